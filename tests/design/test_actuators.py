@@ -13,7 +13,6 @@ from hsv.design.disturbance import DisturbanceSet
 from hsv.design.inputs import ActuatorInputs, parse_inputs
 from hsv.design.region import Region, record
 from hsv.design.tube_problem import channel_model, tube_problem
-from hsv.model.lpv.actuated import respond
 
 NAMES = ("fuel_10", "elevator_50")
 
@@ -59,13 +58,6 @@ def test_a_controller_sees_the_states_before_those_of_the_actuators(design, subj
     assert np.all(system.F[:, 7:] == 0.0)
     ideal = tube_problem(subject.design, subject.vehicle, ones).system
     assert_allclose(system.F[:, :7], ideal.F)
-
-
-def test_the_lag_of_a_plan_at_rest_is_nothing(design, subject):
-    sampled = channel_model(design, subject.vehicle).actuators
-    states, means = respond(sampled, np.zeros((5, 2)))
-    assert not states.any()
-    assert not means.any()
 
 
 def test_the_feedback_to_the_lag_dies_out_between_two_gains_of_the_plan(flight, design, subject):

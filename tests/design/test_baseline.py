@@ -1,17 +1,9 @@
 import json
 
-import numpy as np
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.control.design import ControlDesign
 from hsv.design.baseline import design_gains
-
-
-def test_the_design_passes_the_check_of_the_nodes(design):
-    checked = ControlDesign.from_parameters(design.to_parameters())
-    assert not checked.modified
-    assert np.array_equal(checked.nominal_gains, design.nominal_gains)
 
 
 def test_the_report_is_json_and_carries_the_inputs(result, inputs):

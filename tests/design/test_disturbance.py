@@ -8,7 +8,6 @@ from hsv.design.disturbance import DisturbanceSet, inflated
 from hsv.design.error_system import tube_errors
 from hsv.design.region import Region, record
 from hsv.design.tube_problem import channel_model, tube_problem
-from hsv.flight.corners import corners, fraction
 from hsv.model.vehicle import load_vehicle
 
 
@@ -54,15 +53,6 @@ def test_the_error_system_predicts_the_error_of_a_flight(flight, subject):
         system = tube_problem(local, load_vehicle(), ones).system
         predicted = system.A[0] @ errors[k] + system.G[0] @ channels[k]
         assert_allclose(predicted, errors[k + 1], rtol=0.0, atol=1e-11)
-
-
-def test_fraction_is_balanced(found):
-    rows = fraction(load_vehicle().uncertainty)
-    assert len(rows) == 257
-    assert rows[0] == {}
-    assert len(corners(load_vehicle().uncertainty)) == 1025
-    signs = np.array([[np.sign(v) for v in row.values()] for row in rows[1:]])
-    assert_allclose(signs.T @ signs, 256 * np.eye(10))
 
 
 def test_membership_names_channel_and_step():

@@ -57,6 +57,17 @@ class Subject:
             found = found[int(key) if isinstance(found, list) else key]
         return found
 
+    def count(self, field: str, limit: int) -> int:
+        """Return a number of samples, sequences or steps; a hostile file gets no more than ``limit``.
+
+        Raises:
+            DesignError: It is no such number.
+        """
+        found = self.stated(field)
+        if not isinstance(found, int) or not 0 < found <= limit:
+            raise DesignError(f"{field} = {found!r}: expected an integer from 1 to {limit}")
+        return found
+
     @cached_property
     def vehicle(self) -> Vehicle:
         """The vehicle in the certificate; where there is none, the default one."""

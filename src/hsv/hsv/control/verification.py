@@ -79,13 +79,16 @@ STEERING = (
     "inputs.model.tensor_product.tolerance",
     "inputs.tightening",
 )
-"""Inputs that steer the search for a design: what was found is judged whatever they are."""
+"""Inputs that only steer the search for a design: its results are judged independently of them."""
 
 _POINTS = 46
 """Altitudes, and velocities, at which the model is compared with the vehicle, between its samples."""
 
 _FREQUENCIES = np.logspace(-2.0, 2.0, 200)
 """rad/s, those of the paper's figure 2."""
+
+_LONGEST = 10_000
+"""Steps of the longest sequence of a counter-example."""
 
 _STATUS = ("optimal", "optimal_inaccurate")
 _KEPT_OFF = 0.05
@@ -138,7 +141,7 @@ def sizes(table: Mapping[str, float], names: Sequence[str]) -> np.ndarray:
 
 def statement_checks(subject: Subject) -> Checks:
     """Compare names, units and digests; no other check relies on a digest."""
-    from pydantic_core import to_json  # writes numbers as the inputs were digested; a node does without
+    from pydantic_core import to_json  # writes numbers as the design does; a node does without
 
     design, inputs = subject.design, subject.certificate["inputs"]
     yield equal(subject, "name", design.name)
@@ -174,7 +177,7 @@ def input_checks(subject: Subject) -> Checks:
 
 
 def solver_checks(subject: Subject) -> Checks:
-    """Look at the status of every solver; what it returned is judged by the matrices, not by this."""
+    """Check the status of every solver; the other checks judge the matrices that it returned."""
     for field in leaves(subject.certificate):
         if field.endswith("solver.status"):
             found = subject.stated(field)
@@ -216,10 +219,8 @@ def recomputed_model(subject: Subject) -> Model:
         states = np.concatenate((states, *[filters] * len(subject.design.notch)))
     scales = states, sizes(product["input_scale"], INPUT_NAMES)
     of_grid = inputs["representation"] == "grid"
-    counts = [
-        inputs["grid"][f"{axis}_vertices"] if of_grid else product[f"{axis}_samples"]
-        for axis in ("altitude", "velocity")
-    ]
+    of_axis = ("inputs.model.grid.{}_vertices" if of_grid else "inputs.model.tensor_product.{}_samples").format
+    counts = [subject.count(of_axis(axis), 100) for axis in ("altitude", "velocity")]
     axes = np.linspace(*vehicle.altitude_range, counts[0]), np.linspace(*vehicle.velocity_range, counts[1])
     samples: list[tuple[np.ndarray, np.ndarray]] = [(axis, np.eye(len(axis))) for axis in axes]
     values: Sequence[np.ndarray] = ()
@@ -576,7 +577,7 @@ class StarNorms(NamedTuple):
     def start(self, tube: Tube) -> float:
         """Return the largest level of terms, one a channel, whose sum is -c, where a flight starts (e = 0).
 
-        A term is what the mid-point of its channel makes of the mean vertex; the last one takes the rest.
+        A term is the steady response of the mean vertex to the mid-point of its channel; the last one takes the rest.
         """
         acting, mean = np.flatnonzero(tube.columns.any(axis=(0, 1))), tube.A.mean(axis=0)
         terms = np.linalg.solve(mean - np.eye(len(mean)), tube.G.mean(axis=0) * tube.middle).T
@@ -699,7 +700,7 @@ def counter_example_checks(subject: Subject) -> Checks:
     tube, stated = Tube(subject, subject.design, "tube"), subject.stated(f"{inside}.counter_examples")
     driven = np.zeros(len(tube.rows))
     for k, (row, vertex, steps) in enumerate(zip(tube.rows, stated["vertex"], stated["steps"], strict=True)):
-        for _ in range(steps):
+        for _ in range(min(steps, _LONGEST)):
             driven[k] += np.abs(row @ tube.G[vertex]) @ tube.half
             row = row @ tube.A[vertex]
     check = recomputed(subject, f"{inside}.counter_examples.half_range", driven, "half-widths")
@@ -713,7 +714,7 @@ def counter_example_checks(subject: Subject) -> Checks:
 
 
 def factor_checks(subject: Subject) -> Checks:
-    """Recompute what a change of the factor in flight rests on; a design without one has the factor 1 alone."""
+    """Recompute the evidence for changes of the factor in flight; a design without one has the factor 1 alone."""
     design, stated = subject.design, subject.certificate.get("adjustable")
     filtered = stated is not None
     yield required(Check("nominal.filtered", str(design.filtered), str(filtered), design.filtered == filtered))

@@ -153,7 +153,7 @@ def _report(
 def certified_loops(design: ControlDesign, vehicle: Vehicle, effectiveness: float) -> np.ndarray:
     """Return the closed loops (r, n, n) of error and filter that must share a Lyapunov function.
 
-    Vertices x adjustable factors (the least, 1) x elevator effectiveness (1, ``effectiveness``).
+    Vertices x tube factors (the smallest, 1) x elevator effectiveness (1, ``effectiveness``).
     """
     polytope, model = design.polytope, channel_model(design, vehicle)
 
@@ -182,7 +182,7 @@ def relaxed_bound(
 
 
 def room_at_one(design: ControlDesign, vehicle: Vehicle, tube: dict[str, Any]) -> np.ndarray:
-    """Return the least room (2) that the plan of the certificate ``tube`` leaves where the factor is set to 1.
+    """Return the smallest room (2) that the nominal plan of the certificate ``tube`` has at the factor 1.
 
     Raises:
         DesignError: The feedback leaves nothing of an input there.

@@ -42,7 +42,7 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
 
     Args:
         inputs: Design inputs, from :func:`hsv.design.inputs.read_inputs`.
-        progress: Told of every part that is done.
+        progress: Called after each part.
 
     Raises:
         DesignError: A problem without a solution, a solution that fails when recomputed, or a nominal plan that does
@@ -71,7 +71,7 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what computes a design."""
+    """Return the versions of the packages that compute a design."""
     return {package: version(package) for package in ("numpy", "scipy", "cvxpy", "clarabel")}
 
 

@@ -10,7 +10,7 @@ The structured set writes the rigid part of Delta as three accelerations held ov
 the column B_e(p), and what remains in altitude and pitch angle; a seventh channel is the part of the feedback that
 comes from filtering the nominal pitch rate, F_q (notch(q_n) - q_n), which acts through B(p) F_q. Nothing is left out.
 
-Where the design knows its actuators, u above is where they are on average over the period, driven by what is commanded,
+Where the design knows its actuators, u above is their mean position over the period under the command,
 and w is what of the lost elevator comes through them; see :mod:`hsv.design.error_system` for the lag of the plan.
 """
 
@@ -176,7 +176,7 @@ def decompose(
     """
     x, x_r, n = record.state[:-1], record.reference[:-1], len(record.state) - 1
     S = scheduled(polytope, x[:, :2])
-    # The difference of the whole state and input from the reference, as columns of [A(p), B(p)] take it.
+    # State and input less the reference: the vector that [A(p), B(p)] multiplies.
     moved = np.hstack((x - x_r, (command - record.reference_input)[:-1]))
     predicted = record.reference[1:] + record.defect[:-1]
     for j in range(N_STATES + N_INPUTS):
@@ -224,7 +224,7 @@ class Membership:
 class DisturbanceSet:
     """The structured set: each of :data:`CHANNELS` between ``lower`` and ``upper`` (7), SI (paper eq. 19).
 
-    It bounds what it was computed on and nothing else: check :meth:`membership` in every later flight.
+    It bounds the flights that it was computed from. Check :meth:`membership` in every other flight.
     """
 
     lower: np.ndarray
@@ -283,7 +283,7 @@ def widened(lower: np.ndarray, upper: np.ndarray, factor: float) -> tuple[np.nda
 
 @dataclass(frozen=True)
 class Extremes:
-    """Least and largest values over flights, with the flight of each: bounds (c), indices (c) into the corners."""
+    """Smallest and largest values (c) over flights, and the indices (c) of these flights among the corners."""
 
     lower: np.ndarray
     upper: np.ndarray

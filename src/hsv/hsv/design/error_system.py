@@ -84,7 +84,7 @@ def error_system(
     columns[:, 0, 5] = columns[:, 3, 6] = 1.0
     names = STATE_NAMES[:N_RIGID] + tuple(f"filter_{i + 1}" for i in range(n - N_RIGID - a))
     if actuators:
-        # The filter before the actuators: what a controller sees of the set is its first states.
+        # The filter comes before the actuators, so that the controller sees the first states of the set.
         order = np.r_[:N_RIGID, N_RIGID + a : n, N_RIGID : N_RIGID + a]
         whole, inputs, columns = whole[:, order][:, :, order], inputs[:, order], columns[:, order]
         gain, names = gain[:, order], names + actuator_names(actuators)

@@ -200,7 +200,7 @@ class RampInputs(_Table):
 
 
 def _coupling(value: Any) -> Any:
-    """Return a multiple of the derived coupling as its text, a name as it is."""
+    """Return a multiple of the derived coupling as text; a name is returned unchanged."""
     try:
         return value if isinstance(value, bool) else repr(float(value))
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""The polytopic model that a design stands on, and how well it agrees with the vehicle between its samples."""
+"""The polytopic model of a design (paper eq. 10 to eq. 12, eq. 45) and its accuracy between the samples."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def state_scale(inputs: ModelInputs, notch: Sequence[NotchSection]) -> np.ndarra
 
 
 def polytopic_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[NotchSection] = ()) -> DesignModel:
-    """Return the polytopic model of ``vehicle``, decoupled, over the envelope, as asked for (paper eq. 12, eq. 45).
+    """Return the polytopic model of ``vehicle``, decoupled, over the envelope (paper eq. 12, eq. 45).
 
     Args:
         inputs: Inputs of the model.
@@ -137,7 +137,7 @@ def design_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[NotchSec
 
 
 def _rounded(polytope: Polytope, state_scale: np.ndarray, input_scale: np.ndarray) -> Polytope:
-    """Return the vertices without the digits on which processors differ; what no physics makes becomes zero."""
+    """Return the vertices rounded to the digits on which processors agree; rounding noise becomes zero."""
     A = rounded(polytope.A, state_scale[:, None] / state_scale, VERTEX_DIGITS)
     B = rounded(polytope.B, state_scale[:, None] / input_scale, VERTEX_DIGITS)
     return Polytope(A, B, polytope.altitude, polytope.velocity)

@@ -27,7 +27,7 @@ from hsv.model.plant import FlightStatus
 Result = TypeVar("Result")
 
 _NO_STOP = 1e3
-"""Stop of an actuator that leaves those of the vehicle; they hold beside."""
+"""Stop of an actuator beyond those of the vehicle, which hold as well."""
 
 
 def incomplete_share(inputs: DesignInputs) -> float:
@@ -114,7 +114,7 @@ class Region:
         over: Sequence[Corner],
         progress: Callable[[int], None] = lambda done: None,
     ) -> list[Result]:
-        """Return ``job`` of every flight, in order, with errors as above; they are flown side by side, in threads."""
+        """Return ``job`` of every flight, in order; flights share the lanes of a register and run in threads."""
         return fly_perturbed(self._parts, over, lambda corner, flight: job(_checked(corner, flight)), progress)
 
 
@@ -148,7 +148,7 @@ def record(flight: Flight) -> Record:
 class RegionResult:
     """Extremes measured over the region: of the channels (7), of f, w, Delta (9 each), of lag feedback (2).
 
-    The last: what F makes of the lag of the plan, nothing where actuators are ideal.
+    The last is the feedback F to the lag of the plan, zero where actuators are ideal.
     """
 
     flights: int

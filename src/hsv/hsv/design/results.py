@@ -40,10 +40,6 @@ def _in(unit: str, *values: float) -> str:
     return ", ".join(f"{to_paper(float(value), unit)[0]:.4g}" for value in values)
 
 
-def _half_width(tube: dict[str, Any]) -> str:
-    return _sizes(tube["invariant_set"]["half_width"])
-
-
 def _attained(certificate: dict[str, Any]) -> str:
     driven = certificate["tube"]["invariant_set"].get("counter_examples")
     return _sizes(driven["half_range"]) if driven else "-"
@@ -54,7 +50,7 @@ def _sizes(half_width: Sequence[float]) -> str:
     return ", ".join(_in(unit, value) for unit, value in zip(units, half_width, strict=False))
 
 
-def _each(certificate: dict[str, Any], values: Sequence[float]) -> str:
+def _each(values: Sequence[float]) -> str:
     return f"{_in('1', values[0])}; {_in('rad', values[1])}"
 
 
@@ -66,9 +62,7 @@ def _range(certificate: dict[str, Any]) -> str:
 
 def _room(certificate: dict[str, Any]) -> str:
     plan = certificate["tube"]["tightening"]["plan"]
-    return _each(
-        certificate, [min(pair) for pair in zip(plan["margin_to_lower"], plan["margin_to_upper"], strict=True)]
-    )
+    return _each([min(pair) for pair in zip(plan["margin_to_lower"], plan["margin_to_upper"], strict=True)])
 
 
 def _membership(certificate: dict[str, Any]) -> str:
@@ -90,7 +84,7 @@ _ROWS: dict[str, Callable[[dict[str, Any]], str]] = {
         f"{c['adjustable']['tau'][0]:g}; {c['adjustable']['share']:g}" if "adjustable" in c else "1; 1"
     ),
     "largest nominal input from trim: fuel; elevator deg (eq. 35, eq. 52)": lambda c: _each(
-        c, c["adjustable"]["input_bound"] if "adjustable" in c else list(c["inputs"]["nominal"]["input_bound"].values())
+        c["adjustable"]["input_bound"] if "adjustable" in c else list(c["inputs"]["nominal"]["input_bound"].values())
     ),
     "nominal gains; certified cost of the outermost, s (eq. 32)": lambda c: (
         f"{len(c['nominal'])}; {c['nominal'][0]['certified_gamma']:.1f}"
@@ -99,13 +93,13 @@ _ROWS: dict[str, Callable[[dict[str, Any]], str]] = {
     "inertial coupling; fraction of W in the tube": lambda c: (
         f"{c['inputs']['disturbance']['coupling']}; {c['inputs']['disturbance']['share']:g}"
     ),
-    "half-widths z: ft, ft/s, deg, deg, deg/s (eq. 28)": lambda c: _half_width(c["tube"]),
+    "half-widths z: ft, ft/s, deg, deg, deg/s (eq. 28)": lambda c: _sizes(c["tube"]["invariant_set"]["half_width"]),
     "half-widths of Z for the whole W at tau = 1": lambda c: (
-        _half_width(c["adjustable"]["complete"]) if "adjustable" in c else "-"
+        _sizes(c["adjustable"]["complete"]["invariant_set"]["half_width"]) if "adjustable" in c else "-"
     ),
     "the paper's tau Z": lambda c: _sizes(c["adjustable"]["scaled_half_width"]) if "adjustable" in c else "-",
     "attained by counter-examples: ft, ft/s, deg, deg, deg/s": _attained,
-    "half-range of F Z: fuel; elevator deg": lambda c: _each(c, c["tube"]["invariant_set"]["feedback_half_range"]),
+    "half-range of F Z: fuel; elevator deg": lambda c: _each(c["tube"]["invariant_set"]["feedback_half_range"]),
     "U minus F Z with trim: fuel; elevator deg (eq. 30)": _range,
     "smallest margin of the nominal inputs in it: fuel; elevator deg": _room,
     "largest level of 1e5 random sequences of 600 steps": lambda c: (

@@ -1,8 +1,8 @@
 """Tightened bounds of the nominal input (paper eq. 30): U minus F Z, per side, with the trim.
 
-U is not symmetric about trim and the tube not about zero, so every side has its own bound. What the feedback may add is
-F e over c + Z, its part from filtering the nominal pitch rate, and what it makes of the lag of the plan where the
-design knows its actuators.
+U is not symmetric about trim and the tube not about zero, so every side has its own bound. The feedback consists of F e
+over c + Z, of a part from filtering the nominal pitch rate, and of the response to the lag of the plan where the design
+knows its actuators.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ def left_by(
 def plan_bounds(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray) -> PlanBounds:
     """Return bounds for another nominal plan within which the disturbance set should hold; flights have to show it.
 
-    Another plan may hold for long the inputs that the certified ones only touch. So it is kept off their top; the room
-    below them is that of plans that overshoot a little. The pitch acceleration is as theirs.
+    Another plan may hold for a long time inputs that the certified plans only touch. It therefore stays below their
+    largest inputs, and may go as far below their smallest ones. The pitch acceleration has their bounds.
 
     Args:
         bounds: The tightened bounds.

@@ -1,4 +1,4 @@
-"""The tube of a design: disturbances over the declared region, invariant set, tightened inputs, and their evidence."""
+"""The tube of a design: disturbances (paper eq. 19), invariant set (eq. 26), tightened inputs (eq. 30), evidence."""
 
 from __future__ import annotations
 
@@ -111,9 +111,9 @@ def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, pr
 
 
 def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress) -> Tube:
-    """Return the tube of ``design`` over the declared region, certified, and flown at all corners of it.
+    """Return the certified tube of ``design`` over the declared region, with flights at all its corners.
 
-    The disturbances were measured at a quarter of them, so most corners have not been seen before.
+    The disturbances are measured at a quarter of the corners, so most of these flights are new.
 
     Raises:
         DesignError: No invariant set, a set that fails when recomputed, or a nominal plan that does not fit.
@@ -142,7 +142,7 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
 def flights_in_tube(
     model: ChannelModel, region: Region, found: InvariantSet, progress: Progress
 ) -> list[FlightEvidence]:
-    """Fly all corners of ``region`` and return what each flight shows of the set, disturbances by ``model``."""
+    """Fly all corners of ``region`` and return the evidence of each flight; ``model`` computes its disturbances."""
     everyone = region.corners()
     return region.map(
         lambda flight: flight_evidence(flight, found, found.problem.disturbance, model),
@@ -169,7 +169,7 @@ class FlightEvidence:
 def flight_evidence(
     flight: Flight, found: InvariantSet, disturbance: DisturbanceSet, model: ChannelModel
 ) -> FlightEvidence:
-    """Return what ``flight`` shows of the tube."""
+    """Return the evidence of ``flight`` for the tube."""
     h, recorded = flight.history, record(flight)
     errors, _ = model.errors(recorded)
     plan = recorded.plan

@@ -34,7 +34,7 @@ def known_actuators(design: ControlDesign) -> tuple[ActuatorSet, ...]:
 
 
 def bounding_factors(design: ControlDesign) -> list[np.ndarray]:
-    """Return the tube factors (5 each) between which all others lie: the least, for which the set is found, and 1.
+    """Return the tube factors (5 each) that bound all others: the smallest, for which the set is found, and 1.
 
     The closed loop under a factor between the two lies between their closed loops, so that a set that is invariant
     under both is invariant for any variation of the factor between them.

@@ -135,7 +135,7 @@ def disturbances(subject: Subject, flight: Flight) -> Disturbances:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a flight shows: largest ``level`` in the set, largest ``ratio`` of a disturbance to its bound, and where.
+    """Evidence of a flight: largest ``level`` in the set, largest ``ratio`` of a disturbance to its bound, and where.
 
     ``lowest``, ``highest`` (3): of u_n + u_r and of the nominal pitch acceleration; ``lag`` (2, 2): least and largest
     feedback to the lag; ``channels`` (2, 7): least and largest disturbances.
@@ -152,7 +152,7 @@ class Evidence:
 
 
 def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
-    """Return what ``flight`` shows of the ``tube``.
+    """Return the evidence of ``flight`` for the ``tube``.
 
     Raises:
         DesignError: The flight diverged, or its input was limited.
@@ -223,7 +223,7 @@ def flight_checks(subject: Subject) -> Checks:
 
 
 def _worst(subject: Subject, field: str, flown: Sequence[Evidence]) -> Checks:
-    """Hold the flown corners to what is stated of all: a sample may stay below it, and not exceed it."""
+    """Check that the flown corners do not exceed the extremes stated for all corners."""
     stated, allowance = subject.stated(field), 1.0 + TOLERANCES["flights"].relative
     yield at_most(f"{field}: level", max(f.level for f in flown), min(1.0, stated["worst_level"] * allowance))
     ratio = stated["disturbance_membership"]["worst_ratio"] * allowance
@@ -239,9 +239,8 @@ def _lag_check(name: str, subject: Subject, flown: Sequence[Evidence]) -> Check:
 def sequence_checks(subject: Subject) -> Checks:
     """Repeat the random sequences."""
     tube, field = Tube(subject, subject.design, "tube"), "tube.invariant_set.sampling"
-    stated = subject.stated(field)
-    count = stated["sequences"], stated["steps"], stated["seed"]
-    drawn = random_sequences(tube.A, tube.columns, tube.c, tube.Q, *count)
+    numbers = subject.count(f"{field}.sequences", 1_000_000), subject.count(f"{field}.steps", 10_000)
+    drawn = random_sequences(tube.A, tube.columns, tube.c, tube.Q, *numbers, subject.stated(f"{field}.seed"))
     yield at_most("worst level of random sequences", drawn["worst_level"], 1.0)
     check = recomputed(subject, f"{field}.worst_level", drawn["worst_level"], "random sequences")
     yield replace(check, fields=(check.name, *(f"{field}.{name}" for name in ("sequences", "steps", "seed"))))

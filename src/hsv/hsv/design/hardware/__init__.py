@@ -1,1 +1,1 @@
-"""Certification of a design with hardware and air beside the disturbances of its certificate: ``hsv certify``."""
+"""Certification of a design with further hardware and air: ``hsv certify``."""

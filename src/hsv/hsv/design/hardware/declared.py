@@ -1,8 +1,7 @@
 """Models of hardware and air that a scenario declares or that options of the command line describe.
 
-Of noise as many standard deviations count as :data:`REACH` says, which the numbers of :mod:`hsv.core.arithmetic` pass
-one time in 370: their own bound is :data:`hsv.core.arithmetic.LARGEST`. What has no bound is named, and certifies
-nothing.
+Noise counts :data:`REACH` standard deviations, which one normal number in 370 exceeds; :data:`LARGEST_REACH` bounds
+them all. An effect without a known bound is named, and with it nothing is certified.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ REACH = 3.0
 """Standard deviations of noise and turbulence that count as their bound: one sample in 370 is beyond."""
 
 LARGEST_REACH = float(np.ceil(1e3 * LARGEST)) / 1e3
-"""Bound of all normal numbers, as it is written: rounded up."""
+"""Bound of all normal numbers, rounded up to three decimals."""
 
 
 def sensors(data: SensorData, plan: Plan, reach: float = REACH, of: str = "sensor") -> dict[str, Model]:
@@ -56,7 +55,7 @@ def sensors(data: SensorData, plan: Plan, reach: float = REACH, of: str = "senso
 
 
 def without_bound(data: SensorData, values: Mapping[str, Any]) -> list[str]:
-    """Return what of sensors of the rigid states, or of an estimator behind them, no bound is known for."""
+    """Return the effects of sensors of the rigid states, and of an estimator, for which no bound is known."""
     found = {
         "lag of a sensor": data.lag_decay[:N_RIGID].any(),
         "random walk of a sensor": data.walk[:N_RIGID].any(),
@@ -68,7 +67,7 @@ def without_bound(data: SensorData, values: Mapping[str, Any]) -> list[str]:
 
 
 def declared(subject: CertifiedDesign, scenario: Scenario, reach: float = REACH) -> tuple[dict[str, Model], list[str]]:
-    """Return the models of sensors and air that a scenario declares, by name, and what of it has no bound.
+    """Return the models of sensors and air that a scenario declares, by name, and its effects without a bound.
 
     Args:
         subject: The design.
@@ -98,7 +97,7 @@ def declared(subject: CertifiedDesign, scenario: Scenario, reach: float = REACH)
 
 
 def _beside(values: Mapping[str, Any], period: float) -> list[str]:
-    """Return what of links, and of actuators that are not as published, there is: no model of it is made here."""
+    """Return the names of links that are not ideal and of changed actuator parameters, which have no model here."""
     own = [p.name for p in ACTUATOR_PARAMETERS if isinstance(p.default, list) and values.get(p.name)]
     late = not command_link(values, period).ideal or computation(values, period)[1] > 0.0
     found = {"link of the measurement": not measurement_link(values).ideal, "link of the command": late}
@@ -106,7 +105,7 @@ def _beside(values: Mapping[str, Any], period: float) -> list[str]:
 
 
 def _remeasure(models: dict[str, Model], unbounded: list[str], plan: Plan, equipment: Mapping[str, Any]) -> None:
-    """Add what flights with sensors leave unexplained, or why there are none that say it."""
+    """Add the model errors measured in flights with sensors; if a flight fails, they are an unbounded effect."""
     try:
         models["model errors under sensors"] = unexplained(plan, equipment)
     except DesignError as failure:
@@ -129,7 +128,7 @@ def described(
     density: str = "0 %",
     reach: float = REACH,
 ) -> tuple[dict[str, Model], list[str]]:
-    """Return the models that are described in words, by name, and what has no bound; what does nothing is left out.
+    """Return the models that options describe, by name, and the effects without a bound; none of size zero.
 
     Args:
         subject: The design.

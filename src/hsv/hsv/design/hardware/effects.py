@@ -73,7 +73,7 @@ class Measured:
     plan: Plan | None = None
 
     def __call__(self, system: ErrorSystem) -> Effect:
-        """Return the effect on ``system``; what is late of the error e is left to :func:`delayed`."""
+        """Return the effect on ``system``; :func:`delayed` adds the delay of the error e."""
         columns, seen = entering(system), system.F[:, :N_RIGID].copy()
         error, widening = self.error, np.zeros(len(CHANNELS))
         if self.plan:
@@ -122,7 +122,7 @@ def delayed(system: ErrorSystem, late: np.ndarray) -> ErrorSystem:
 
 
 def air(vehicle: Vehicle, period: float, forward: float = 0.0, up: float = 0.0, density: float = 0.0) -> Model:
-    """Return the model of air with at most these velocities (m/s) and a density off by at most this fraction.
+    """Return the model of air with bounded velocities (m/s) and a bounded relative error of the density.
 
     Its effect is that at mid-envelope, held over a ``period`` (s).
     """

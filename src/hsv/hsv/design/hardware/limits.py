@@ -1,4 +1,4 @@
-"""Whether limits of actuators act within a certified set: how far and how fast the tube moves them at most.
+"""Largest positions and rates of the actuators within a certified set, compared with their limits.
 
 The error system is linear, so a certificate holds for actuators whose stops and rate limits no error in the set
 reaches. Where they are reached it holds for the same actuators without them, and says nothing of the limited ones.
@@ -105,7 +105,7 @@ def reaches(found: InvariantSet, design: ControlDesign, plan: Plan) -> list[Reac
 
 
 def _after(actuator: ActuatorSet, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what position and rate after ``time`` (s) are of the states before, (order) each, and of a command (2)."""
+    """Return the rows (order) from the states to position and rate after ``time`` (s), and those (2) of a command."""
     F11, F12, F21, F22 = actuator_map(actuator.order, actuator.natural_frequency, actuator.damping_ratio, time)
     if actuator.order == 1:
         turned = -actuator.natural_frequency * F11

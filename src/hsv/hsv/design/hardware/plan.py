@@ -62,14 +62,14 @@ class Plan:
         return np.asarray(self.inflation * np.abs(self.states).max(axis=0))
 
     def change(self, steps: np.ndarray) -> np.ndarray:
-        """Return by how much each rigid state (5) changes at most over so many steps (5)."""
+        """Return the largest change of each rigid state (5) over the given number of steps (5)."""
         pairs = [(self.states[n:, i], self.states[: len(self.states) - n, i]) for i, n in enumerate(steps)]
         return np.array([self.inflation * np.abs(later - before).max() for later, before in pairs])
 
     def scheduling(self, errors: np.ndarray) -> np.ndarray:
-        """Return what errors (2) of altitude and velocity add to the bounds of the structured set (7).
+        """Return the widening (7) of the structured set that errors (2) of altitude and velocity cause.
 
-        The nominal model is scheduled with what is measured, so its prediction of x_n is off by
+        The nominal model is scheduled with the measurement, so its prediction of x_n is off by
         [A(p + error) - A(p)] x_n + [B(p + error) - B(p)] u_n. Both ends of both errors are looked at.
         """
         polytope, points = self.subject.design.polytope, self.record.state[:, :2]
@@ -93,8 +93,8 @@ class Plan:
     def remeasured(self, equipment: Mapping[str, Any]) -> np.ndarray:
         """Return by how much flights with ``equipment``, flat parameters of sensors, leave the structured set (7).
 
-        What noise moves the elevator by is another input to the same vehicle, and what the model does not explain of it
-        is measured as the set itself is: over flights, of the nominal vehicle and 32 corners, inflated.
+        Noise moves the elevator, and the model does not explain all of the response. The rest is measured as the set
+        is: in flights of the nominal vehicle and 32 corners, inflated.
 
         Raises:
             DesignError: A flight is lost or limited.

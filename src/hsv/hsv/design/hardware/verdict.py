@@ -1,4 +1,4 @@
-"""Whether a design stays certified with models of hardware and air beside the disturbances of its certificate.
+"""Verdict: whether a design stays certified if models of hardware and air add to its disturbances.
 
 Actuators add states. The invariant set is sought as a design seeks its own, under all vertices, and the nominal plan of
 the certificate has to fit into what it leaves of the inputs. Whether limits of actuators act in that set is said by
@@ -33,7 +33,7 @@ from hsv.model.actuators import ACTUATOR_SETS, IDEAL
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_RIGID
 
 Lag = tuple[np.ndarray, np.ndarray] | None
-"""Least and largest feedback (2 each) to the lag of the plan behind actuators; none where they are ideal."""
+"""Smallest and largest feedback (2 each) to the lag of the plan behind actuators; none where they are ideal."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def certified_with(
     progress: Progress = lambda *_: None,
     unbounded: Sequence[str] = (),
 ) -> list[Verdict]:
-    """Return a verdict for the design as it is, with its ``actuators``, with each model alone, and with all.
+    """Return verdicts: as certified, with ``actuators``, with each model alone, and with all models.
 
     Where actuators are known and all is certified without their limits, a last verdict is on these.
 
@@ -106,7 +106,7 @@ def certified_with(
         subject: The design with its certificate.
         models: Models by name.
         actuators: Names with commas between, or "ideal"; empty: those that the design knows.
-        progress: Told of every verdict.
+        progress: Called after each verdict.
         unbounded: Further effects for which no bound is known; with any of them nothing is certified.
 
     Raises:
@@ -152,7 +152,7 @@ def _named(actuators: str) -> tuple[str, ...]:
 
 
 def _lag_of_the_plan(subject: CertifiedDesign, design: ControlDesign) -> tuple[np.ndarray, np.ndarray]:
-    """Return least and largest feedback (2 each) to the lag of the nominal vehicle's plan, inflated as a design's."""
+    """Return the smallest and largest feedback (2 each) to the lag of the nominal vehicle's plan, inflated as W."""
     inputs = subject.inputs
     flight = Region(subject.design, inputs, incomplete_share(inputs)).fly({})
     feedback = channel_model(design, subject.vehicle).errors(record(flight))[1]

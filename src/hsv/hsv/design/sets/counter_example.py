@@ -36,7 +36,7 @@ class CounterExamples:
 
 
 def counter_examples(problem: TubeProblem) -> CounterExamples:
-    """Return the sequences of all rows, flown: e(k+1) = A_i e(k) + G_i d(k) from e = 0.
+    """Return the sequences of all rows, simulated: e(k+1) = A_i e(k) + G_i d(k) from e = 0.
 
     At a constant vertex i, row e(m) = sum_k row A_i^(m-1-k) G_i d(k) is largest for the bound of each disturbance that
     has the sign of its factor. What changing vertices add to that is not sought.
@@ -54,7 +54,7 @@ def counter_examples(problem: TubeProblem) -> CounterExamples:
 
 
 def responses(problem: TubeProblem, row: np.ndarray) -> np.ndarray:
-    """Return (steps, r, d) what each disturbance, so many steps ago, moves an output ``row`` (n) by at each vertex.
+    """Return the response (steps, r, d) of an output ``row`` (n) to each disturbance, steps ago, at each vertex.
 
     As many steps as count, all vertices stable.
     """
@@ -66,7 +66,7 @@ def responses(problem: TubeProblem, row: np.ndarray) -> np.ndarray:
         share = np.abs(found[-1]) @ half_width
         total += share
         left = np.einsum("in,inm->im", left, A)
-        # The slow poles are real: what is left after a step falls no faster than it has.
+        # The slow poles are real, so the remainder decays no faster than before.
         if len(found) % 100 == 0 and np.all(share <= _NEGLIGIBLE * total):
             break
     return np.array(found)

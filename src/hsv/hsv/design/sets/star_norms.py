@@ -78,12 +78,12 @@ class StarNorms:
         return residuals
 
     def level_at_start(self, problem: TubeProblem, centre: np.ndarray, error: np.ndarray | None = None) -> float:
-        """Return the largest level of terms whose sum is an ``error`` (n), by default none: at most 1, it is inside.
+        """Return the largest level of terms whose sum is an ``error`` (n), by default zero; at most 1: it is inside.
 
-        Zero error is the sum of what the mid-point of each channel makes of the mean vertex in the long run, with the
-        opposite sign: no mid-point is farther from zero than the half-width of its channel. The last channel takes what
-        is left, that of constant channels too, which have no ellipsoid. The error is added to the term of one channel,
-        for each row the one that suits. Infinite where no channel does anything and the sum is not zero.
+        Zero error is the sum of the steady responses of the mean vertex to the mid-point of each channel, with the
+        opposite sign: no mid-point is farther from zero than the half-width of its channel. The last channel takes the
+        rest, and with it the constant channels, which have no ellipsoid. The error is added to the term of one channel,
+        for each row the best one. Infinite where no channel does anything and the sum is not zero.
         """
         mean = problem.system.A.mean(axis=0)
         G, acting = problem.system.G.mean(axis=0), np.flatnonzero(problem.columns(centre).any(axis=(0, 1)))
@@ -158,7 +158,7 @@ def star_norms(
     Args:
         problem: Error system and disturbances.
         centre: (n) centre of the set.
-        progress: Told how many ellipsoids of all are found.
+        progress: Called with the ellipsoids found and their total.
 
     Raises:
         DesignError: A row and a channel for which there is none.
