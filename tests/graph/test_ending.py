@@ -9,13 +9,13 @@ import sys
 import pytest
 
 from hsv.graph.standstill import HUNG_AFTER
-from hsv_node.ending import LEAVE_WITHIN
+from hsv_node.process import LEAVE_WITHIN
 
 
 def run(script: str, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
     """Run a script that has said its answer and then leaves; one that hung would fail here."""
     begin = (
-        "import ctypes, resource, sys, time\nfrom hsv_node.ending import ends_with\nprint('the answer', flush=True)\n"
+        "import ctypes, resource, sys, time\nfrom hsv_node.process import ends_with\nprint('the answer', flush=True)\n"
     )
     command = [sys.executable, "-c", begin + script]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment)

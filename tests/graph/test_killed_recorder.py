@@ -31,7 +31,7 @@ SUBSCRIBE = textwrap.dedent(
     import struct, time
     import rclpy
     from hsv_msgs.msg import VehicleState
-    from hsv_node.qos import STEP
+    from hsv_node.middleware import STEP
     from rclpy.experimental import EventsExecutor
 
     rclpy.init()

@@ -70,7 +70,7 @@ HASHES = textwrap.dedent(
     import json, sys
     import rclpy
     from hsv.bags.reader import Bag
-    from hsv_node.messages import message_class
+    from hsv_node.middleware import message_class
 
     rclpy.init()
     node, other = rclpy.create_node("talker"), rclpy.create_node("asker")
@@ -102,8 +102,8 @@ SUBSCRIBE = textwrap.dedent(
     from rclpy.experimental import EventsExecutor
     from hsv.bags.description import TOPICS
     from hsv.bags.reader import Bag
-    from hsv_node.messages import message_class
-    from hsv_node.qos import STEP
+    from hsv_node.middleware import message_class
+    from hsv_node.middleware import STEP
     from std_srvs.srv import Trigger
 
     rclpy.init()

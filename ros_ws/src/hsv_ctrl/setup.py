@@ -23,7 +23,7 @@ setup(
             "controller = hsv_ctrl.controller:main",
             "notch_filter = hsv_ctrl.notch_filter:main",
             "nominal_trajectory = hsv_ctrl.nominal_trajectory:main",
-            "robust_mpc = hsv_ctrl.robust_mpc:main",
+            "robust_mpc = hsv_ctrl.tube_mpc:robust_main",
             "tube_mpc = hsv_ctrl.tube_mpc:main",
         ],
     },

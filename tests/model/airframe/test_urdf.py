@@ -1,14 +1,14 @@
 """The robot description that is shipped has the frames and joints of the airframe."""
 
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from hsv.model.airframe.pose import FLAMES, LEVEL, Sample, transforms
+from hsv.model.airframe.urdf import urdf
 
-ROBOT = ElementTree.parse(Path(__file__).parents[3] / "ros_ws/src/hsv_bringup/urdf/airframe.urdf").getroot()
+ROBOT = ElementTree.fromstring(urdf())
 JOINTS = {joint.find("child").attrib["link"]: joint for joint in ROBOT.iter("joint")}
 
 

@@ -13,8 +13,7 @@ from hsv.bags import description
 from hsv.bags.definitions import definition, type_hash
 from hsv.bags.topic import Qos, Topic
 from hsv.bags.writer import BagWriter
-from hsv_node.messages import message_class
-from hsv_node.qos import STEP
+from hsv_node.middleware import STEP, message_class
 
 _CONTROLLER = description.TUBE_MPC.name
 

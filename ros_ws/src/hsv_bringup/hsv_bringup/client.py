@@ -21,10 +21,9 @@ from hsv.base.files import json_text
 from hsv.graph.exclusive import is_published
 from hsv.graph.standstill import Standstill
 from hsv_node import roles
-from hsv_node.ending import ends_with
 from hsv_node.main import take_signals
-from hsv_node.messages import type_name
-from hsv_node.qos import LATCHED
+from hsv_node.middleware import LATCHED, type_name
+from hsv_node.process import ends_with
 
 ABSENT_AFTER = 3.0
 """Seconds without a change in the ROS domain after which nobody is looked for who is not on this machine."""

@@ -10,8 +10,7 @@ from hsv_bringup.recorder import RecorderNode
 from hsv_ctrl.controller import ControllerNode
 from hsv_ctrl.nominal_trajectory import NominalTrajectoryNode
 from hsv_ctrl.notch_filter import NotchFilterNode
-from hsv_ctrl.robust_mpc import RobustMpcNode
-from hsv_ctrl.tube_mpc import TubeMpcNode
+from hsv_ctrl.tube_mpc import RobustMpcNode, TubeMpcNode
 from hsv_node.main import run_nodes
 from hsv_node.process import ProcessNode
 from hsv_plant.fault_injector import FaultInjectorNode

@@ -48,10 +48,9 @@ from hsv.pages.viewers import LAYOUTS, VIEWERS
 from hsv_bringup.client import ABSENT_AFTER, SILENT_AFTER
 from hsv_bringup.flow_executor import FlowExecutor
 from hsv_node.main import run_node
-from hsv_node.messages import message_class, type_name
+from hsv_node.middleware import LATCHED, message_class, type_name
 from hsv_node.parameters import declare, refuse_unknown
 from hsv_node.process import ProcessNode
-from hsv_node.qos import LATCHED
 from hsv_node.roles import full_name, node_in_role, services
 
 RATE = 20.0

@@ -23,9 +23,8 @@ from hsv.bags.writer import BagWriter
 from hsv.graph.standstill import Standstill
 from hsv_node.lockstep import LockstepNode
 from hsv_node.main import run_node
-from hsv_node.messages import message_class
+from hsv_node.middleware import LATCHED, STEP, message_class
 from hsv_node.parameters import declare
-from hsv_node.qos import LATCHED, STEP
 
 
 class PeerEmulatorNode(LockstepNode):

@@ -21,7 +21,7 @@ from hsv.bags.topic import Qos
 from hsv.base.errors import ParameterError, RecordingError
 from hsv_node.lockstep import SAID_EVERY
 from hsv_node.main import run_node
-from hsv_node.messages import message_class
+from hsv_node.middleware import message_class
 from hsv_node.parameters import refuse_sim_time, refuse_unknown
 from hsv_node.process import ProcessNode
 

@@ -43,9 +43,8 @@ from hsv_bringup.flow_executor import BatchExecutor
 from hsv_bringup.peer_parameters import GIVE_UP_AFTER, PeerParameters
 from hsv_node.lockstep import SAID_EVERY, PeerNode
 from hsv_node.main import run_node
-from hsv_node.messages import message_class
+from hsv_node.middleware import LATCHED, STEP, message_class
 from hsv_node.parameters import declare
-from hsv_node.qos import LATCHED, STEP
 
 CONFIRMATION_INTERVAL = 50
 """Steps between confirmations: a confirmation of every step would halve the speed of the loop."""

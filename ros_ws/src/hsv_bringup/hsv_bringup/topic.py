@@ -18,7 +18,7 @@ from hsv.bags.typestore import message_types
 from hsv.bags.units import units_of
 from hsv.base.errors import ParameterError, RecordingError, RunError
 from hsv_bringup.client import GraphClient, OneLineParser, answer, run_client
-from hsv_node.messages import message_class
+from hsv_node.middleware import message_class
 from hsv_node.roles import node_in_role
 
 DEPTH = 1000

@@ -16,7 +16,7 @@ from hsv.base.errors import RunError
 from hsv.base.units import unit_system
 from hsv.graph.snapshot import Snapshot
 from hsv_bringup.client import GraphClient, OneLineParser, answer, run_client
-from hsv_node.messages import message_class
+from hsv_node.middleware import message_class
 
 EVERY = 0.2
 """Seconds of the wall clock between two looks."""

@@ -14,11 +14,10 @@ from hsv.control.nominal_law import NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.flight.blocks import Signals
 from hsv_ctrl.design import declare_design
-from hsv_ctrl.step_times import StepTimes
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
+from hsv_node.middleware import LATCHED
 from hsv_node.parameters import declare_vehicle
-from hsv_node.qos import LATCHED
 
 _SOLVER_FAILED = int(NominalStatus.SOLVER_FAILED)
 
@@ -32,23 +31,18 @@ class NominalTrajectoryNode(BlockNode):
         self._values, self._design = declare_design(self, NominalTrajectory.PARAMETERS)
         self._period = self._values["period"]
         self.component = self._trajectory = NominalTrajectory.from_parameters(self._values, self._design)
-        self._times, self._failed = StepTimes(), False
+        self._failed = False
         self._references = self.create_publisher(Reference, REFERENCE, LATCHED)
         self.create_service(SetCommand, SET_COMMAND, self._command)
 
     def start_run(self, run: Run) -> None:
         """Start a new nominal trajectory."""
         super().start_run(run)
-        self._times, self._failed = StepTimes(), False
+        self._failed = False
         self._publish_reference(0)
 
-    def advance(self, signals: Signals) -> None:
-        """Step the trajectory and note how long it takes: some laws solve a problem in flight."""
-        with self._times:
-            super().advance(signals)
-
     def stepped(self, signals: Signals) -> None:
-        """Tell how the law fares; a solver that begins to fail is a warning."""
+        """Report the status of the law; warn when a solver begins to fail."""
         failed = bool(int(signals.nominal_status) & _SOLVER_FAILED)
         fails, self._failed = failed and not self._failed, failed
         if fails or self.diagnosis_due(signals):
@@ -58,7 +52,7 @@ class NominalTrajectoryNode(BlockNode):
                 "running" if status is NominalStatus.OK else str(status.name),
                 warning=fails,
                 gain_index=signals.gain_index,
-                step_time_p99_ms=self._times,
+                step_time_p99_ms=self.step_time_p99,
             )
 
     def _command(self, request: SetCommand.Request, response: SetCommand.Response) -> SetCommand.Response:

@@ -1,23 +1,83 @@
-"""The Tube-MPC controller node."""
+"""The controller nodes that report the status of the tube: Tube-MPC, and the paper's robust MPC without a tube."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from hsv_msgs.msg import Run
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
-from hsv.bags.description import TUBE_MPC
+from hsv.bags.description import ROBUST_MPC, TUBE_MPC, NodeDescription
 from hsv.base.errors import DesignError, ParameterError
 from hsv.control.coverage import uncovered_hardware
 from hsv.control.design import CERTIFICATE_PARAMETERS, TAU
-from hsv.control.effectiveness import EFFECTIVENESS_ENABLED, WATCHED_PARAMETERS
-from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw
+from hsv.control.effectiveness import EFFECTIVENESS_ENABLED, WATCHED_PARAMETERS, EffectivenessMode
+from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS, RobustMpc
+from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw, TubeResult, TubeStatusCode
 from hsv.control.verification import preflight
+from hsv.flight.blocks import Signals
 from hsv_ctrl.design import declare_design
-from hsv_ctrl.tube import TubeNode
+from hsv_node.block import BlockNode
 from hsv_node.main import run_node
-from hsv_node.parameters import declare, declare_vehicle
+from hsv_node.parameters import declare, declare_vehicle, given
+
+
+class TubeNode(BlockNode):
+    """A controller node with a name of its own, which reports how the error lies in the tube.
+
+    Raises:
+        ParameterError: The graph's parameter ``controller`` names another controller.
+    """
+
+    def __init__(self, role: NodeDescription) -> None:
+        super().__init__(role, "tube")
+        if given(self, "controller") and self.controller != role.name:
+            raise ParameterError(
+                f"parameter controller = {self.controller!r}: expected {role.name}, which this node is"
+            )
+        self._begin()
+
+    def start_run(self, run: Run) -> None:
+        """Begin inside the tube."""
+        super().start_run(run)
+        self._begin()
+
+    def _begin(self) -> None:
+        self._outside = False
+        self._mode = EffectivenessMode.HEALTHY
+
+    def stepped(self, signals: Signals) -> None:
+        """Report the tube status; warn when the error leaves the tube."""
+        result = signals.diagnostics
+        assert isinstance(result, TubeResult)
+        outside = result.status is TubeStatusCode.OUTSIDE
+        left, self._outside = outside and not self._outside, outside
+        if left:
+            time = signals.stamp[0] + 1e-9 * signals.stamp[1]
+            self.get_logger().warning(f"left the tube at {time:.2f} s: {result.component}, level {result.level:.3f}")
+        found, changed, known = result.effectiveness, False, {}
+        if found:
+            changed, self._mode = found.mode is not self._mode, found.mode
+            known = {
+                "effectiveness": found.estimate,
+                "effectiveness_low": found.low,
+                "effectiveness_high": found.high,
+                "elevator": found.mode.name,
+            }
+        if found and changed:
+            self.get_logger().warning(f"elevator {found}")
+        if left or changed or self.diagnosis_due(signals):
+            self.diagnose(
+                signals,
+                f"elevator {found}" if changed else result.status.name,
+                warning=left or changed,
+                saturated=bool(result.saturated.any()),
+                level=result.level,
+                component=result.component,
+                step_time_p99_ms=self.step_time_p99,
+                **known,
+            )
 
 
 class TubeMpcNode(TubeNode):
@@ -64,3 +124,16 @@ class TubeMpcNode(TubeNode):
 def main(args: Sequence[str] | None = None) -> int:
     """Run the Tube-MPC controller node."""
     return run_node(TubeMpcNode, "tube_mpc", args)
+
+
+class RobustMpcNode(TubeNode):
+    """One gain about the reference; of the nominal trajectory node it takes the reference alone."""
+
+    def __init__(self) -> None:
+        super().__init__(ROBUST_MPC)
+        self.component = RobustMpc.from_parameters(*declare_design(self, ROBUST_MPC_PARAMETERS))
+
+
+def robust_main(args: Sequence[str] | None = None) -> int:
+    """Run the robust MPC controller node."""
+    return run_node(RobustMpcNode, "robust_mpc", args)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import time
+from collections import deque
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
 from hsv_msgs.msg import Run
 
 from hsv.bags.description import TOPIC_OF, NodeDescription
@@ -13,6 +16,9 @@ from hsv.bags.messages import StepMessages
 from hsv.base.errors import RunError, SignalError
 from hsv.flight.blocks import Signals
 from hsv_node.lockstep import PeerNode
+
+STEP_TIMES = 1000
+"""Number of steps over which the percentile of the step time is taken, once a simulated second."""
 
 
 class BlockNode(PeerNode):
@@ -31,6 +37,7 @@ class BlockNode(PeerNode):
         # In the order of the role: other nodes wait for the first and work on it while the rest is published.
         self._answers = [(StepMessages(topic).pack, self.create_step_publisher(topic)) for topic in role.publishes]
         self.messages = {topic: StepMessages(topic) for topic in self.role.subscribes}
+        self._step_times: deque[float] = deque(maxlen=STEP_TIMES)
         self._delays = {topic: int(topic in self.role.delayed) for topic in self.role.subscribes}
         for topic in self.role.subscribes:
             self.create_step_subscription(topic, partial(self.on_message, topic))
@@ -38,6 +45,7 @@ class BlockNode(PeerNode):
     def start_run(self, run: Run) -> None:
         """Forget the previous run."""
         self._received.clear()
+        self._step_times.clear()
         self.component.reset()
 
     def stepped(self, signals: Signals) -> None:
@@ -54,7 +62,9 @@ class BlockNode(PeerNode):
         try:
             for name in due:
                 self.messages[name].unpack(self._received[name][1], signals)
-            self.advance(signals)
+            begun = time.perf_counter()
+            self._step(self.component, signals)
+            self._step_times.append(time.perf_counter() - begun)
         except SignalError as error:
             self.refuse_message(TOPIC_OF[error.signal], error)
             return
@@ -67,9 +77,10 @@ class BlockNode(PeerNode):
             publish(pack(signals))
         self.stepped(signals)
 
-    def advance(self, signals: Signals) -> None:
-        """Step the component."""
-        self._step(self.component, signals)
+    @property
+    def step_time_p99(self) -> str:
+        """The 99th percentile of the wall time of the last steps of the component, in ms."""
+        return f"{1e3 * np.percentile(self._step_times, 99):.3f}"
 
     def _due(self, step: int) -> Sequence[str]:
         """Return the topics that ``step`` takes; none while one of their messages is missing."""

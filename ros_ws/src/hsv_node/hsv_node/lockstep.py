@@ -21,10 +21,9 @@ from hsv.base.errors import RunError
 from hsv.control.controllers import class_place
 from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.flight.blocks import Signals
-from hsv_node.messages import message_class
+from hsv_node.middleware import LATCHED, STEP, message_class
 from hsv_node.parameters import declare, refuse_unknown
 from hsv_node.process import ProcessNode
-from hsv_node.qos import LATCHED, STEP
 from hsv_node.roles import full_name, node_in_role, published_types
 
 FIRST_SAID_AFTER = 2.0

@@ -19,9 +19,8 @@ from rclpy.utilities import remove_ros_args
 from hsv.base.errors import HsvError, ParameterError
 from hsv.base.processes import ignore_ctrl_c_at_end
 from hsv_node.arguments import check_names, shared_parameters
-from hsv_node.ending import ends_with
 from hsv_node.middleware import prefer_profiles
-from hsv_node.process import ProcessNode
+from hsv_node.process import ProcessNode, ends_with
 
 
 def run_node(

@@ -1,23 +1,45 @@
-"""Settings of Fast DDS that the nodes start with, unless somebody has settings of their own."""
+"""The middleware: quality of service, message classes by name, and settings of Fast DDS."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import MutableMapping
+from importlib import import_module
 from pathlib import Path
+from typing import Any
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+STEP = QoSProfile(depth=256, reliability=ReliabilityPolicy.RELIABLE)
+"""Topics with one message a step: deeper than the plant may run ahead of the recorder."""
+
+LATCHED = QoSProfile(depth=32, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""Announcements that late joiners must receive."""
 
 PROFILES = Path(__file__).with_name("fastdds.xml")
 """The settings: how often a node announces itself at first, and when its own threads are woken."""
 
 _VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 _OWN_FILE = "DEFAULT_FASTRTPS_PROFILES.xml"
-"""What Fast DDS reads in the working directory."""
+"""File in the working directory that Fast DDS reads."""
+
+
+def message_class(name: str) -> Any:
+    """Return the class of a message type such as ``"hsv_msgs/msg/VehicleState"``."""
+    package, kind, message = name.split("/")
+    return getattr(import_module(f"{package}.{kind}"), message)
+
+
+def type_name(kind: type) -> str:
+    """Return the type of a class of messages or of a service, such as ``"hsv_msgs/srv/InjectFault"``."""
+    package, section, _ = kind.__module__.split(".")
+    return f"{package}/{section}/{kind.__name__}"
 
 
 def prefer_profiles(environment: MutableMapping[str, str] = os.environ, directory: Path | None = None) -> None:
-    """Have Fast DDS read :data:`PROFILES`; before the first node is made.
+    """Make Fast DDS read :data:`PROFILES`; to be called before the first node is made.
 
-    Where the ``environment`` names a file, or the working ``directory`` has one that Fast DDS reads, that holds alone.
+    A file that the ``environment`` names, or that Fast DDS finds in the working ``directory``, has precedence.
     """
     if not any(name in environment for name in _VARIABLES) and not Path(directory or "", _OWN_FILE).exists():
         environment[_VARIABLES[0]] = str(PROFILES)

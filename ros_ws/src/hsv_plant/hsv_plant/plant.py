@@ -8,10 +8,14 @@ import time
 import uuid
 from collections.abc import Sequence
 
+import rclpy
 from hsv_msgs.msg import Ready, RecorderProgress, Run, VehicleState
 from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import ListParameters
+from rclpy.client import Client
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter as RosParameter
+from rclpy.task import Future
 
 from hsv.bags.description import (
     ACTUATOR,
@@ -37,9 +41,8 @@ from hsv.model.plant import FlightStatus, Plant
 from hsv.model.signals import INPUT_NAMES
 from hsv_node.lockstep import LINK_LOOK, LockstepNode, run_in_words, short_id, step_in_words
 from hsv_node.main import run_node
+from hsv_node.middleware import LATCHED, STEP
 from hsv_node.parameters import declare, declare_vehicle, refuse_sim_time
-from hsv_node.qos import LATCHED, STEP
-from hsv_plant.liveness import unresponsive
 
 MAX_AHEAD = 100
 """Steps that the plant may be ahead of the recorder."""
@@ -277,6 +280,31 @@ class PlantNode(LockstepNode):
                 f"angle of attack {signals.state[2]:.3g} rad, pitch angle {signals.state[3]:.3g} rad"
             )
         self.finish(EXIT_DIVERGED if signals.status is FlightStatus.DIVERGED else 0)
+
+
+def unresponsive(node: LockstepNode, peers: Sequence[NodeDescription], wait: float = 2.0) -> list[str]:
+    """Return the ``peers`` whose parameter service does not answer while no other does for ``wait`` (s).
+
+    Every node has that service, so that a hung process is told from one that only waits for somebody else.
+    """
+    # The remappings of the command line do not apply to the helper.
+    helper = rclpy.create_node(f"{node.get_name()}_liveness", context=node.context, use_global_arguments=False)
+    try:
+        clients: dict[str, Client] = {}
+        futures: dict[str, Future] = {}
+        standstill, answers = Standstill(), 0
+        while standstill.look((len(futures), answers)) < wait and answers < len(peers):
+            for peer in peers:
+                if peer.name not in clients and (name := node.node_in_role(peer)):
+                    clients[peer.name] = helper.create_client(ListParameters, f"{name}/list_parameters")
+            for peer_name, client in clients.items():
+                if peer_name not in futures and client.service_is_ready():
+                    futures[peer_name] = client.call_async(ListParameters.Request())
+            rclpy.spin_once(helper, timeout_sec=0.05)
+            answers = sum(future.done() for future in futures.values())
+        return [peer.name for peer in peers if peer.name not in futures or not futures[peer.name].done()]
+    finally:
+        helper.destroy_node()
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -46,11 +46,6 @@ def claim_node(domain: int, name: str) -> socket.socket | None:
     return _bound("hsv_node", domain, name)
 
 
-def claim_processor(number: int) -> socket.socket | None:
-    """Return what keeps a processor of this machine to one flight while it is open; None if another flight has it."""
-    return _bound("hsv_processor", number, "")
-
-
 def is_published(domain: int, topic: str) -> bool:
     """Tell whether a node of this machine has claimed ``topic``."""
     # To bind it would refuse a node that claims it in the same instant.

@@ -31,7 +31,6 @@ from hsv.bags.description import (
 from hsv.base.errors import RunError
 from hsv.base.processes import end_with_parent, uninterrupted
 from hsv.graph.exclusive import claim_namespace, is_published, ros_domain
-from hsv.graph.placement import CHAIN, share_processor
 from hsv.graph.snapshot import Snapshot
 from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
 
@@ -137,7 +136,7 @@ class Launcher:
         self._on_line = on_line
         self._on_snapshot = on_snapshot
         self._wait_timeout = max(wait_timeout, HUNG_AFTER)
-        self._flying = self._placed = False
+        self._flying = False
         self._claims = ExitStack()
         self._processes: list[_Process] = []
 
@@ -170,8 +169,6 @@ class Launcher:
         """
         *others, last = self._processes
         while True:
-            if self._flying and not self._placed:
-                self._place()
             for process in others:
                 code = process.popen.poll()
                 if code is None or _landed(process, code):
@@ -190,13 +187,6 @@ class Launcher:
                     return code
                 raise self._failure(last, code)
             time.sleep(_LOOK)
-
-    def _place(self) -> None:
-        """Keep the nodes that wait for one another on one processor, once they have started, for which they use all."""
-        self._placed = True
-        chain = [process.popen.pid for process in self._processes if process.description.name in CHAIN]
-        if len(chain) > 1 and (held := share_processor(chain)):
-            self._claims.enter_context(held)
 
     def _await_first_words(self, process: _Process) -> None:
         """Wait until who watches has said where, and so sees the flight from its start; not where it fails or hangs."""

@@ -1,4 +1,7 @@
-"""Injects, clears and lists faults in flight: ``ros2 run hsv_bringup fault inject elevator_deflection ...``."""
+"""Commands on a running graph: faults, another point of altitude and velocity, and parameters.
+
+For example ``ros2 run hsv_bringup fault inject elevator_deflection loss_of_effectiveness effectiveness=0.8``.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,18 @@ import argparse
 from collections.abc import Sequence
 
 from hsv_msgs.msg import Actuator, Fault
-from hsv_msgs.srv import ClearFault, InjectFault
+from hsv_msgs.srv import ClearFault, InjectFault, SetCommand
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter as RosParameter
 
-from hsv.bags.description import FAULT_INJECTOR
+from hsv.bags.description import FAULT_INJECTOR, NOMINAL_TRAJECTORY
 from hsv.bags.messages import fault_in
 from hsv.base.errors import ParameterError, RunError
+from hsv.graph.settable import find, parse, step_in
 from hsv.model.faults.injector import read_parameters
 from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
-from hsv_node.qos import STEP
+from hsv_node.middleware import STEP
 
 
 def _inject(client: GraphClient, options: argparse.Namespace) -> None:
@@ -55,7 +62,7 @@ def _list(client: GraphClient, options: argparse.Namespace) -> None:
     answer(f"step {status.step}, {time}: {words}", {**values, "active": described}, options.json)
 
 
-def main(args: Sequence[str] | None = None) -> int:
+def fault(args: Sequence[str] | None = None) -> int:
     """Run the command."""
     parser = OneLineParser(prog="fault", description="Inject, clear and list faults in flight.")
     parser.add_argument("--json", action="store_true", help="print a JSON object")
@@ -72,3 +79,53 @@ def main(args: Sequence[str] | None = None) -> int:
     clear.set_defaults(act=_clear)
     commands.add_parser("list", help="which faults act now").set_defaults(act=_list)
     return run_client(parser, lambda client, options: options.act(client, options), args)
+
+
+def _command(client: GraphClient, options: argparse.Namespace) -> None:
+    run = client.find_run()
+    fields = {name: getattr(options, name) for name in ("altitude", "velocity", "duration", "blend")}
+    response = client.call(NOMINAL_TRAJECTORY, SetCommand, SetCommand.Request(**fields))
+    if not response.success:
+        raise ParameterError(response.message)
+    time, values = acting_from(run, response.step)
+    answer(
+        f"{response.message}, {time}",
+        {"message": response.message, **values, "end_s": round(response.end, 9)},
+        options.json,
+    )
+
+
+def set_command(args: Sequence[str] | None = None) -> int:
+    """Run the command."""
+    parser = OneLineParser(prog="set_command", description="Command another point of altitude and velocity in flight.")
+    parser.add_argument("altitude", type=float, help="m")
+    parser.add_argument("velocity", type=float, help="m/s")
+    parser.add_argument("--duration", type=float, default=0.0, help="least length of the ramp, s; 0: as short as fits")
+    parser.add_argument(
+        "--blend", type=float, default=0.0, help="half the time in which the rate changes at a corner, s; 0: 2 s"
+    )
+    parser.add_argument("--json", action="store_true", help="print a JSON object")
+    return run_client(parser, _command, args)
+
+
+def _set(client: GraphClient, options: argparse.Namespace) -> None:
+    node, parameter = find(options.name)
+    value = parse(options.value, parameter)
+    run = client.find_run()
+    request = SetParameters.Request(parameters=[RosParameter(parameter.name, value=value).to_parameter_msg()])
+    response = client.call(node, SetParameters, request)
+    result: SetParametersResult = response.results[0]
+    if not result.successful:
+        raise ParameterError(result.reason)
+    time, values = acting_from(run, step_in(result.reason))
+    named = {"node": node.name, "parameter": parameter.name, "value": value}
+    answer(f"{result.reason}, {time}", named | values, options.json)
+
+
+def set_parameter(args: Sequence[str] | None = None) -> int:
+    """Run the command."""
+    parser = OneLineParser(prog="set_parameter", description="Change a parameter in flight.")
+    parser.add_argument("name", help="e.g. tau, or feedback.tau; real_time_factor, paused")
+    parser.add_argument("value", help="e.g. 0.8, or a number for each element: 0.8,0.8,0.9,0.9,1; true or false")
+    parser.add_argument("--json", action="store_true", help="print a JSON object")
+    return run_client(parser, _set, args)
