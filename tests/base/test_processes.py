@@ -97,6 +97,7 @@ def test_a_node_is_ended_that_has_just_been_started(monkeypatch, tmp_path):
     program = tmp_path / "node"
     program.write_text("#!/bin/sh\nexec sleep 60\n")
     program.chmod(0o755)
+    monkeypatch.setattr("hsv.graph.exclusive.LAST_DOMAIN", 2 * 10**9)
     monkeypatch.setenv("ROS_DOMAIN_ID", str(10**9 + os.getpid()))
     monkeypatch.setattr("hsv.graph.launcher.executable", lambda node: program)
     monkeypatch.setattr(subprocess, "Popen", Popen)

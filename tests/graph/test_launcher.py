@@ -20,23 +20,26 @@ def launcher(namespace: str = ROOT, *nodes: NodeDescription) -> Launcher:
     return Launcher(nodes, [], lambda step: None, lambda node, text: None, namespace=namespace)
 
 
-@pytest.mark.parametrize("spelling", ["{}", " 0{}"])
-@pytest.mark.parametrize("namespace", [ROOT, "/veh1", "/a" * 90])
-def test_domain_and_namespace_belong_to_one_run_however_they_are_written(
-    monkeypatch: pytest.MonkeyPatch, spelling: str, namespace: str
-) -> None:
+@pytest.fixture
+def domain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make this process believe that it is in :data:`DOMAIN`."""
+    monkeypatch.setattr("hsv.graph.exclusive.LAST_DOMAIN", DOMAIN)
     monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+
+
+@pytest.mark.usefixtures("domain")
+@pytest.mark.parametrize("namespace", [ROOT, "/veh1", "/a" * 90])
+def test_domain_and_namespace_belong_to_one_run(namespace: str) -> None:
     with launcher(namespace):
-        monkeypatch.setenv("ROS_DOMAIN_ID", spelling.format(DOMAIN))
         with pytest.raises(RunError, match=f"another run has ROS_DOMAIN_ID={DOMAIN}"), launcher(namespace):
             pass
         with launcher("/other"):
             pass
 
 
+@pytest.mark.usefixtures("domain")
 @pytest.mark.parametrize("node", [TUBE_MPC, COMPOSED], ids=lambda node: node.name)
-def test_a_node_that_runs_by_hand_is_named(monkeypatch: pytest.MonkeyPatch, node: NodeDescription) -> None:
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+def test_a_node_that_runs_by_hand_is_named(node: NodeDescription) -> None:
     held = claim_topic(DOMAIN, "/veh1/hsv/command")
     assert held is not None and claim_topic(DOMAIN, "/veh1/hsv/command") is None
     refused = "publishes /veh1/hsv/command already: expected no other tube_mpc there"
@@ -47,7 +50,14 @@ def test_a_node_that_runs_by_hand_is_named(monkeypatch: pytest.MonkeyPatch, node
         pass
 
 
-def test_a_domain_is_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_DOMAIN_ID", "seven")
-    with pytest.raises(ParameterError, match="ROS_DOMAIN_ID='seven': expected a whole number"), launcher():
+@pytest.mark.parametrize("text", ["seven", "-1", "300", "025", "1.0"])
+def test_a_domain_is_a_decimal_number_that_dds_has(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", text)
+    with pytest.raises(ParameterError, match=f"ROS_DOMAIN_ID='{text}': expected a whole number from 0 to"), launcher():
+        pass
+
+
+def test_discovery_must_be_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
+    with pytest.raises(ParameterError, match="ROS_AUTOMATIC_DISCOVERY_RANGE='OFF': expected LOCALHOST"), launcher():
         pass

@@ -109,6 +109,25 @@ def test_a_diverging_flight_ends_cleanly_and_says_so(shared_processes: Processes
     assert len({len(bag.messages(topic)) for topic in TOPICS}) == 1
 
 
+def test_a_slow_pace_is_not_taken_for_a_hang(shared_processes: Processes) -> None:
+    scenario = short_scenario(shared_processes.folder, duration=0.1, fault=0.05)
+    words = ("--composed", "--no-report", "--step-timeout", "0.5", "--real-time-factor", "0.01")
+    done = shared_processes.run("hsv", "run", scenario, *words)
+    assert "is stuck" not in done.stdout, done.stdout
+    assert done.returncode == 0, done.stdout
+
+
+def test_a_run_can_start_paused(shared_processes: Processes) -> None:
+    scenario = short_scenario(shared_processes.folder)
+    run = shared_processes.start(
+        "hsv", "run", scenario, "--composed", "--paused", "--no-report", "--bag", shared_processes.folder / "paused"
+    )
+    released = shared_processes.run("hsv", "set", "paused", "false")
+    assert "from step 1 on" in released.stdout, released.stdout
+    assert run.wait() == 0
+    assert len(Bag(shared_processes.folder / "paused").messages("/hsv/state")) == 251
+
+
 def test_pacing_keeps_to_the_wall_clock(shared_processes: Processes) -> None:
     import json
 

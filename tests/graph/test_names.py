@@ -24,7 +24,7 @@ from hsv.flight.assembly import assemble, flight_parameters
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario
 from hsv.graph.launcher import parameter_arguments
-from hsv.graph.preparation import prepare
+from hsv.graph.preparation import RunOptions, prepare
 
 pytestmark = pytest.mark.graph
 
@@ -91,7 +91,7 @@ def test_remapped_by_hand_with_duplicates_and_parameters_dumped(processes: Proce
     folder = processes.folder
     alone = processes.start("ros2", "run", "hsv_ctrl", "notch_filter", "--ros-args", "-r", "__ns:=/alone")
     # Nothing that is done to this flight comes too late; it is interrupted.
-    prepared = prepare(str(short_scenario(folder, 3600, 3)), bag=folder / "remapped", real_time_factor=4.0)
+    prepared = prepare(str(short_scenario(folder, 3600, 3)), RunOptions(real_time_factor=4.0), bag=folder / "remapped")
     files = parameter_arguments(prepared.parameter_files)
     arguments = {node.name: [*files, *REMAPPED] for node in graph()}
     arguments[NOTCH_FILTER.name] += ["-r", "__node:=nf2"]

@@ -10,7 +10,7 @@ from hsv.base.errors import RecordingError
 from hsv.control.design import find_design, read_design
 from hsv.flight.fingerprint import as_published
 from hsv.flight.scenario import parse_scenario, with_controller
-from hsv.graph.preparation import prepare
+from hsv.graph.preparation import RunOptions, prepare
 
 
 def test_the_bag_is_made_here_so_that_a_second_run_of_its_name_is_refused(tmp_path: Path) -> None:
@@ -32,7 +32,7 @@ def test_default_names_differ_within_a_second(tmp_path: Path) -> None:
 def test_the_bag_of_a_foreign_controller_keeps_the_scenario_that_is_flown(tmp_path: Path, name: str) -> None:
     for external in (False, True):
         folder = tmp_path / str(external)
-        prepared = prepare(name, bag=folder / "bag", folder=folder, external=external)
+        prepared = prepare(name, RunOptions(external=external), bag=folder / "bag", folder=folder)
         kept = parse_scenario((folder / "scenario.toml").read_text(), name)
         assert kept == prepared.scenario and kept.controller.startswith("node:") == external
         # Only the scenario's own controller is compared with the publication.

@@ -19,7 +19,7 @@ from hsv.flight.scenario import load_scenario
 from hsv.flight.sources import DIGITS, drop_older, flight_digest
 from hsv.graph.flight import fly_graph
 from hsv.graph.launcher import executable
-from hsv.graph.preparation import prepare
+from hsv.graph.preparation import RunOptions, prepare
 
 
 def graph_is_there() -> bool:
@@ -74,7 +74,7 @@ class Flights:
         # Recorded beside its place and moved there when it is whole.
         workplace = Path(mkdtemp(prefix=f".{bag.name}_", dir=self._folder))
         try:
-            prepared = prepare(scenario, bag=workplace / bag.name, composed=True)
+            prepared = prepare(scenario, RunOptions(composed=True), bag=workplace / bag.name)
             fly_graph(
                 prepared,
                 on_step=lambda step: self._progress(f"flying {scenario}", step, prepared.steps),

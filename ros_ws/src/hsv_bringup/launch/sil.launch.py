@@ -34,8 +34,9 @@ ARGUMENTS = {
     "real_time_factor": ("", "pace: 1 is real time, 0 as fast as possible; empty: 0, with a live view 1"),
     "step_timeout": (
         "",
-        "wall time (s) after which a silent node ends the run; empty: 10, beside a foreign node 2.5",
+        "wall time (s) after which a silent node ends the run; empty: 10, with an external controller 2.5",
     ),
+    "paused": ("false", "true: start paused, until hsv set paused false or the live page resumes the flight"),
     "external": ("false", "true: wait for a controller that is started by hand, any node of yours"),
     "live": ("false", "true: show the flight while it is flown, on a page and to Foxglove; or false"),
     "live_port": ("", "port for Foxglove, the page has the next one; 0: any two that are free; empty: 8765"),
@@ -54,6 +55,7 @@ CHOICES = {
     "composed": ("true", "false"),
     "external": ("true", "false"),
     "live": ("true", "false"),
+    "paused": ("true", "false"),
     "report": ("true", "false"),
     "units": ("metric", "si", "paper"),
     "log_level": ("debug", "info", "warn", "error", "fatal"),
@@ -98,7 +100,7 @@ class Flight:
     def _on_exit(self, event: ProcessExited, context: LaunchContext) -> list[Action]:
         node, code = self._running.pop(event.action), event.returncode
         actions = []
-        # Without who only watches the flight goes on.
+        # Losing a viewer does not end the flight.
         if node["in_flight"] and not self._ending:
             self._ending = True
             # Whoever ends first ends the run: the plant when it has landed, any other when something went wrong.
@@ -151,7 +153,7 @@ def prepare(context: LaunchContext) -> list[Action]:
     command += ["--step-timeout", options["step_timeout"]] if options["step_timeout"] else []
     command += ["--namespace", options["namespace"]]
     command += ["--bag", options["bag"]] if options["bag"] else []
-    command += [f"--{name}" for name in ("composed", "external", "live") if options[name] == "true"]
+    command += [f"--{name}" for name in ("composed", "external", "live", "paused") if options[name] == "true"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         refuse(as_arguments(done.stderr.strip().removeprefix("hsv: error: ")), done.returncode)

@@ -189,9 +189,10 @@ class PlantNode(LockstepNode):
             self._try_start()
         else:
             self._continue()
-            # Of who pauses nobody else is to blame.
-            waited = self._standstill.look(time.monotonic() if self.values["paused"] else self._messages)
-            if waited > self._limit() + max(self._delay(), 0.0):
+            # While the run is paused, or the pace delays the next step, no node can be late.
+            waits = self.values["paused"] or (self._answered and self._delay() > 0.0)
+            waited = self._standstill.look(time.monotonic() if waits else self._messages)
+            if waited > self._limit():
                 self._give_up(waited)
 
     def _limit(self) -> float:

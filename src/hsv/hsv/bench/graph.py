@@ -10,7 +10,7 @@ from hsv.bags.parameter_sections import ParameterSections
 from hsv.bench.figure import Figure
 from hsv.bench.ring import ring_lap
 from hsv.graph.launcher import Launcher, parameter_arguments
-from hsv.graph.preparation import prepare
+from hsv.graph.preparation import RunOptions, prepare
 
 _PERIOD = 0.02
 
@@ -23,7 +23,7 @@ def graph_lap(duration: float, *, composed: bool = False) -> float:
     """
     times: dict[int, float] = {}
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
-        prepared = prepare("case1", bag=Path(folder, "bag"), composed=composed)
+        prepared = prepare("case1", RunOptions(composed=composed), bag=Path(folder, "bag"))
         shortened = Path(folder, "duration.yaml")
         shortened.write_text(ParameterSections({"duration": float(duration)}).to_yaml(), encoding="utf-8")
         arguments = parameter_arguments([*prepared.parameter_files, shortened])

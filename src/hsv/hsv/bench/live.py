@@ -17,7 +17,7 @@ from websockets.typing import Subprotocol
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bench.figure import Figure
 from hsv.graph.launcher import Launcher, parameter_arguments
-from hsv.graph.preparation import prepare
+from hsv.graph.preparation import RunOptions, prepare
 
 _ADDRESS = re.compile(r"live data: (ws://\S+)")
 
@@ -40,7 +40,7 @@ def processor_seconds(duration: float, *, live: bool) -> float:
     """
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
         bag = Path(folder, "bag")
-        prepared = prepare("case1", bag=bag, real_time_factor=1.0, live_port=0 if live else None)
+        prepared = prepare("case1", RunOptions(real_time_factor=1.0, live_port=0 if live else None), bag=bag)
         shortened = Path(folder, "duration.yaml")
         shortened.write_text(ParameterSections({"duration": float(duration)}).to_yaml(), encoding="utf-8")
         arguments = parameter_arguments([*prepared.parameter_files, shortened])

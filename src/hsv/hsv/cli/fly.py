@@ -57,6 +57,7 @@ NewBagOption = Annotated[Path | None, Option("--bag", help="Bag to write; defaul
 ComposedOption = Annotated[bool, Option("--composed", help="All nodes in one process: faster, same bytes.")]
 ExternalOption = Annotated[bool, Option("--external", help="Wait for a controller node that you start by hand.")]
 NamespaceOption = Annotated[str, Option(help="ROS namespace of all nodes and topics, such as /veh1.")]
+PausedOption = Annotated[bool, Option("--paused", help="Start paused; hsv set paused false resumes.")]
 ReportOption = Annotated[bool, Option(help="Write the report into the bag's folder.")]
 StrictOption = Annotated[bool, Option("--strict", help="Exit code 1 if a limit of the scenario is not kept.")]
 AllOption = Annotated[bool, Option("--all", help="Say which metrics the scenario does not limit, too.")]
@@ -77,6 +78,7 @@ def run(
     bag: NewBagOption = None,
     namespace: NamespaceOption = "/",
     step_timeout: StepTimeoutOption = None,
+    paused: PausedOption = False,
     report: ReportOption = True,
     verbose: Annotated[bool, Option("--verbose", help="Show the log output of the nodes.")] = False,
     strict: StrictOption = False,
@@ -93,17 +95,20 @@ def run(
     from hsv.bags.description import LIVE, checked_namespace
     from hsv.graph.flight import fly_graph
     from hsv.graph.launcher import WARNING
-    from hsv.graph.preparation import prepare
+    from hsv.graph.preparation import RunOptions, prepare
 
     namespace = checked_namespace(namespace)
     prepared = prepare(
         scenario,
+        RunOptions(
+            real_time_factor=real_time_factor,
+            step_timeout=step_timeout,
+            composed=composed,
+            external=external,
+            live_port=_live_port(live, live_port),
+            paused=paused,
+        ),
         bag=bag,
-        real_time_factor=real_time_factor,
-        step_timeout=step_timeout,
-        composed=composed,
-        external=external,
-        live_port=_live_port(live, live_port),
     )
     clock: dict[str, float] = {}
 
@@ -187,6 +192,7 @@ def prepare(
     bag: NewBagOption = None,
     namespace: NamespaceOption = "/",
     step_timeout: StepTimeoutOption = None,
+    paused: PausedOption = False,
     folder: Annotated[Path | None, Option(help="Folder for the parameter files; default: temporary.")] = None,
     json: JsonOption = False,
 ) -> None:
@@ -202,6 +208,7 @@ def prepare(
 
     from hsv.bags.description import LANDED, LIVE, ROOT, checked_namespace, graph
     from hsv.graph.launcher import claim_graph
+    from hsv.graph.preparation import RunOptions
     from hsv.graph.preparation import prepare as prepare_run
 
     if folder:
@@ -213,13 +220,16 @@ def prepare(
     try:
         prepared = prepare_run(
             scenario,
+            RunOptions(
+                real_time_factor=real_time_factor,
+                step_timeout=step_timeout,
+                composed=composed,
+                external=external,
+                live_port=port,
+                paused=paused,
+            ),
             bag=bag,
-            real_time_factor=real_time_factor,
-            step_timeout=step_timeout,
             folder=target,
-            composed=composed,
-            external=external,
-            live_port=port,
         )
     except BaseException:
         if not folder:

@@ -9,9 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import socket
 
 from hsv.base.errors import ParameterError
+
+LAST_DOMAIN = 232
+"""The highest domain whose ports are below 65536."""
 
 _LONGEST_NAME = 100
 """Bytes; the system takes 107."""
@@ -21,13 +25,23 @@ def ros_domain() -> int:
     """Return the ROS domain of this process.
 
     Raises:
-        ParameterError: ROS_DOMAIN_ID is no number.
+        ParameterError: ROS_DOMAIN_ID is not such a number; rcl would read 025 as an octal one, and -1 as 0.
     """
     text = os.environ.get("ROS_DOMAIN_ID") or "0"
-    try:
-        return int(text)
-    except ValueError:
-        raise ParameterError(f"ROS_DOMAIN_ID={text!r}: expected a whole number") from None
+    if not re.fullmatch(r"0|[1-9][0-9]*", text) or int(text) > LAST_DOMAIN:
+        raise ParameterError(f"ROS_DOMAIN_ID={text!r}: expected a whole number from 0 to {LAST_DOMAIN}")
+    return int(text)
+
+
+def require_discovery() -> None:
+    """Check that processes can find each other.
+
+    Raises:
+        ParameterError: Discovery is switched off.
+    """
+    name = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    if (value := os.environ.get(name, "")).upper() == "OFF":
+        raise ParameterError(f"{name}={value!r}: expected LOCALHOST or SUBNET, so that the nodes find each other")
 
 
 def claim_namespace(domain: int, namespace: str) -> socket.socket | None:

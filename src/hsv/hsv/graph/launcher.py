@@ -30,7 +30,7 @@ from hsv.bags.description import (
 )
 from hsv.base.errors import RunError
 from hsv.base.processes import end_with_parent, uninterrupted
-from hsv.graph.exclusive import claim_namespace, is_published, ros_domain
+from hsv.graph.exclusive import claim_namespace, is_published, require_discovery, ros_domain
 from hsv.graph.snapshot import Snapshot
 from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
 
@@ -230,6 +230,7 @@ class Launcher:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
+            env=_environment(),
             text=True,
             errors="replace",
             # Ctrl-C in the terminal goes to this process alone, which ends the nodes in order.
@@ -273,8 +274,10 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
     The nodes of two runs would take each other's messages, and both would be lost.
 
     Raises:
-        RunError: Another run has them, or a node that publishes what one of ``nodes`` does.
+        RunError: Another run has them, or a node that publishes a topic of one of ``nodes``.
+        ParameterError: The environment names no domain, or switches discovery off.
     """
+    require_discovery()
     domain = ros_domain()
     where = f"ROS_DOMAIN_ID={domain}{f' and namespace {namespace}' if namespace != ROOT else ''}"
     held = claim_namespace(domain, namespace)
@@ -286,6 +289,11 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
                 held.close()
                 raise RunError(f"a node with {where} publishes {topic} already: expected no other {node.name} there")
     return held
+
+
+def _environment() -> dict[str, str]:
+    """Return the environment of the processes: warnings are recognised by the default format of the log."""
+    return {name: value for name, value in os.environ.items() if name != "RCUTILS_CONSOLE_OUTPUT_FORMAT"}
 
 
 def _landed(process: _Process, code: int) -> bool:

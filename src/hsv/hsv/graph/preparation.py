@@ -55,63 +55,80 @@ class PreparedRun:
     """Holds the parameter files, and is gone with this object; ``None``: they are in a folder of the caller's."""
 
 
+@dataclass(frozen=True)
+class RunOptions:
+    """How a scenario is flown; none of it changes a number of the flight."""
+
+    real_time_factor: float | None = None
+    """Simulated over wall time; 0: as fast as possible; None: 0, with a live view 1."""
+    step_timeout: float | None = None
+    """Wall time (s) after which a silent node ends the run; None: :data:`STEP_TIMEOUT`, or :data:`FOREIGN_STEP_TIMEOUT`
+    with an external controller."""
+    composed: bool = False
+    """Whether all nodes share one process."""
+    external: bool = False
+    """Whether a controller that is started by hand replaces that of the scenario."""
+    live_port: int | None = None
+    """Port of the live view, whose page has the next one; 0: any two; None: no live view."""
+    paused: bool = False
+    """Whether the flight starts paused."""
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            QuantityError: ``real_time_factor`` or ``step_timeout`` is out of range.
+        """
+        if self.real_time_factor is not None and not 0.0 <= self.real_time_factor <= 1000.0:
+            raise QuantityError(f"real-time-factor = {self.real_time_factor}: expected 0 (as fast as possible) to 1000")
+        if self.step_timeout is not None and not 0.1 <= self.step_timeout <= 1e6:
+            raise QuantityError(f"step-timeout = {self.step_timeout}: expected at least 0.1 (seconds)")
+
+
 def prepare(
     scenario_name: str,
+    options: RunOptions = RunOptions(),
     *,
     text: str = "",
     bags: Path = Path("bags"),
     bag: Path | None = None,
-    real_time_factor: float | None = None,
-    step_timeout: float | None = None,
     folder: Path | None = None,
-    composed: bool = False,
-    external: bool = False,
-    live_port: int | None = None,
 ) -> PreparedRun:
-    """Check scenario and design, make the bag's directory, write the parameter files of a run.
+    """Check scenario and design, make the bag's directory, and write the parameter files of a run.
 
-    Everything that can be refused is refused here, before any process starts or anything is written.
+    Whatever can be refused is refused here, before a process starts or anything is written.
 
     Args:
         scenario_name: Name or path of the scenario.
+        options: How it is flown.
         text: The scenario, as :func:`hsv.flight.scenario.scenario_text` returns it; empty: that of this name.
         bags: Folder of the bag if ``bag`` is not given; it is named by scenario and time.
         bag: Bag to record to, a new directory.
-        real_time_factor: Simulated over wall time; 0: as fast as possible; ``None``: 0, with a live view 1.
-        step_timeout: Wall time (s) after which a silent node ends the run; ``None``: :data:`STEP_TIMEOUT`, or
-            :data:`FOREIGN_STEP_TIMEOUT` where the controller is a node of its own.
         folder: Directory for the parameter files; if not given, a temporary one that goes with the result.
-        composed: All nodes in one process.
-        external: Whatever the scenario's controller is, one is flown that is started by hand.
-        live_port: Port of the live view, whose page has the next one, or 0 for any two; ``None``: no live view.
 
     Raises:
-        QuantityError: ``real_time_factor`` or ``step_timeout`` is out of range.
-        ParameterError: ``live_port`` or the one behind it is in use.
+        ParameterError: ``live_port`` or the port after it is in use.
         ScenarioError: Names the field that is wrong, or what is wrong with the design.
         RecordingError: ``bag`` exists already or cannot be made.
     """
+    real_time_factor = options.real_time_factor
     if real_time_factor is None:
-        real_time_factor = 0.0 if live_port is None else 1.0
-    if not 0.0 <= real_time_factor <= 1000.0:
-        raise QuantityError(f"real-time-factor = {real_time_factor}: expected 0 (as fast as possible) to 1000")
-    if step_timeout is not None and not 0.1 <= step_timeout <= 1e6:
-        raise QuantityError(f"step-timeout = {step_timeout}: expected at least 0.1 (seconds)")
-    live_ports = None if live_port is None else ports(live_port)
+        real_time_factor = 0.0 if options.live_port is None else 1.0
+    live_ports = None if options.live_port is None else ports(options.live_port)
     text = text or scenario_text(scenario_name)
     name = Path(scenario_name).stem
-    if external:
+    if options.external:
         # What the bag keeps is what is flown: it is not the published flight of this scenario.
         text = with_controller(text, NODE, name)
     scenario = parse_scenario(text, name)
     with blamed_on(scenario):
         design_file = find_design(scenario.design) if scenario.design else None
         design = read_design(design_file) if design_file else None
-        nodes = ((LIVE,) if live_ports else ()) + _started(scenario.controller, composed)
+        nodes = ((LIVE,) if live_ports else ()) + _started(scenario.controller, options.composed)
         own = own_parameters(scenario)
         foreign = controller_node(scenario.controller).foreign
         library = library_record(scenario.controller)
-    wait = step_timeout or (FOREIGN_STEP_TIMEOUT if foreign else STEP_TIMEOUT)
+    wait = options.step_timeout or (FOREIGN_STEP_TIMEOUT if foreign else STEP_TIMEOUT)
     components = assemble_flight(scenario, design)
     now = datetime.datetime.now(datetime.UTC)
     run_id = uuid.uuid4().hex
@@ -142,6 +159,7 @@ def prepare(
         **certified,
         "real_time_factor": float(real_time_factor),
         "step_timeout": float(wait),
+        "paused": options.paused,
         "recorder": True,
         "bag.directory": str(bag.absolute()),
         "bag.attachments": [str(folder / name) for name in files],
