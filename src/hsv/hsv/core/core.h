@@ -341,5 +341,4 @@ double hsv_worst_level(const hsv_tube_set *set, int64_t steps, const double *sta
 void hsv_curves(int64_t steps, int64_t stride, const double *history, const double *auxiliary, const double *reference,
                 double *curves, uint8_t *saturated);
 /* end */
-/* Of any argument, for lanes. */
-void hsv_any_sine_cosine(double x, double *sine, double *cosine);
+void hsv_any_sine_cosine(double x, double *sine, double *cosine); /* of any argument, for lanes */
