@@ -31,7 +31,7 @@ def test_every_metric_has_words_of_its_own_and_every_group_has_metrics() -> None
         ),
         (("simulate", "case1"), "verdict within all 6 limits"),
         (("linearise", "--model", "ECM"), "filtered_pitch_rate"),
-        (("trim",), "angle of attack            1.6446  deg"),
+        (("trim",), "angle of attack              1.6446  deg"),
     ],
 )
 def test_what_is_printed_fits_80_columns(hsv, monkeypatch, words, printed) -> None:

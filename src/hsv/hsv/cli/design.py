@@ -414,16 +414,14 @@ def verify(
         claims = [{"part": part, **vars(check)} for part, check in rows]
         print_json({"claims": claims, "stated": stated, "ok": not failing})
     else:
-        table = new_table("", "check", "found", "expected")
         for part, made in checks.items():
             if made:
-                table.add_row("", Text(part, "bold"), "", "")
+                say(Text(part, "bold"))
             for check in made:
-                cells = ("ok" if check.ok else "FAIL", f"  {check.name}", _found(check), check.expected)
-                table.add_row(*cells, style=None if check.ok else "bold red")
-        table.add_row("", Text(f"{len(rows) - len(failing)} of {len(rows)} checks pass", "bold"), "", "")
-        console.print(table)
-        console.print(folded(f"stated, not checked: {', '.join(stated)}"), soft_wrap=True)
+                expected = f", expected {check.expected}" if check.expected else ""
+                line = folded(f"{'ok' if check.ok else 'FAIL':4}  {check.name}: {_found(check)}{expected}", 8)
+                say(line if check.ok else Text(line, "bold red"))
+        say(Text(f"{len(rows) - len(failing)} of {len(rows)} checks pass", "bold"))
     if failing:
         part, check = failing[0]
         report_error(f"{part}: check fails: {check}")
