@@ -12,7 +12,7 @@ SHELLS = [
     for name in ("bash", "zsh")
 ]
 pytestmark = pytest.mark.skipif(
-    not (ROOT / ".venv/hsv-setup/environment").exists(), reason="this checkout has not been set up by make setup"
+    not (ROOT / ".venv/hsv-setup").exists(), reason="this checkout has not been set up by make setup"
 )
 
 

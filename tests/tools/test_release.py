@@ -11,9 +11,14 @@ import yaml
 from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import parse_package
 
-from release import ReleaseError, manifests, released
+from release import released
 
 ROOT = Path(__file__).parents[2]
+
+
+def manifests(root: Path) -> list[Path]:
+    """Return the manifest of every package of a checkout."""
+    return sorted([*root.glob("src/*/package.xml"), *root.glob("ros_ws/src/*/package.xml")])
 
 
 @pytest.fixture
@@ -50,12 +55,12 @@ def test_every_file_has_the_version_afterwards(checkout: Path) -> None:
 
 @pytest.mark.parametrize("version", ["1.2", "v1.2.3", "0.0.1", ""])
 def test_a_version_that_is_none_or_not_above_is_refused(checkout: Path, version: str) -> None:
-    with pytest.raises(ReleaseError, match=r"^version = "):
+    with pytest.raises(ValueError, match=r"^version = "):
         released(checkout, version, "2030-04-05")
 
 
 @pytest.mark.parametrize("name", ["CHANGELOG.md", "src/hsv/CHANGELOG.rst", "CITATION.cff"])
 def test_a_file_with_nothing_to_release_is_named(checkout: Path, name: str) -> None:
     (checkout / name).write_text("empty\n", encoding="utf-8")
-    with pytest.raises(ReleaseError, match=re.escape(str(checkout / name))):
+    with pytest.raises(ValueError, match=re.escape(str(checkout / name))):
         released(checkout, "90.1.2", "2030-04-05")

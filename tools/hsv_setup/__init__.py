@@ -1,1 +1,0 @@
-"""Sets the bench up: virtual environment, ROS 2 packages, workspace, byte code."""
