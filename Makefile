@@ -83,6 +83,7 @@ references: lint ## run all tests, then fly the reference bags of bags/reference
 	python3 tools/references.py
 
 bench: setup ## set up, then measure this machine; replaces the table in docs/benchmarks.md (ARGS="--scale 0.5")
+	-@$(INSTALL) --requirement requirements-bench.txt
 	@source ./env.sh && exec hsv bench --out docs/benchmarks.md $(ARGS)
 
 docs: setup ## set up, then build the documentation into docs/_build (open docs/_build/index.html)

@@ -113,8 +113,7 @@ def make_environment(route: str, env: dict[str, str]) -> None:
         settings = subprocess.run([PYTHON, "-m", "pip", "config", "list"], env=env, capture_output=True, text=True)
         wanted = ["setuptools"] if re.search(r"\.(index-url|no-index)=", settings.stdout) else ["setuptools", "uv"]
         Step("Installer", [PYTHON, "-m", "pip", "install", "--constraint", ROUTES[route][0], *wanted], env).end()
-        program = VENV / "bin" / "ros2"
-        program.write_text(f'#!/bin/sh\nexec {PYTHON} -S {ROOT}/tools/ros2.py "$@"\n')
+        (program := VENV / "bin" / "ros2").write_text(f'#!/bin/sh\nexec {PYTHON} -S {ROOT}/tools/ros2.py "$@"\n')
         program.chmod(0o755)
 
 
@@ -225,6 +224,9 @@ def main() -> int:
     start, route = time.monotonic(), os.environ.get("ROS_DISTRO") or "wheels"
     if sys.prefix != sys.base_prefix:  # the interpreter of the environment itself, or of another one
         os.execve(BASE, [BASE, *sys.argv], clean_environment(route))
+    if route not in ROUTES:
+        print(f"make setup: ROS_DISTRO={route} is sourced, expected jazzy or no ROS in this shell", file=sys.stderr)
+        return 1
     lock = os.open(ROOT, os.O_RDONLY)
     os.set_inheritable(lock, True)
     try:
@@ -233,8 +235,6 @@ def main() -> int:
         except BlockingIOError:
             print("waiting for another set-up of this checkout ...", flush=True)
             fcntl.flock(lock, fcntl.LOCK_EX)
-        if route not in ROUTES:
-            raise SetupError(f"ROS_DISTRO={route} is sourced, expected jazzy: use a shell without it, or source Jazzy")
         set_up(route, clean_environment(route))
     except SetupError as error:
         print(f"make setup: {error}", file=sys.stderr)

@@ -46,7 +46,7 @@ HERE = {
 }
 """Pages whose commands this file runs as one script, with what it needs before."""
 
-FEWER = {"--samples 10000 ": "--samples 20 ", "--samples 4096 ": "--samples 16 ", "memory.py 100000": "memory.py 1000"}
+FEWER = {"--samples 10000 ": "--samples 20 ", "--samples 4096 ": "--samples 16 "}
 """Campaigns that are flown with fewer flights than on the page, which would take many minutes."""
 
 NEGATIVE = ("hsv run case1_derived_no_notch", "hsv certify")
@@ -93,7 +93,6 @@ NOT_RUN = {
     ("CONTRIBUTING.md", "make setup"): "sets up what the tests run in",
     ("CONTRIBUTING.md", "python3 -m pytest tests/core -q"): "make test runs that folder",
     ("README.md", "flowchart LR"): "a diagram",
-    ("docs/benchmarks.md", "python3 tools/step_times.py"): "takes minutes; see tests/graph/test_active_law.py",
     ("docs/installation.md", "$ docker build --tag hsv-bench ."): "needs Docker",
     ("src/hsv/hsv/pages/report/plotly/README.md", NPM): "how a file of the repository was fetched",
     (
