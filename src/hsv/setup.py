@@ -46,9 +46,9 @@ setup(
             "control/include/*.h",
             "core/*.[ch]",
             "designs/*",
-            "pages/**/template/*",
+            "pages/template/*",
             "pages/layouts/*",
-            "pages/report/plotly/*",
+            "pages/plotly/*",
         ]
     },
     data_files=[

@@ -11,10 +11,9 @@ from hsv.base.units import UnitSystem
 from hsv.cli.look import info
 from hsv.core import lib
 from hsv.core.arithmetic import uniforms
-from hsv.pages.report.events import flight_events
-from hsv.pages.report.page import render
-from hsv.pages.report.payload import all_panels
-from hsv.pages.report.run import reported_runs
+from hsv.pages.events import flight_events
+from hsv.pages.flights import reported_runs
+from hsv.pages.report import all_panels, report_page
 
 EQUIPPED = """
 extends = "case1"
@@ -84,7 +83,7 @@ def test_nothing_is_said_of_an_ideal_flight(ideal, capsys):
         "inputs",
         "tube",
     }
-    page = render(reported_runs([ideal]))
+    page = report_page(reported_runs([ideal]))
     assert "less true" not in page and "filtered, effector" not in page and 'id="air"' not in page
     info([ideal.path], UnitSystem.si, False)
     out = capsys.readouterr().out
@@ -105,7 +104,7 @@ def test_the_report_plots_measured_less_true_effector_and_wind(equipped):
     assert not any(curve.kind == "effector" for curve in curves["fuel_equivalence_ratio"])
     np.testing.assert_allclose(curves["wind_up"][0].y[:-1], 0.9144)
     assert {panel.group for panel in run.curves.panels} >= {"sensors", "air"}
-    page = render([run])
+    page = report_page([run])
     assert "filtered, effector" in page and 'id="plot-measurement_error_pitch_rate"' in page and 'id="air"' in page
 
 
@@ -113,7 +112,7 @@ def test_faults_have_all_parameters_with_units(equipped, capsys):
     [text] = [event.text for event in flight_events(equipped, describe(equipped)) if event.kind == "fault"]
     assert text.startswith("elevator deflection: oscillation amplitude ")
     assert 'paper">0.5&nbsp;deg</span>' in text and "frequency 2&nbsp;Hz" in text
-    assert 'paper">0.5&nbsp;deg</span>' in render(reported_runs([equipped]))
+    assert 'paper">0.5&nbsp;deg</span>' in report_page(reported_runs([equipped]))
     info([equipped.path], UnitSystem.paper, False)
     out = capsys.readouterr().out
     said = " ".join(out.split())  # on a terminal it is folded

@@ -94,7 +94,7 @@ NOT_RUN = {
     ("CONTRIBUTING.md", "python3 -m pytest tests/core -q"): "make test runs that folder",
     ("README.md", "flowchart LR"): "a diagram",
     ("docs/installation.md", "$ docker build --tag hsv-bench ."): "needs Docker",
-    ("src/hsv/hsv/pages/report/plotly/README.md", NPM): "how a file of the repository was fetched",
+    ("src/hsv/hsv/pages/plotly/README.md", NPM): "how a file of the repository was fetched",
     (
         "docs/montecarlo.md",
         ".venv/bin/dask ssh --nthreads 1 --nworkers 8 scheduler-host worker-1 worker-2",

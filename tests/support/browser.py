@@ -17,9 +17,10 @@ AXE = NPM / "node_modules" / "axe-core" / "axe.min.js"
 
 SETTLED = """
     if (!document.getElementById("library")) return true;
-    return Boolean(window.report) && report.panels.every((panel) => !panel.stale);
+    window.report?.drawAll();
+    return Boolean(window.own);
 """
-"""Whether everything is drawn, on a page that draws plots."""
+"""Whether everything is drawn, on a page that draws plots; what is out of sight is drawn now."""
 
 HINT = "make test-viewers installs it"
 FLAGS = (

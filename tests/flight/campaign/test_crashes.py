@@ -14,7 +14,7 @@ from hsv.flight.campaign.sample_runner import SampleRunner
 from hsv.flight.campaign.store import ResultStore
 from hsv.flight.campaign.summary import Results, shares, worst_flights
 from hsv.graph.campaign_replay import replay_in_process
-from hsv.pages.campaign.page import write_page
+from hsv.pages.campaign import write_campaign_page
 
 SCENARIO = """
 title = "a library that crashes"
@@ -62,7 +62,7 @@ def test_a_flight_that_crashes_is_recorded_and_the_others_are_flown(fly, tmp_pat
     assert (first.flight, first.limit) == (flight, "crashed") and second.limit != "crashed"
     repeated = replay_in_process(crashed, flight)
     assert not repeated.differing and repeated.repeated["crashed"] == crashed.row(flight)["crashed"]
-    write_page(crashed, tmp_path / "page.html")
+    write_campaign_page(crashed, tmp_path / "page.html")
     assert "crashed" in (tmp_path / "page.html").read_text()
 
 
@@ -71,7 +71,7 @@ def test_a_campaign_of_which_every_flight_fails_is_recorded(fly, tmp_path):
     assert failed.crashed.all()
     assert "step 5: returned 7, expected 0" in failed.row(0)["crashed"]
     assert shares(failed)[0].within == 0
-    write_page(failed, tmp_path / "page.html")
+    write_campaign_page(failed, tmp_path / "page.html")
 
 
 def test_results_of_two_libraries_are_not_mixed(fly):

@@ -12,7 +12,7 @@ from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.store import ResultStore
 from hsv.flight.campaign.summary import Results, clopper_pearson, distributions, shares, worst_flights
 from hsv.flight.closed_loop import fly
-from hsv.pages.campaign.page import render
+from hsv.pages.campaign import campaign_page
 
 
 def test_clopper_pearson_of_the_textbook():
@@ -63,7 +63,7 @@ def test_flights_that_diverge_are_within_no_limit_and_come_first(lost):
     worst = worst_flights(lost)
     assert worst[0].limit == "diverged"
     assert lost.column("end_time")[worst[0].flight] == lost.column("end_time").min()
-    assert "∞" in render(lost)
+    assert "∞" in campaign_page(lost)
 
 
 def test_envelopes_hold_every_flight(results, planned):
@@ -99,7 +99,7 @@ def test_an_envelope_has_the_extremes_and_the_mean_values_of_each_window():
 
 
 def test_the_page_is_complete_in_itself(results):
-    page = render(results)
+    page = campaign_page(results)
     assert "https://" not in page.split('id="data"')[0]
     for words in ("tube level", "moment of inertia", "hsv montecarlo replay", "Clopper-Pearson", "test"):
         assert words in page

@@ -9,9 +9,9 @@ from published_model import DERIVED, FOOT, SLUG
 
 from hsv.model.airframe.geometry import EIGENVALUE, Cantilever, airframe
 from hsv.model.airframe.pose import BODY, Sample, composed, transforms
-from hsv.model.airframe.side_view import geometry
 from hsv.model.airframe.solids import solids
 from hsv.model.vehicle import load_vehicle
+from hsv.pages.side_view import geometry
 
 
 def test_lengths_add_up_to_the_published_hundred_feet():

@@ -8,7 +8,7 @@ from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.store import ResultStore
 from hsv.flight.campaign.summary import Results, within_all
-from hsv.pages.campaign.page import write_page
+from hsv.pages.campaign import write_campaign_page
 
 pytestmark = pytest.mark.viewer
 
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.viewer
 @pytest.fixture(scope="module")
 def page(results, tmp_path_factory):
     page = tmp_path_factory.mktemp("page") / "campaign.html"
-    write_page(results, page)
+    write_campaign_page(results, page)
     return page
 
 
@@ -46,15 +46,15 @@ def test_every_plot_is_drawn(opened):
 
 
 def test_units_are_switched_in_text_and_plots(opened, results):
-    seconds = ends(opened, "scatter-fault[0].start", "xaxis")
-    for name in ("plot-envelope_altitude_error", "histogram-altitude_end_error"):
-        axis = "yaxis" if name.startswith("plot") else "xaxis"
+    seconds = ends(opened, "plot-scatter_fault[0].start", "xaxis")
+    for name in ("plot-envelope_altitude_error", "plot-histogram_altitude_end_error"):
+        axis = "yaxis" if "envelope" in name else "xaxis"
         metres = ends(opened, name, axis)
         opened.click("[name=units][value=paper]")
         assert ends(opened, name, axis) == pytest.approx([end / 0.3048 for end in metres], rel=1e-6)
         opened.click("[name=units][value=metric]")
-    assert ends(opened, "scatter-fault[0].start", "xaxis") == seconds
-    mass = "return document.getElementById('scatter-mass').data[0].x[0]"
+    assert ends(opened, "plot-scatter_fault[0].start", "xaxis") == seconds
+    mass = "return document.getElementById('plot-scatter_mass').data[0].x[0]"
     percent = opened.run(mass)
     opened.click("[name=units][value=si]")
     assert percent == pytest.approx(100.0 * results.column("sample_mass")[0], rel=1e-5)
@@ -66,7 +66,7 @@ def test_the_address_says_what_is_shown_and_shows_it(opened):
         const envelope = document.getElementById("plot-envelope_altitude_error");
         const hidden = document.querySelectorAll(".picture [data-run][hidden]");
         return [document.documentElement.dataset.units, envelope.data.length, envelope._fullLayout.xaxis.range,
-          document.getElementById("scatter-mass")._fullLayout.yaxis.title.text, hidden.length];
+          document.getElementById("plot-scatter_mass")._fullLayout.yaxis.title.text, hidden.length];
     """
     plain = opened.run(what)
     opened.click("[name=units][value=paper]")
@@ -92,7 +92,7 @@ def test_what_a_campaign_of_whole_flights_opens_with(browser, screen, tmp_path, 
     out = tmp_path / "case1.parquet"
     run_campaign(campaign, ResultStore(out, campaign), Executor())
     results, page = Results(out), tmp_path / "case1.html"
-    write_page(results, page)
+    write_campaign_page(results, page)
     screen(1280)
     browser.open(page)
     assert browser.run("return document.querySelector('.lead').innerText").startswith(f"{within_all(results)} of 100 ")

@@ -44,15 +44,15 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
     browser.console()
     browser.requests()
     driver.get(page)
-    until(browser, flight, "window.live && live.charts.now > 4")
+    until(browser, flight, "window.live && live.now > 4")
     # Space pauses, and the flight goes on where it was.
     browser.press(" ")
     until(browser, flight, "live.status.settings.paused")
     until(browser, flight, "live.form.pause.textContent === 'Resume'")
-    stood = browser.run("return live.charts.now")
+    stood = browser.run("return live.now")
     steps = recorded_steps(bag)
     time.sleep(0.5)
-    assert browser.run("return live.charts.now") - stood < 0.1 and recorded_steps(bag) - steps <= 50
+    assert browser.run("return live.now") - stood < 0.1 and recorded_steps(bag) - steps <= 50
     browser.press(" ")
     until(browser, flight, "!live.status.settings.paused")
     driver.find_element("css selector", "[name=parameters]").send_keys("80 %")
@@ -62,7 +62,7 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
     answer = browser.run("return document.getElementById('answer').textContent")
     assert answer.startswith("loss of effectiveness 0.8 of elevator deflection from step ")
     step = int(answer.partition("from step ")[2].split()[0])
-    until(browser, flight, f"live.charts.now > {step * 0.02 + 6.0}")
+    until(browser, flight, f"live.now > {step * 0.02 + 6.0}")
     browser.picture(pictures / "live.png")
     shade = browser.run("return document.getElementById('plot-altitude').layout.shapes[0]")
     assert shade["x0"] == pytest.approx(step * 0.02) and shade["x1"] > shade["x0"]
@@ -81,7 +81,7 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
     wait_until(lambda: flight.poll() is not None, [flight.pid])
     # The server has left; the curves stay.
     until(browser, flight, "live.over")
-    assert browser.run("return live.charts.now") == pytest.approx(120.0)
+    assert browser.run("return live.now") == pytest.approx(120.0)
     assert browser.run("return document.querySelector('fieldset.flight').disabled")
     assert browser.console() == []
     assert {address.split("/")[2] for address in browser.requests() if ":" in address} <= {page.split("/")[2]}
@@ -111,7 +111,7 @@ def look(browser, flight, page):
     # The same page with another token is no other page to a browser.
     browser.driver.get("about:blank")
     browser.driver.get(page)
-    until(browser, flight, "window.live && live.charts.now > 3 && live.status && live.status.faults.length")
+    until(browser, flight, "window.live && live.now > 3 && live.status && live.status.faults.length")
 
 
 @pytest.fixture
@@ -145,8 +145,8 @@ def assert_refused(browser, flight):
     """The page says why nothing was done, and nothing was: the flight goes on as it was."""
     until(browser, flight, "document.getElementById('answer').className === 'bad'")
     assert browser.run("return document.getElementById('answer').textContent").startswith("token: wrong or missing")
-    before = browser.run("return live.charts.now")
-    until(browser, flight, f"live.charts.now > {before + 0.5}")
+    before = browser.run("return live.now")
+    until(browser, flight, f"live.now > {before + 0.5}")
     status = browser.run("return live.status")
     assert not status["settings"]["paused"] and status["settings"]["real_time_factor"] == 1
     assert [fault["channel"] for fault in status["faults"]] == ["elevator_deflection"]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from hsv.bags.description import TUBE_STATUS
+from hsv.pages.flights import flight_curves
 from hsv.pages.live import hub as hub_module
-from hsv.pages.report.curves import flight_curves
 
 STEPS = 201
 A_STEP = 9

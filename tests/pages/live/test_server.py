@@ -1,4 +1,4 @@
-"""The server of the page: who is let in, what he gets, and that nobody is kept waiting."""
+"""The server of the page: access, data, commands, and clients that do not read."""
 
 import json
 import urllib.error
@@ -82,7 +82,13 @@ def test_commands_need_the_token(hub, server):
 
 @pytest.mark.parametrize(
     ("request_text", "words"),
-    [("no json", "request: no JSON"), ("[1, 2]", "request = '[1, 2]': expected a JSON object")],
+    [
+        ("no json", "request: no JSON"),
+        ("[1, 2]", "request = '[1, 2]': expected a JSON object"),
+        ('{"id": ' + "[" * 4000 + "]" * 4000 + "}", "request: no JSON"),
+        ('{"token": "\\ud800", "command": "pause"}', "half a surrogate pair"),
+        ('{"command": "\\udfff\\ud800"}', "half a surrogate pair"),
+    ],
 )
 def test_nonsense_is_answered(server, request_text, words):
     answer = PageClient(server.url).send(request_text)

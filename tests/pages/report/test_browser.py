@@ -6,8 +6,8 @@ from page_checks import PageChecks
 from recorded_flight import record_flight
 
 from hsv.base.units import UnitSystem, in_system
-from hsv.pages.report.page import write_report
-from hsv.pages.report.panels import PANELS, error_panel
+from hsv.pages.panels import PANELS, error_panel
+from hsv.pages.report import write_report
 
 pytestmark = pytest.mark.viewer
 
@@ -137,16 +137,13 @@ def test_the_time_window_can_be_typed(opened):
 
 
 def state(browser):
-    """Return what the page shows: units, time window, vertical ranges, curves of the altitude, runs of the picture."""
+    """Return what the page shows: units, time window, curves of the altitude, runs of the picture."""
     return browser.run(
         """
-        const axis = (name) => document.getElementById(`plot-${name}`)._fullLayout.yaxis.range;
         const inSight = (path) => getComputedStyle(path).display !== "none";
         return {
           units: document.documentElement.dataset.units,
-          time: report.state.time,
-          ranges: report.zooms,
-          drawn: report.zooms.velocity && axis("velocity"),
+          time: report.time,
           curves: document.getElementById("plot-altitude").data.map((curve) => curve.name).sort(),
           picture: [...document.querySelectorAll(".picture [data-run]")].filter(inSight).length,
           place: scrollY,
@@ -164,12 +161,10 @@ def test_the_address_says_what_is_shown_and_shows_it(opened, page):
     opened.click("[name=limits]")
     opened.run("Plotly.relayout('plot-altitude', {'xaxis.range[0]': 7.5, 'xaxis.range[1]': 9})")
     opened.settle()
-    opened.run("Plotly.relayout('plot-velocity', {'yaxis.range[0]': 7901, 'yaxis.range[1]': 7910})")
-    opened.settle()
     opened.driver.find_element("css selector", "nav a[href='#inputs']").click()
     opened.settle()
     address, shown = opened.driver.current_url, state(opened)
-    assert shown["time"] == [7.5, 9] and shown["ranges"] == {"velocity": [7901, 7910]} and shown["units"] == "paper"
+    assert shown["time"] == [7.5, 9] and shown["units"] == "paper"
     assert 0 < shown["picture"] < plain["picture"] and len(shown["curves"]) < len(plain["curves"])
     assert address.partition("#")[2].startswith("inputs&")
     opened.driver.get("about:blank")
@@ -180,12 +175,12 @@ def test_the_address_says_what_is_shown_and_shows_it(opened, page):
     assert found == {key: value for key, value in shown.items() if key != "place"}
     assert opened.console() == []
     opened.click("[name=all]")
-    assert "from=" not in opened.driver.current_url and "y-velocity" not in opened.driver.current_url
+    assert "from=" not in opened.driver.current_url
 
 
 def test_an_address_that_says_nonsense_shows_the_page(browser, page):
     browser.driver.get("about:blank")
-    browser.driver.get(f"{page.as_uri()}#nowhere&units=cubits&from=x&no-run=7&y-altitude=a..b&other=1")
+    browser.driver.get(f"{page.as_uri()}#nowhere&units=cubits&from=x&other=1")
     browser.settle()
     assert browser.run("return document.documentElement.dataset.units") == "metric"
     assert x_ranges(browser) == {(0.0, 20.0)} and browser.console() == []

@@ -1,55 +1,53 @@
-"""Differences between runs, those of runs that nearly agree above all."""
+"""Differences between runs, especially between runs that nearly agree."""
 
 import numpy as np
 import pytest
 from recorded_flight import record_flight
 
-from hsv.pages.report.differences import differences
-from hsv.pages.report.opening import happened
-from hsv.pages.report.run import reported_runs
+from hsv.pages.flights import reported_runs
+from hsv.pages.report import flight_differences, happened
 
 
 @pytest.fixture(scope="module")
 def nearly(bags):
-    """The quiet flight with a notch a hair's breadth beside its own."""
+    """Return the quiet flight with a slightly different notch filter."""
     return record_flight(bags / "nearly", notch__zero_frequency=[15.0001])
 
 
 def by_panel(runs):
-    return {difference.panel.name: difference for difference in differences(runs)}
+    return {found[0].panel.name: found for found in flight_differences(runs)}
 
 
 def test_a_flight_does_not_differ_from_itself(quiet):
     runs = reported_runs([quiet, quiet])
-    found = differences(runs)
-    assert found and all(difference.none for difference in found)
+    found = flight_differences(runs)
+    assert found and not any(difference.largest for each in found for difference in each)
     assert "States and commands are the same, bit for bit" in happened(runs, found)
 
 
 def test_differences_far_below_single_precision_are_kept(quiet, nearly):
     runs = reported_runs([quiet, nearly])
-    (altitude,) = by_panel(runs)["altitude"].runs
+    (altitude,) = by_panel(runs)["altitude"]
     first, second = (bag.columns("/hsv/state")["altitude"] for bag in (quiet, nearly))
     np.testing.assert_array_equal(altitude.y, second - first)
     assert 0.0 < altitude.largest < np.spacing(np.float32(first.max()))
-    assert altitude.at == altitude.time[np.argmax(np.abs(second - first))]
-    assert "The flights nearly agree" in happened(runs, differences(runs))
+    assert "The flights nearly agree" in happened(runs, flight_differences(runs))
 
 
 def test_flights_that_differ_are_said_to_differ_most_somewhere(quiet, loud):
     runs = reported_runs([quiet, loud])
     found = by_panel(runs)
     assert "The flights differ most in" in happened(runs, list(found.values()))
-    assert found["level"].runs[0].share > 0.01
+    assert found["level"][0].share > 0.01
 
 
 def test_only_steps_that_both_have_are_compared(quiet, bags):
     short = record_flight(bags / "short", duration=4.0, fault=3.0)
-    (altitude,) = by_panel(reported_runs([short, quiet]))["altitude"].runs
+    (altitude,) = by_panel(reported_runs([short, quiet]))["altitude"]
     state = [bag.columns("/hsv/state") for bag in (short, quiet)]
     assert len(altitude.y) == len(state[0]["altitude"]) < len(state[1]["altitude"])
     assert altitude.time[-1] == state[0]["header.stamp"][-1] * 1e-9
 
 
 def test_one_run_alone_has_none(quiet):
-    assert differences(reported_runs([quiet])) == []
+    assert flight_differences(reported_runs([quiet])) == []

@@ -1,7 +1,7 @@
 from recorded_flight import record_flight
 
 from hsv.bags.info import describe
-from hsv.pages.report.events import Event, flight_events
+from hsv.pages.events import Event, flight_events
 
 
 def of_kind(bag, kind):

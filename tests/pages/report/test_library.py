@@ -1,21 +1,21 @@
-"""The plotting library in the page is the one that others publish."""
+"""The plotting library is an unchanged copy of the published one."""
 
 import json
 
 import pytest
 from bag_readers import NPM
 
-from hsv.pages.report.templates import LIBRARY
+from hsv.pages.engine import LIBRARY
 
 PACKAGE = "plotly.js-basic-dist-min"
 
 
-def test_it_has_the_version_that_npm_is_asked_for():
+def test_it_has_the_version_of_the_npm_package():
     version = json.loads((NPM / "package.json").read_text())["dependencies"][PACKAGE]
     assert f"plotly.js (basic - minified) v{version}\n" in LIBRARY.read_text(encoding="utf-8")[:200]
 
 
-def test_its_licence_lies_beside_it():
+def test_its_licence_is_next_to_it():
     assert "MIT License" in LIBRARY.parent.joinpath("LICENSE").read_text(encoding="utf-8")
 
 

@@ -1,6 +1,7 @@
 import base64
 import gzip
 import html
+import json
 import re
 
 import numpy as np
@@ -13,18 +14,16 @@ from hsv.bags.topic import Qos, Topic
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import RecordingError
 from hsv.flight.metrics import METRICS
-from hsv.pages.report.differences import differences
-from hsv.pages.report.opening import happened, sentence
-from hsv.pages.report.page import render, write_report
-from hsv.pages.report.payload import Numbers, all_panels, payload
-from hsv.pages.report.run import reported_runs
+from hsv.pages.engine import Numbers
+from hsv.pages.flights import reported_runs
+from hsv.pages.report import all_panels, flight_differences, happened, report_page, sentence, write_report
 
 EMBEDDED = re.compile(r'<script type="application/[^>]*>.*?</script>', re.DOTALL)
 
 
 @pytest.fixture(scope="module")
 def page(quiet, loud):
-    return render(reported_runs([quiet, loud]))
+    return report_page(reported_runs([quiet, loud]))
 
 
 def words(page):
@@ -47,7 +46,7 @@ def test_every_link_has_its_section(page):
 
 
 def test_equal_bags_give_equal_pages(quiet, page, loud):
-    assert render(reported_runs([quiet, loud])) == page
+    assert report_page(reported_runs([quiet, loud])) == page
 
 
 def test_runs_of_one_scenario_are_told_apart(quiet, loud):
@@ -56,7 +55,7 @@ def test_runs_of_one_scenario_are_told_apart(quiet, loud):
 
 def test_verdict_limits_and_metrics_are_those_of_the_run(quiet):
     (run,) = reported_runs([quiet])
-    seen = words(render([run]))
+    seen = words(report_page([run]))
     over = sum(not verdict.within for verdict in run.verdicts.values())
     assert over, "20 s are too short to reach the end error that is asked for"
     assert f"✗ {over} of {len(run.scenario.limits)} limits not kept" in seen
@@ -101,8 +100,8 @@ def test_what_happened_is_told_and_escaped(page):
 
 def test_parameters_certificate_and_repetition_are_told(page, loud):
     seen = words(page)
-    assert "20 matrices 9 × 9" in seen and "vehicle.coupling" in seen
-    assert "invariant set" in seen and "parameters sha256" in seen
+    assert "1620 numbers" in seen and "vehicle.coupling" in seen and "15&nbsp;rad/s" in page
+    assert loud.attachments["certificate.json"].decode() in html.unescape(page)
     assert loud.custom_data["run_id"] in seen
     assert f"git checkout {loud.custom_data['commit']}" in seen and "hsv run case1 " in seen
 
@@ -116,10 +115,11 @@ def test_parameters_that_differ_are_marked_and_others_said_once(page):
 
 def test_all_recorded_steps_are_drawn(loud, quiet):
     runs = reported_runs([quiet, loud])
-    found = differences(runs)
-    described, _ = payload(runs, found)
+    found = flight_differences(runs)
+    described = json.loads(re.search(r'id="described">(.*?)</script>', report_page(runs), re.DOTALL)[1])
     names = [panel.name for panel in all_panels(runs)]
-    assert [panel["name"] for panel in described["panels"]] == names + [each.name for each in found]
+    different = [f"difference_{each[0].panel.name}" for each in found]
+    assert [panel["name"] for panel in described["panels"]] == names + different
     assert len(names) == 12 + 7 and len(found) == 12
     assert set(described["lengths"]) == {1001, 2}
 
@@ -168,7 +168,7 @@ def test_a_design_without_a_set_is_said_to_have_none(bags):
     from recorded_flight import record_flight
 
     bag = record_flight(bags / "no_set", tube__shape=[], tube__half_width=[], tube__centre=[], duration=2.0, fault=1.0)
-    page = render(reported_runs([bag]))
+    page = report_page(reported_runs([bag]))
     assert "carries an invariant set" in words(page) and 'id="plot-level"' not in page
 
 
@@ -183,8 +183,8 @@ def test_without_attachments_there_is_a_page_but_no_verdict(quiet, tmp_path):
         for time, data in quiet.messages(topic):
             writer.write(topic, time, data)
     writer.close()
-    seen = words(render(reported_runs([Bag(tmp_path / "bare")])))
-    assert "no limits to judge by" in seen and "no scenario is attached" in seen
+    seen = words(report_page(reported_runs([Bag(tmp_path / "bare")])))
+    assert "no limits to judge by" in seen and "No scenario is attached" in seen
     assert "None are attached to the bag" in seen
 
 

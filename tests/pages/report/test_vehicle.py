@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hsv.model.airframe.geometry import airframe
-from hsv.model.airframe.side_view import geometry
-from hsv.pages.report.page import write_report
+from hsv.pages.report import write_report
+from hsv.pages.side_view import geometry
 
 pytestmark = pytest.mark.viewer
 
@@ -26,7 +26,7 @@ def page(quiet, tmp_path_factory):
 def opened(browser, page):
     browser.open(page)
     browser.run("document.getElementById('vehicle').scrollIntoView()")
-    browser.wait("return Boolean(report.player.views)")
+    browser.wait("return Boolean(own.vehicle?.views[0])")
     return browser
 
 
@@ -36,11 +36,11 @@ def shown(browser, at, exaggeration=40):
         const [time, exaggeration] = arguments, slider = document.querySelector("[name=exaggeration]");
         slider.value = exaggeration;
         slider.dispatchEvent(new Event("input"));
-        report.player.show(time);
+        own.show(time);
         const numbers = (path) => ((path.getAttribute("d") || "").match(/-?[\\d.]+/g) || []).map(Number);
         return [...document.querySelectorAll("#vehicle figure")].map((figure) => ({
-          paths: [...figure.querySelectorAll("svg > path")].map(numbers),
-          ghost: [...figure.querySelectorAll("svg > g > path")].map(numbers),
+          paths: [...figure.querySelectorAll(".vehicle path, .flame")].map(numbers),
+          ghost: [...figure.querySelectorAll(".ghost path")].map(numbers),
           readout: [...figure.querySelectorAll(".readout dd")].map((entry) => entry.textContent),
           text: figure.querySelector("svg").textContent,
         }));
@@ -52,7 +52,7 @@ def body_of(figure):
     """Return the outline of the body, the longest path, in metres: x forward, z up, from the centre of gravity."""
     points = np.array(max(figure["paths"], key=len)).reshape(-1, 2)
     scale = 0.72 * 640 / airframe().length
-    return (points - [0.47 * 640, 0.55 * 300]) * [1.0, -1.0] / scale
+    return (points - [301, 165]) * [1.0, -1.0] / scale
 
 
 def expected_body(eta, pitch, exaggeration):
@@ -96,13 +96,13 @@ def test_numbers_are_those_of_the_bag_and_true_to_scale(opened, quiet):
 
 def test_positive_elevator_is_drawn_trailing_edge_down(opened):
     script = """
-        const place = document.createElement("div");
+        const place = document.querySelector(".side-view").cloneNode(true);
         document.body.append(place);
-        const view = createSideView(place, report.player.plots.airframe);
+        const view = new SideView(place, report.airframe);
         const sample = {time: 0, altitude: 26000, velocity: 2400, angle_of_attack: 0, pitch_angle: 0, elastic: [0, 0],
           fuel_equivalence_ratio: arguments[1], elevator_deflection: arguments[0], faults: []};
         view.draw(sample);
-        const paths = [...place.querySelectorAll("svg > path")].map((path) => path.getAttribute("d") || "");
+        const paths = [...place.querySelectorAll(".vehicle path, .flame")].map((path) => path.getAttribute("d") || "");
         place.remove();
         return paths.map((d) => (d.match(/-?[\\d.]+/g) || []).map(Number));
     """
@@ -132,19 +132,19 @@ def test_faults_are_marked_on_the_time_line_and_told_while_they_act(opened):
     assert "elevator deflection: loss of effectiveness" in shown(opened, FAULT)[0]["text"]
     shown(opened, 0.0)
     opened.run("document.querySelector('.jumps button').click()")
-    assert opened.run("return report.player.time") == FAULT
+    assert opened.run("return own.time") == FAULT
 
 
 def test_it_plays_at_the_speed_chosen_and_stops_at_the_end(opened):
     shown(opened, 0.0)
     opened.run("document.querySelector('[name=speed]').value = '20'; document.querySelector('[name=play]').click()")
-    opened.wait("return report.player.time > 5")
+    opened.wait("return own.time > 5")
     opened.run("document.querySelector('[name=play]').click()")
-    paused = opened.run("return report.player.time")
-    assert opened.run("return [report.player.playing, report.player.time]") == [False, paused]
+    paused = opened.run("return own.time")
+    assert opened.run("return [own.playing, own.time]") == [False, paused]
     opened.run("document.querySelector('[name=play]').click()")
-    opened.wait("return !report.player.playing")
-    assert opened.run("return report.player.time") == 20.0
+    opened.wait("return !own.playing")
+    assert opened.run("return own.time") == 20.0
     assert opened.console() == []
 
 
@@ -152,23 +152,23 @@ def test_keys_move_the_time_and_play(opened):
     shown(opened, 4.0)
     slider = opened.driver.find_element("css selector", "#player [name=time]")
     slider.send_keys("\ue014")  # arrow to the right
-    assert opened.run("return report.player.time") == pytest.approx(4.02)
+    assert opened.run("return own.time") == pytest.approx(4.02)
     slider.send_keys(" ")
-    opened.wait("return report.player.playing && report.player.time > 4.1")
+    opened.wait("return own.playing && own.time > 4.1")
     slider.send_keys(" ")
-    assert not opened.run("return report.player.playing")
+    assert not opened.run("return own.playing")
 
 
 def test_who_wants_little_motion_gets_two_pictures_a_second(opened):
     opened.media(features=[{"name": "prefers-reduced-motion", "value": "reduce"}])
     count = """
         window.drawn = 0;
-        const draw = report.player.draw;
-        report.player.draw = function () { window.drawn++; draw.call(this); };
+        const draw = own.vehicle.draw;
+        own.vehicle.draw = function () { window.drawn++; draw.call(this); };
     """
-    opened.run(f"{count} report.player.show(0); document.querySelector('[name=play]').click()")
-    opened.wait("return report.player.time > 2")
-    drawn, at = opened.run("return [window.drawn, report.player.time]")
+    opened.run(f"{count} own.show(0); document.querySelector('[name=play]').click()")
+    opened.wait("return own.time > 2")
+    drawn, at = opened.run("return [window.drawn, own.time]")
     opened.media(features=[])
     assert drawn <= 2 * at + 3
 

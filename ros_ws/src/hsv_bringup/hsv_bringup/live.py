@@ -43,7 +43,7 @@ from hsv.pages.live.commands import Change, Command, Inject
 from hsv.pages.live.foxglove_server import FoxgloveServer
 from hsv.pages.live.hub import Hub
 from hsv.pages.live.server import Answer, PageServer
-from hsv.pages.report.panels import INPUTS
+from hsv.pages.panels import INPUTS
 from hsv.pages.viewers import LAYOUTS, VIEWERS
 from hsv_bringup.client import ABSENT_AFTER, SILENT_AFTER
 from hsv_bringup.flow_executor import FlowExecutor

@@ -313,7 +313,7 @@ def _conclude(
     from hsv.cli.summary import FlightSummary, report_flight
     from hsv.flight.metrics import flight_metrics
     from hsv.flight.scenario import parse_scenario
-    from hsv.pages.report.page import write_report
+    from hsv.pages.report import write_report
 
     recorded = Bag(bag)
     if "scenario.toml" not in recorded.attachments:
@@ -581,7 +581,7 @@ def resilience(
     from hsv.flight.resilience.faults import TRIED
     from hsv.flight.resilience.store import CaseStore
     from hsv.flight.resilience.summary import ResilienceResults, parameter_words
-    from hsv.pages.resilience.page import write_results
+    from hsv.pages.resilience import write_results
 
     if listed:
         print_titles({name: parameter_words(name) for name in TRIED}, json)
@@ -620,7 +620,7 @@ def _names(text: str) -> tuple[str, ...]:
 
 def _cells(results: ResilienceResults) -> list[dict[str, Any]]:
     from hsv.flight.resilience.faults import TRIED
-    from hsv.pages.resilience.page import flight_file
+    from hsv.pages.resilience import flight_file
 
     found = []
     for (fault, controller), square in results.squares.items():

@@ -56,7 +56,7 @@ def report(
     Example: hsv report bags/case1_20260101T000000Z bags/case1_no_notch_20260101T000000Z --out comparison.html
     """
     from hsv.bags.reader import Bag
-    from hsv.pages.report.page import write_report
+    from hsv.pages.report import write_report
 
     check_target(out, "out", ".html", ".htm")
     opened = [Bag(bag) for bag in bags]
@@ -242,7 +242,7 @@ def _fault(units: UnitSystem, fault: dict[str, Any]) -> str:
 def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str, str]:
     """Return a line for each kind of equipment that is not ideal."""
     from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
-    from hsv.pages.report.panels import AIR_PANELS
+    from hsv.pages.panels import AIR_PANELS
 
     if equipment is None:
         return {}

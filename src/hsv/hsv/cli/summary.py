@@ -176,7 +176,7 @@ def announce(capacity: Capacity) -> None:
 def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, flown: int | None = None) -> None:
     """Print the summary of a campaign and write its page; ``flown`` is the number of flights flown just now."""
     from hsv.flight.campaign.summary import CONFIDENCE, distributions, shares, worst_flights
-    from hsv.pages.campaign.page import write_page
+    from hsv.pages.campaign import write_campaign_page
 
     written = results.path.with_suffix(".html") if page else None
     if json:
@@ -217,7 +217,7 @@ def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, f
         _print_campaign(results, units)
         say(f"results {results.path}")
     if written:
-        write_page(results, written)
+        write_campaign_page(results, written)
         if not json:
             say(f"page    {written}")
 

@@ -1,1 +1,1 @@
-"""Pages of a browser: report, campaigns, resilience and the live page."""
+"""The pages: reports of flights and campaigns, the live page, static plots, layouts for viewers."""

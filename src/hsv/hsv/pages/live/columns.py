@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hsv.bags.description import STATE, TUBE_STATUS
-from hsv.pages.report.panels import ERRORS, PANELS, Curve, Kind, Panel, error_panel
+from hsv.pages.panels import ERRORS, PANELS, Curve, Kind, Panel, error_panel
 
 Read = Callable[[Any], float]
 """Reads a number of a message."""

@@ -1,4 +1,4 @@
-"""The server of the live page: the page itself, and over a WebSocket what it shows and what it asks for."""
+"""The server of the live page: the page, and a WebSocket for its data and its commands."""
 
 from __future__ import annotations
 
@@ -17,28 +17,31 @@ from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from hsv.base.errors import HsvError, ParameterError, reason
-from hsv.base.files import json_text
+from hsv.base.errors import DocumentError, HsvError, ParameterError, reason
+from hsv.base.files import json_text, parse_json
 from hsv.graph.addresses import HOST, origins
 from hsv.pages.live.commands import Command, read_command
 from hsv.pages.live.hub import Hub
-from hsv.pages.live.page import render
+from hsv.pages.live.page import live_page
 
 SOCKET = "/flight"
 """Path of the WebSocket."""
 
-_LONGEST_REQUEST = 10_000
-"""Bytes of what a page may send at once."""
+LONGEST_REQUEST = 10_000
+"""Bytes that a page may send at once."""
 
-_GOING = 1001
+GOING_AWAY = 1001
 """Close code of a server that ends."""
+
+CLOSE_TIMEOUT = 1.0
+"""Seconds for which clients are waited for at the end."""
 
 Answer = Callable[[dict[str, Any]], None]
 """Takes the answer to a command: whether it was ``accepted``, a ``message``, and the ``step`` from which on it acts."""
 
 
 class PageServer:
-    """Serves the page in a separate thread: a client that is slow, or never reads, does not delay others.
+    """Serves the page in a separate thread; a client that is slow or never reads does not delay others.
 
     Raises:
         ParameterError: The port is in use.
@@ -48,7 +51,7 @@ class PageServer:
         self._hub = hub
         self._token = secrets.token_urlsafe(16)
         self.commands: SimpleQueue[tuple[Command, Answer]] = SimpleQueue()
-        """Commands that were checked, to be carried out and answered."""
+        """Valid commands, to be carried out and answered."""
         self._changed: set[asyncio.Event] = set()
         self._loop = asyncio.new_event_loop()
         try:
@@ -59,7 +62,7 @@ class PageServer:
                 f"live.page_port = {port}: {reason(error).lower()}, expected a free port of this machine"
             ) from None
         self.port = int(self._server.sockets[0].getsockname()[1])
-        self._page = render(hub, self.port).encode()
+        self._page = live_page(hub, self.port).encode()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
 
@@ -70,41 +73,45 @@ class PageServer:
 
     @property
     def watched(self) -> bool:
-        """Whether somebody looks at the page."""
+        """Whether a page is open."""
         return bool(self._changed)
 
     def publish(self) -> None:
-        """Send new data of the hub to all clients, to each when it is ready."""
+        """Send new data of the hub to every client as soon as it is ready."""
         if self._changed:
             self._loop.call_soon_threadsafe(self._wake)
 
     def close(self) -> None:
         """Send new data, and disconnect the clients."""
-
-        async def leave() -> None:
-            self._wake()
-            with suppress(TimeoutError):
-                # The tasks of clients that read have sent everything by then.
-                await asyncio.wait_for(self._sent(), _LAST_WORDS)
-            self._server.close(code=_GOING, reason="the live view has ended")
-            with suppress(TimeoutError):
-                await asyncio.wait_for(self._server.wait_closed(), _LAST_WORDS)
-            unread = asyncio.all_tasks() - {asyncio.current_task()}
-            for task in unread:
-                task.cancel()
-            await asyncio.gather(*unread, return_exceptions=True)
-
-        asyncio.run_coroutine_threadsafe(leave(), self._loop).result()
+        asyncio.run_coroutine_threadsafe(self._leave(), self._loop).result()
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
+
+    async def _leave(self) -> None:
+        self._wake()
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._sent(), CLOSE_TIMEOUT)
+        self._server.close(code=GOING_AWAY, reason="the live view has ended")
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._server.wait_closed(), CLOSE_TIMEOUT)
+        # The remaining tasks belong to clients that do not read.
+        unread = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in unread:
+            task.cancel()
+        await asyncio.gather(*unread, return_exceptions=True)
+
+    async def _sent(self) -> None:
+        await asyncio.sleep(0)
+        while any(event.is_set() for event in self._changed):
+            await asyncio.sleep(0.01)
 
     def _wake(self) -> None:
         for changed in self._changed:
             changed.set()
 
     async def _listen(self, port: int) -> Server:
-        # Of a client that comes wrongly, a person at the flight need not hear.
+        # A program that connects without a valid handshake is none of the pilot's business.
         logger = logging.getLogger(__name__)
         logger.addFilter(lambda record: record.msg != "opening handshake failed")
         return await serve(
@@ -112,26 +119,19 @@ class PageServer:
             HOST,
             port,
             process_request=self._respond,
-            max_size=_LONGEST_REQUEST,
-            close_timeout=_LAST_WORDS,
+            max_size=LONGEST_REQUEST,
+            close_timeout=CLOSE_TIMEOUT,
             logger=logger,
         )
 
-    async def _sent(self) -> None:
-        await asyncio.sleep(0)
-        while any(event.is_set() for event in self._changed):
-            await asyncio.sleep(_LOOK)
-
     def _respond(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer whatever asks for no WebSocket, and refuse pages of other places."""
-        origin = request.headers.get("Origin")
-        allowed = origins(self.port)
-        if origin is not None and origin not in allowed:
-            text = f"Origin: {origin!r}, expected {' or '.join(allowed)}\n"
-            return connection.respond(HTTPStatus.FORBIDDEN, text)
-        if request.path == SOCKET and "Upgrade" in request.headers:
-            if origin is None:
-                return connection.respond(HTTPStatus.FORBIDDEN, f"Origin: missing, expected {' or '.join(allowed)}\n")
+        """Answer requests for the page, and refuse pages of other origins."""
+        origin, allowed = request.headers.get("Origin"), origins(self.port)
+        socket = request.path == SOCKET and "Upgrade" in request.headers
+        if origin not in allowed and (origin is not None or socket):
+            said = "missing" if origin is None else repr(origin)
+            return connection.respond(HTTPStatus.FORBIDDEN, f"Origin: {said}, expected {' or '.join(allowed)}\n")
+        if socket:
             return None
         if request.path != "/":
             return connection.respond(HTTPStatus.NOT_FOUND, f"path = {request.path!r}: expected / or {SOCKET}\n")
@@ -158,7 +158,7 @@ class PageServer:
             sender.cancel()
 
     async def _send(self, connection: ServerConnection, changed: asyncio.Event) -> None:
-        """Send what has changed since the last time, as fast as the client reads."""
+        """Send changes since the last time, as fast as the client reads."""
         generation, rows, version = 0, 0, -1
         with suppress(ConnectionClosed):
             while True:
@@ -177,7 +177,7 @@ class PageServer:
                     changed.clear()
 
     def _take(self, connection: ServerConnection, text: str | bytes) -> None:
-        """Check a request and hand it on; whatever comes of it is answered."""
+        """Check a request and queue its command; every request is answered."""
         number: Any = None
 
         def answer(values: dict[str, Any]) -> None:
@@ -197,10 +197,18 @@ class PageServer:
 
 
 def _fields(text: str | bytes) -> dict[str, Any]:
+    """Return the fields of a request.
+
+    Raises:
+        ParameterError: It is no JSON object, is nested too deep, or has half a surrogate pair, which is no character.
+    """
     try:
-        fields = json.loads(text)
-    except ValueError as error:
+        fields = parse_json(text)
+        json.dumps(fields, ensure_ascii=False).encode()
+    except DocumentError as error:
         raise ParameterError(f"request: no JSON ({error}), expected an object") from None
+    except UnicodeError:
+        raise ParameterError("request: half a surrogate pair in a text, expected characters") from None
     if not isinstance(fields, dict):
         raise ParameterError(f"request = {text!r}: expected a JSON object")
     return fields
@@ -209,9 +217,3 @@ def _fields(text: str | bytes) -> dict[str, Any]:
 async def _send_quietly(connection: ServerConnection, words: str) -> None:
     with suppress(ConnectionClosed):
         await connection.send(words)
-
-
-_LAST_WORDS = 1.0
-"""Seconds for which clients are waited for at the end."""
-
-_LOOK = 0.01

@@ -1,0 +1,286 @@
+"""The page of a Monte Carlo campaign: one HTML file that loads nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+from markupsafe import Markup
+
+from hsv.base.errors import CampaignError, ControllerError
+from hsv.base.units import UnitSystem
+from hsv.flight.campaign.campaign import Factor
+from hsv.flight.campaign.envelope import SIGNALS, signals, window_starts
+from hsv.flight.campaign.summary import (
+    ENDED,
+    Distribution,
+    Results,
+    Share,
+    distributions,
+    limits,
+    shares,
+    within_all,
+    worst_flights,
+)
+from hsv.flight.campaign.table import OUTCOMES
+from hsv.flight.flight import Flight
+from hsv.flight.metrics import METRICS, Group, in_words, is_share
+from hsv.model.plant import Plant
+from hsv.pages.engine import Numbers, Plot, render, write_page
+from hsv.pages.picture import Line, Picture, drawing, picture
+from hsv.pages.text import capitalised, quantity, units_of
+
+POINTS = 2000
+"""Flights that a scatter plot draws at most; of more it draws every n-th."""
+
+BINS = 60
+
+RUN = "run"
+"""Group of the numbers that are not metrics: when a flight ended, and its largest level in the tube."""
+
+PICTURED = ("altitude_error", "velocity_error", "angle_of_attack", "elevator_deflection")
+"""Signals of the picture of all flights."""
+
+SECTIONS = {
+    "summary": "Summary",
+    "worst": "Worst flights",
+    "envelopes": "Envelopes",
+    "distributions": "Distributions",
+    "scatter": "Against each parameter",
+    "repeat": "Repeat",
+}
+"""Headings in the order of the page."""
+
+
+def write_campaign_page(results: Results, out: Path, units: UnitSystem = UnitSystem.metric) -> None:
+    """Write the page of ``results`` to the HTML file ``out``; ``units`` are those in which it opens.
+
+    Raises:
+        CampaignError: The file cannot be written.
+    """
+    write_page(campaign_page(results, units), out, CampaignError)
+
+
+def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> str:
+    """Return the page."""
+    worst, shown, judged = worst_flights(results), distributions(results), shares(results)
+    flights = _flown(results, worst[0].flight)
+    differing = [d for d in shown if d.minimum < d.maximum]
+    grouped = _grouped(differing)
+    numbers = Numbers()
+    drawn = np.arange(0, results.campaign.samples, -(-results.campaign.samples // POINTS))
+    end = _windows(results)[-1]
+    failed = most_failed(judged)
+    return render(
+        "campaign.html.j2",
+        plots=[
+            *_envelopes(results, flights, numbers),
+            *(_histogram(results, d, numbers) for found in grouped.values() for d in found),
+            *(_scatter(results, factor, drawn, numbers) for factor in results.campaign.factors if differing),
+        ],
+        described={
+            "runs": [{"label": label, "end": end} for label in flights],
+            "metrics": {
+                d.name: {
+                    "title": in_words(d.name),
+                    "units": units_of(OUTCOMES[d.name], share=is_share(d.name)),
+                    "y": numbers.add(results.column(d.name)[drawn]),
+                    "limits": _limits(results, d),
+                }
+                for d in differing
+            },
+        },
+        numbers=numbers,
+        campaign=results.campaign,
+        units=units,
+        sections={name: heading for name, heading in SECTIONS.items() if differing or name != "scatter"},
+        sentence=sentence(results),
+        failed=failed and in_words(failed.name),
+        sorted=failed and _sorted(results, failed),
+        picture=_picture(results, flights),
+        result=results.path.name,
+        shares=judged,
+        within_all=within_all(results),
+        flights=list(flights),
+        distributions=grouped,
+        constant=[d for d in shown if d.minimum == d.maximum],
+        outcome=_outcome,
+        worst=worst,
+        chosen=next((d.name for d in differing if d.name == worst[0].limit), differing[0].name if differing else ""),
+        ended=ENDED,
+        relative=relative,
+        share_interval=share_interval,
+        drawn=len(drawn),
+    )
+
+
+def sentence(results: Results) -> str:
+    """Return the verdict: how many flights are within all limits, and which limit most of them break."""
+    ended, *limited = judged = shares(results)
+    lost = ended.flights - ended.within
+    ending = f"{lost} of {ended.flights} flights did not come to their end" if lost else "All flights came to their end"
+    if not limited:
+        return f"{ending}; there are no limits to judge them by."
+    text = f"{within_all(results)} of {ended.flights} flights are within all {len(limited)} limits"
+    if failed := most_failed(judged):
+        broken = failed.flights - failed.within
+        text += f"; most often not kept is the limit of {in_words(failed.name)}, by {broken} of {ended.flights}"
+    return f"{text}. {ending}."
+
+
+def most_failed(judged: Sequence[Share]) -> Share | None:
+    """Return the limit that most flights break, None if no flight breaks one."""
+    over = min((share for share in judged if share.limit is not None), key=lambda share: share.within, default=None)
+    return over if over is not None and over.within < over.flights else None
+
+
+def _sorted(results: Results, failed: Share) -> Picture:
+    """Return the picture of the metric that fails most: the magnitudes of all flights in order, and the limit."""
+    values = np.sort(np.abs(results.column(failed.name)))  # flights that do not define the metric come last, as NaN
+    across = 100.0 * (np.arange(len(values)) + 0.5) / len(values)
+    lines = [Line("bound", np.array([0.0, 100.0]), np.full(2, failed.limit)), Line("run0", across, values)]
+    title = f"{capitalised(in_words(failed.name))}, magnitude"
+    plot = drawing(title, OUTCOMES[failed.name], 100.0, lines, share=is_share(failed.name))
+    return picture([plot], 100.0, axis="flights, in order of magnitude [%]")
+
+
+def _grouped(shown: Sequence[Distribution]) -> dict[str, list[Distribution]]:
+    """Return distributions by group: the groups of metrics, then the run."""
+    groups: dict[str, list[Distribution]] = {group: [] for group in (*Group, RUN)}
+    for distribution in shown:
+        groups[METRICS[distribution.name].group if distribution.name in METRICS else RUN].append(distribution)
+    return {group: found for group, found in groups.items() if found}
+
+
+def _outcome(name: str, value: float, digits: int = 3) -> Markup:
+    """Return the number (SI) that the result has of a flight under ``name``, in all systems of units."""
+    return quantity(value, OUTCOMES[name], digits, share=is_share(name))
+
+
+def share_interval(share: Share) -> str:
+    """Return the interval of a share in percent, in as many digits as the number of flights resolves."""
+    assert share.interval is not None
+    places = max(0, math.ceil(math.log10(share.flights)) - 2)
+    low, high = (f"{100.0 * end:.{places}f}" for end in share.interval)
+    return f"{low} … {high} %"
+
+
+def relative(factor: Factor) -> bool:
+    """Return whether a factor is the relative change of a parameter, shown in percent."""
+    return factor.field != factor.name and factor.unit == "1"
+
+
+def histogram(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return counts and edges of at most :data:`BINS` bars over the finite ``values``."""
+    values = values[np.isfinite(values)]
+    distinct = np.unique(values.round(9))
+    bins: int | np.ndarray = min(BINS, max(10, 2 * round(np.sqrt(len(values)))))
+    if 1 < len(distinct) <= BINS:
+        # Times are multiples of the control period, and counts are integers: each value has its own bar.
+        spacing = float(np.min(np.diff(distinct)))
+        bars = round((distinct[-1] - distinct[0]) / spacing) + 1
+        bins = distinct[0] + spacing * (np.arange(bars + 1) - 0.5) if bars <= BINS else bins
+    counts, edges = np.histogram(values, bins)
+    return counts, edges
+
+
+def _flown(results: Results, worst: int) -> dict[str, Flight]:
+    """Return the flight of the unchanged scenario and the worst one, if they may be flown, by their names."""
+    flights = {}
+    if results.flyable:
+        runner = results.sample_runner
+        with suppress(ControllerError):
+            flights["unchanged"] = runner.fly_unchanged()
+        with suppress(ControllerError):
+            flights[f"flight {worst}"] = runner.fly(worst, runner.sample(worst))
+    return flights
+
+
+def _windows(results: Results) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Return the first step of each window, its time (s), which windows any flight reached, and the end (s)."""
+    campaign = results.campaign
+    plant = Plant.from_parameters({**campaign.design, **campaign.scenario.parameters()})
+    reached = np.flatnonzero(np.isfinite(results.envelope.low).all(axis=1))
+    starts = window_starts(plant.steps)
+    return starts, starts * plant.period, reached, plant.steps * plant.period
+
+
+def _envelopes(results: Results, flights: Mapping[str, Flight], numbers: Numbers) -> list[Plot]:
+    """Return a plot of each signal: the range of all flights, their mean, and the flights that are flown again."""
+    envelope, found = results.envelope, []
+    windows, time, reached, _ = _windows(results)
+    x, flown_x = numbers.add(time[reached]), numbers.add(time)
+    for index, (name, unit) in enumerate(SIGNALS):
+        curves = [
+            {"kind": kind, "label": label, "run": None, "x": x, "y": numbers.add(values[reached, index])}
+            for kind, label, values in (
+                ("low", "smallest", envelope.low),
+                ("high", "largest", envelope.high),
+                ("mean", "mean", envelope.mean),
+            )
+        ]
+        for run, flight in enumerate(flights.values()):
+            y = numbers.add(_curve(flight, windows, index))
+            curves.append({"kind": "nominal" if run else "actual", "label": "", "run": run, "x": flown_x, "y": y})
+        found.append(Plot(f"envelope_{name}", capitalised(in_words(name)), unit, "envelopes", curves))
+    return found
+
+
+def _histogram(results: Results, shown: Distribution, numbers: Numbers) -> Plot:
+    """Return the histogram of a metric with its limits, as far as they lie within the data."""
+    counts, edges = histogram(results.column(shown.name))
+    x, y = numbers.add(0.5 * (edges[:-1] + edges[1:])), numbers.add(counts)
+    note = Markup("median {}, 95 % below {}, largest {}").format(
+        *(_outcome(shown.name, value) for value in (shown.median, shown.percentile_95, shown.maximum))
+    )
+    return Plot(
+        f"histogram_{shown.name}",
+        capitalised(in_words(shown.name)),
+        "1",
+        f"distributions_{METRICS[shown.name].group if shown.name in METRICS else RUN}",
+        [{"kind": "bars", "label": "flights", "run": None, "x": x, "y": y}],
+        limits=_limits(results, shown),
+        notes=[note],
+        x_unit=OUTCOMES[shown.name],
+        x_share=is_share(shown.name),
+        limits_on="x",
+    )
+
+
+def _scatter(results: Results, factor: Factor, drawn: np.ndarray, numbers: Numbers) -> Plot:
+    """Return the plot of the chosen metric against a factor; the script fills in the metric."""
+    x, every = numbers.add(results.column(f"sample_{factor.name}")[drawn]), int(drawn[1]) if len(drawn) > 1 else 1
+    curve = {"kind": "dots", "label": "", "run": None, "x": x, "y": x, "every": every}
+    title, share = capitalised(in_words(factor.name)), relative(factor)
+    return Plot(f"scatter_{factor.name}", title, "1", "scatter", [curve], x_unit=factor.unit, x_share=share)
+
+
+def _limits(results: Results, shown: Distribution) -> list[float]:
+    """Return the limits of a metric that lie within the data: others would squeeze the plot."""
+    limit = limits(results).get(shown.name)
+    return [] if limit is None else [end for end in (-limit, limit) if shown.minimum <= end <= shown.maximum]
+
+
+def _picture(results: Results, flights: Mapping[str, Flight]) -> Picture:
+    """Return the picture of all flights."""
+    windows, time, reached, end = _windows(results)
+    envelope, drawings = results.envelope, []
+    for index, signal in enumerate(SIGNALS):
+        if signal.name in PICTURED:
+            low, high, mean = (edge[reached, index] for edge in (envelope.low, envelope.high, envelope.mean))
+            lines = [Line("band", time[reached], low, high=high), Line("mean", time[reached], mean)]
+            for run, flight in enumerate(flights.values()):
+                curve = _curve(flight, windows, index)
+                lines.append(Line(f"run{run} {'nominal' if run else ''}", time[: len(curve)], curve, run))
+            drawings.append(drawing(capitalised(in_words(signal.name)), signal.unit, end, lines))
+    starts = [fault.start for fault in results.campaign.scenario.fault]
+    return picture(drawings, end, [(start, end) for start in starts if start < end])
+
+
+def _curve(flight: Flight, windows: np.ndarray, index: int) -> np.ndarray:
+    """Return a signal of a flight at the windows that it reached."""
+    curve = signals(flight.data().flight_curves)[index]
+    return np.asarray(curve[windows[windows < len(curve)]])

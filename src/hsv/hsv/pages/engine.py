@@ -1,0 +1,155 @@
+"""The page engine: templates with style and scripts inside, and curves as numbers in one compressed block.
+
+All pages share ``template/base.html.j2``, one stylesheet and the scripts that draw :class:`Plot` with Plotly.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from hsv.base.errors import HsvError, reason
+from hsv.flight.metrics import in_words
+from hsv.pages import text
+from hsv.pages.text import units_of
+
+LIBRARY = files("hsv.pages").joinpath("plotly", "plotly-basic.min.js")
+"""The plotting library of all pages; see the README next to it."""
+
+
+@dataclass
+class Plot:
+    """A plot of a page.
+
+    A curve is a dictionary: ``kind`` (how the script draws it), ``label``, ``run`` (the flight with which it is
+    hidden, or None) and ``x`` and ``y``, the numbers of its arrays. A shade has ``kind``, ``from`` and ``to`` (seconds)
+    and ``runs``.
+    """
+
+    name: str
+    title: str
+    unit: str
+    """SI unit of y."""
+    group: str
+    curves: list[dict[str, Any]]
+    share: bool = False
+    """Whether y is a share, which the metric system gives in percent."""
+    limits: Sequence[float] = ()
+    """Limits, drawn as lines, in SI."""
+    shades: Sequence[dict[str, Any]] = ()
+    notes: Sequence[Markup] = ()
+    """Remarks below the title."""
+    x_unit: str | None = None
+    """SI unit of x; None: x is the time, which all plots over time share."""
+    x_share: bool = False
+    limits_on: str = "y"
+    """The axis that the limits belong to."""
+
+    def described(self) -> dict[str, Any]:
+        """Return the description for the script."""
+        return {
+            "name": self.name,
+            "units": units_of(self.unit, share=self.share),
+            "across": None if self.x_unit is None else units_of(self.x_unit, share=self.x_share),
+            "curves": self.curves,
+            "limits": list(self.limits),
+            "limitsOn": self.limits_on,
+            "shades": list(self.shades),
+        }
+
+
+@dataclass
+class Numbers:
+    """Arrays one after the other in single precision: seven digits, more than a plot can show."""
+
+    lengths: list[int] = field(default_factory=list)
+    blocks: dict[bytes, int] = field(default_factory=dict)
+
+    def add(self, values: np.ndarray) -> int:
+        """Return the number of the array; equal arrays are stored once."""
+        with np.errstate(over="ignore"):
+            block = np.asarray(values, "<f4").tobytes()
+        if block not in self.blocks:
+            self.blocks[block] = len(self.lengths)
+            self.lengths.append(len(values))
+        return self.blocks[block]
+
+    def packed(self) -> Markup:
+        """Return all arrays, compressed.
+
+        The bits of a number are taken as an integer, less the one before it; of an array the lowest bytes come first,
+        then the next ones. Smooth curves compress to a third of the size that way, without loss.
+        """
+        return compressed(b"".join(map(_transposed, self.blocks)))
+
+
+def _transposed(block: bytes) -> bytes:
+    bits = np.frombuffer(block, "<u4")
+    return np.diff(bits, prepend=np.uint32(0)).astype("<u4").view("u1").reshape(-1, 4).T.tobytes()
+
+
+def compressed(data: bytes) -> Markup:
+    """Return ``data`` gzipped, as base64; the same text for the same data."""
+    return Markup(base64.b64encode(gzip.compress(data, 9, mtime=0)).decode())
+
+
+def render(template: str, *, plots: Sequence[Plot] = (), numbers: Numbers | None = None, **values: Any) -> str:
+    """Return a page.
+
+    Args:
+        template: File name of its template; one that ends in ``.html.j2`` escapes its values.
+        plots: The plots of the page.
+        numbers: The numbers that they draw, None where the page gets them otherwise, or has no plots.
+        values: What else the template names; ``described`` adds to the description for the script.
+    """
+    environment = Environment(
+        loader=PackageLoader("hsv.pages", "template"),
+        autoescape=template.endswith(".html.j2"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.policies["json.dumps_kwargs"] = {}  # in the order of the tables
+    environment.filters |= {"number": text.number, "words": in_words}
+    environment.globals |= {
+        "asset": _asset,
+        "library": lambda: compressed(LIBRARY.read_bytes()),
+        "quantity": text.quantity,
+        "in_brackets": text.in_brackets,
+        "unit_systems": text.SYSTEMS,
+    }
+    described = {"panels": [plot.described() for plot in plots], **values.pop("described", {})}
+    packed = None
+    if numbers is not None:
+        described["lengths"] = numbers.lengths
+        packed = numbers.packed()
+    return environment.get_template(template).render(plots=plots, described=described, numbers=packed, **values)
+
+
+def _asset(name: str) -> Markup:
+    """Return a style or script of the template folder as it is."""
+    return Markup(files("hsv.pages").joinpath("template", name).read_text(encoding="utf-8"))
+
+
+def write_page(page: str, out: Path, error: type[HsvError]) -> None:
+    """Write a page to the HTML file ``out``.
+
+    Raises:
+        HsvError: The file cannot be written; of the type ``error``.
+    """
+    try:
+        out.write_text(page, encoding="utf-8")
+    except OSError as refused:
+        if out.is_file():
+            out.unlink()  # half a page
+        why = f"{out}: cannot be written ({reason(refused)}), expected an HTML file to write"
+        raise error(why) from None

@@ -1,0 +1,156 @@
+"""Events of a flight in chronological order: faults, limits, the tube, warnings, changed parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup, escape
+
+from hsv.bags.description import COMMAND, DIAGNOSTICS, PARAMETER_EVENTS, ROSOUT, STATE
+from hsv.bags.info import parameters_in_words
+from hsv.bags.reader import Bag
+from hsv.bags.track import expecting_fields
+from hsv.pages.panels import INPUTS
+from hsv.pages.text import quantity
+
+JOIN_WITHIN = 0.5
+"""Seconds; intervals of one kind that are closer are shown as one."""
+
+DIAGNOSTICS_PERIOD = 1.0
+"""Seconds of simulated time between the diagnostics of a node."""
+
+LOG_WARNING = 30
+"""Level of a warning in rcl_interfaces/msg/Log; the levels of errors are higher."""
+
+_FAILURES = {
+    "diverged": "the flight diverged: the state left the range of the model",
+    "broken off": "the recording breaks off: the run did not reach its end",
+}
+
+_DIAGNOSTIC_LEVELS = {1: "warning", 2: "error", 3: "error"}
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened; ``end`` is None where it lasted until the end, equal to ``start`` for an instant."""
+
+    start: float
+    end: float | None
+    kind: str
+    """``fault``, ``saturation``, ``tube``, ``warning``, ``error`` or ``change``."""
+    text: str
+    subject: str = ""
+    """The input or node concerned."""
+
+
+def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
+    """Return the events of ``bag``, whose ``description`` is that of :func:`hsv.bags.info.describe`."""
+    events = [
+        *_faults(description),
+        *_excursions(description),
+        *_uncertified(description),
+        *_saturation(bag),
+        *_ending(bag, description),
+    ]
+    with expecting_fields(bag.path):
+        # Nodes report some things both in the log and in their diagnostics.
+        reported = sorted([*_diagnostics(bag), *_log(bag)], key=lambda event: event.start)
+        events += [*_joined(reported, within=1.5 * DIAGNOSTICS_PERIOD), *_parameter_changes(bag)]
+    return sorted(events, key=lambda event: event.start)
+
+
+def _faults(description: dict[str, Any]) -> Iterator[Event]:
+    for fault in description["faults"] or ():
+        channel, kind = (escape(fault[key].replace("_", " ")) for key in ("channel", "type"))
+        # Names in an external bag are escaped; quantities are HTML in all systems of units.
+        named = {str(escape(name)): value for name, value in fault["parameters"].items()}
+        parameters = parameters_in_words({**fault, "parameters": named}, quantity)
+        text = Markup(f"{channel}: {kind} {parameters}".rstrip())
+        yield Event(fault["start_s"], fault["end_s"], "fault", text, fault["channel"])
+
+
+def _excursions(description: dict[str, Any]) -> list[Event]:
+    excursions = description["tube"]["excursions"] if description["tube"] else ()
+    return _joined(Event(e["start_s"], e["end_s"], "tube", "error outside the invariant set") for e in excursions)
+
+
+def _uncertified(description: dict[str, Any]) -> Iterator[Event]:
+    # These are properties of vehicle and hardware, not of a moment: one event at the start.
+    start, tube = description["start_s"], description["tube"] or {}
+    for steps, text in (
+        ("uncertified_steps", "vehicle outside the set that the tube is certified for"),
+        ("uncertified_hardware_steps", "hardware or air that the tube is not certified for"),
+    ):
+        if tube.get(steps):
+            yield Event(start, start, "warning", text, "tube_mpc")
+
+
+def _saturation(bag: Bag) -> Iterator[Event]:
+    if COMMAND not in bag.roles:
+        return
+    columns = bag.columns(COMMAND)
+    time, saturated = columns["header.stamp"] * 1e-9, columns["saturated"]
+    for column, name in enumerate(INPUTS):
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], saturated[:, column], [False])).astype(np.int8)))
+        text = f"command of {name.replace('_', ' ')} limited"
+        intervals = (
+            Event(float(time[first]), float(time[over]) if over < len(time) else None, "saturation", text, name)
+            for first, over in edges.reshape(-1, 2)
+        )
+        yield from _joined(intervals)
+
+
+def _ending(bag: Bag, description: dict[str, Any]) -> Iterator[Event]:
+    if text := _FAILURES.get(description["ending"]):
+        last = float(bag.columns(STATE)["header.stamp"][-1]) * 1e-9
+        yield Event(last, last, "error", text, "plant")
+
+
+def _diagnostics(bag: Bag) -> Iterator[Event]:
+    if DIAGNOSTICS not in bag.roles:
+        return
+    for time, message in bag.decode(DIAGNOSTICS):
+        for status in message.status:
+            if status.level in _DIAGNOSTIC_LEVELS:
+                kind = _DIAGNOSTIC_LEVELS[status.level]
+                node = status.name.partition(": ")[0]  # "node: task"
+                yield Event(time * 1e-9, time * 1e-9, kind, f"{node}: {status.message}", node)
+
+
+def _log(bag: Bag) -> Iterator[Event]:
+    """Yield the warnings of this graph; another graph in the domain logs to the same topic."""
+    if ROSOUT not in bag.roles:
+        return
+    for time, message in bag.decode(ROSOUT):
+        # A logger has the name of its node with dots for slashes.
+        space, _, node = message.name.rpartition(".")
+        if message.level >= LOG_WARNING and space == bag.namespace.strip("/").replace("/", "."):
+            kind = "warning" if message.level == LOG_WARNING else "error"
+            yield Event(time * 1e-9, time * 1e-9, kind, f"{node}: {message.msg}", node)
+
+
+def _parameter_changes(bag: Bag) -> Iterator[Event]:
+    if PARAMETER_EVENTS not in bag.roles:
+        return
+    for time, message in bag.decode(PARAMETER_EVENTS):
+        names = ", ".join(parameter.name for parameter in message.changed_parameters)
+        space, _, _ = message.node.rpartition("/")
+        if names and time > 0 and space == bag.namespace.rstrip("/"):
+            yield Event(time * 1e-9, time * 1e-9, "change", f"{message.node}: {names} changed", message.node)
+
+
+def _joined(events: Iterable[Event], within: float = JOIN_WITHIN) -> list[Event]:
+    """Return ``events``, which are in the order of time, with neighbouring events of the same text merged."""
+    last: dict[str, int] = {}
+    joined: list[Event] = []
+    for event in events:
+        index = last.get(event.text)
+        if index is not None and (end := joined[index].end) is not None and event.start - end <= within:
+            joined[index] = replace(joined[index], end=event.end)
+            continue
+        last[event.text] = len(joined)
+        joined.append(event)
+    return joined

@@ -1,0 +1,191 @@
+"""Recorded flights as a report shows them: description, metrics, verdicts, events, parameters and curves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hsv.bags.bag_warnings import completeness
+from hsv.bags.description import STATE, TUBE_STATUS
+from hsv.bags.equipment import effectors, equipment_topics, measurement_errors, moving_air
+from hsv.bags.flight import flight_data, labels
+from hsv.bags.info import describe
+from hsv.bags.reader import Bag
+from hsv.bags.steps import joined
+from hsv.base.errors import HsvError
+from hsv.control.design import parse_parameters
+from hsv.flight.limits import Verdict, verdicts
+from hsv.flight.metrics import flight_metrics
+from hsv.flight.scenario import Scenario, parse_scenario
+from hsv.pages.events import Event, flight_events
+from hsv.pages.panels import AIR_PANELS, INPUTS, MEASUREMENT_ERRORS, PANELS, Curve, Kind, Panel, error_panel
+
+
+@dataclass(frozen=True)
+class DrawnCurve:
+    """A curve of one flight in SI: y (n) over the flight's time, or (2) over both ends of it."""
+
+    kind: Kind
+    label: str
+    y: np.ndarray
+
+
+@dataclass(frozen=True)
+class FlightCurves:
+    """Time (n) in seconds, the panels of the flight by name, in order, and the curves by panel."""
+
+    time: np.ndarray
+    panels: dict[str, Panel] = field(default_factory=dict)
+    curves: dict[str, list[DrawnCurve]] = field(default_factory=dict)
+
+    def add(self, panel: Panel, *curves: DrawnCurve) -> None:
+        """Add a panel with its curves."""
+        self.panels[panel.name] = panel
+        self.curves[panel.name] = list(curves)
+
+    def over(self, curve: DrawnCurve) -> np.ndarray:
+        """Return the times of a curve."""
+        return self.time if len(curve.y) == len(self.time) else self.time[[0, -1]]
+
+    def actual(self, name: str) -> np.ndarray | None:
+        """Return the values of the curve that a panel is about, None without it."""
+        return next((curve.y for curve in self.curves.get(name, ()) if curve.kind is Kind.actual), None)
+
+
+@dataclass(frozen=True)
+class ReportedRun:
+    """A recorded flight."""
+
+    label: str
+    description: dict[str, Any]
+    """See :func:`hsv.bags.info.describe`."""
+    texts: dict[str, str]
+    """The attached texts by file name; empty where the bag has none."""
+    scenario: Scenario | None
+    """Scenario of the flight; None if the bag has none that can be read, and :attr:`remark` says why."""
+    remark: str
+    metrics: dict[str, float]
+    verdicts: dict[str, Verdict]
+    curves: FlightCurves
+    events: list[Event]
+    parameters: dict[str, dict[str, Any]]
+    """Parameters of the scenario and of the design, as they are in the bag."""
+    incomplete: str
+    """Number of steps with all topics, and number of steps; empty if the bag is complete."""
+
+    @property
+    def custom(self) -> dict[str, str]:
+        """Data of the recorder about the run: run id, commit, design and its hash, ..."""
+        return dict(self.description["custom_data"])
+
+    @property
+    def duration(self) -> float:
+        """Simulated time of the last step in seconds."""
+        return float(self.curves.time[-1])
+
+    @property
+    def failure(self) -> str:
+        """Reason for which the flight did not finish; empty if it did."""
+        return next((event.text for event in self.events if event.kind == "error" and event.subject == "plant"), "")
+
+    @property
+    def good(self) -> bool:
+        """Whether the flight is recorded completely and came to its end within every limit."""
+        return not self.failure and not self.incomplete and all(verdict.within for verdict in self.verdicts.values())
+
+    @property
+    def input_limits(self) -> dict[str, tuple[float, float]]:
+        """Smallest and largest value of each input, SI, where the design states them."""
+        design = self.parameters["design"]
+        ends = zip(design.get("input.minimum", []), design.get("input.maximum", []), strict=False)
+        return dict(zip(INPUTS, ends, strict=False))
+
+
+def reported_runs(bags: Sequence[Bag]) -> list[ReportedRun]:
+    """Return the runs of a report, one for each of ``bags``, with distinct labels.
+
+    Raises:
+        RecordingError: A bag holds no flight.
+    """
+    return [_reported_run(bag, label) for bag, label in zip(bags, labels(bags), strict=True)]
+
+
+def _reported_run(bag: Bag, label: str) -> ReportedRun:
+    curves = flight_curves(bag)
+    description = describe(bag)
+    metrics = flight_metrics(flight_data(bag))
+    names = ("scenario.toml", "scenario.yaml", "design.yaml", "certificate.json")
+    texts = {name: bag.attachments.get(name, b"").decode(errors="replace") for name in names}
+    scenario, remark = _scenario(texts["scenario.toml"], bag.custom_data.get("scenario", label))
+    return ReportedRun(
+        label=label,
+        description=description,
+        texts=texts,
+        scenario=scenario,
+        remark=remark,
+        metrics=metrics,
+        verdicts=verdicts(scenario, metrics, ended=description["ending"] == "finished") if scenario else {},
+        curves=curves,
+        events=flight_events(bag, description),
+        parameters={
+            part: parse_parameters(texts[f"{part}.yaml"], f"{bag.path}: {part}.yaml") if texts[f"{part}.yaml"] else {}
+            for part in ("scenario", "design")
+        },
+        incomplete=completeness(bag),
+    )
+
+
+def _scenario(text: str, name: str) -> tuple[Scenario | None, str]:
+    if not text:
+        return None, "no scenario is attached to the bag, so there are no limits to judge by: --scenario gives one"
+    try:
+        return parse_scenario(text, name), ""
+    except HsvError as error:
+        return None, f"the attached scenario cannot be read by this version: {error}"
+
+
+def flight_curves(bag: Bag) -> FlightCurves:
+    """Return the curves of ``bag`` at the steps that all of their topics have.
+
+    Raises:
+        RecordingError: A topic is missing, or no step is complete.
+    """
+    topics = dict.fromkeys(curve.topic for panel in PANELS for curve in panel.curves)
+    topics |= dict.fromkeys(equipment_topics(bag))
+    if TUBE_STATUS not in bag.roles:  # a custom controller has no tube
+        del topics[TUBE_STATUS]
+    columns = joined(bag, list(topics))
+    flight = FlightCurves(columns[STATE]["header.stamp"] * 1e-9)
+
+    def values(curve: Curve) -> np.ndarray:
+        parts = [columns[curve.topic][name] for name in curve.fields]
+        return np.sum([part if curve.column is None else part[:, curve.column] for part in parts], axis=0)
+
+    def tube(name: str) -> np.ndarray:
+        """Return a vector of the tube status (n, components); without a set it has no components."""
+        found = columns[TUBE_STATUS][name] if TUBE_STATUS in columns else ()
+        return np.asarray(found, float).reshape(len(flight.time), -1)
+
+    centre, half_width = tube("tube_centre"), tube("tube_half_width")
+    errors = [error_panel(component) for component in range(tube("error").shape[1])]
+    for panel in (*PANELS, *errors):
+        if all(curve.topic in columns for curve in panel.curves):
+            drawn = [DrawnCurve(curve.kind, curve.label, values(curve)) for curve in panel.curves]
+            if np.isfinite(drawn[0].y).any():
+                flight.add(panel, *drawn)
+    for name, y in effectors(columns).items():
+        flight.curves[name].append(DrawnCurve(Kind.effector, "effector", y))
+    for name, y in measurement_errors(columns).items():
+        flight.add(MEASUREMENT_ERRORS[name], DrawnCurve(Kind.actual, "measured less true", y))
+    for name, y in moving_air(columns).items():
+        flight.add(AIR_PANELS[name], DrawnCurve(Kind.actual, "air", y))
+    if "level" in flight.curves:
+        flight.curves["level"].append(DrawnCurve(Kind.bound, "edge of the set", np.ones(2)))
+    for panel, c, z in zip(errors, centre.T, half_width.T, strict=False):
+        for label, y in (("c − z", c - z), ("c + z", c + z)):
+            ends = y[[0, -1]] if np.all(y == y[0]) else y
+            flight.curves.get(panel.name, []).append(DrawnCurve(Kind.bound, label, ends))
+    return flight

@@ -1,0 +1,137 @@
+"""The panels of report and live page: a table of quantities over time with their curves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from hsv.bags.description import ACTUATOR, COMMAND, FILTERED_STATE, NOMINAL, STATE, TUBE_STATUS
+from hsv.model.signals import STATE_NAMES, STATE_UNITS
+
+
+class Kind(StrEnum):
+    """Kind of a curve; the page draws each kind in its own way, and hides some on request."""
+
+    actual = "actual"
+    nominal = "nominal"
+    reference = "reference"
+    filtered = "filtered"
+    actuator = "actuator"
+    effector = "effector"
+    bound = "bound"
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve: the sum of fields of one topic, or of their columns."""
+
+    kind: Kind
+    label: str
+    topic: str
+    fields: tuple[str, ...]
+    column: int | None = None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A quantity over time; ``unit`` is SI."""
+
+    name: str
+    title: str
+    unit: str
+    group: str
+    curves: tuple[Curve, ...] = ()
+    shading: str = ""
+    """Shading in addition to the faults: ``tube`` or the name of an input."""
+
+
+GROUPS = {
+    "trajectory": "Trajectory",
+    "attitude": "Attitude",
+    "elastic": "Elastic modes",
+    "inputs": "Inputs",
+    "sensors": "Sensors: measured less true",
+    "air": "Air",
+    "tube": "Tube",
+}
+"""Headings of the groups, in the order of the page."""
+
+INPUTS = ("fuel_equivalence_ratio", "elevator_deflection")
+
+
+def _state(group: str, title: str, unit: str, field: str, *more: Curve) -> Panel:
+    curves = (
+        Curve(Kind.actual, "vehicle", STATE, (field,)),
+        Curve(Kind.nominal, "nominal", NOMINAL, (f"reference.{field}", f"deviation.{field}")),
+        Curve(Kind.reference, "reference", NOMINAL, (f"reference.{field}",)),
+        *more,
+    )
+    return Panel(field, title, unit, group, curves)
+
+
+def _input(title: str, unit: str, field: str) -> Panel:
+    curves = (
+        Curve(Kind.actual, "command", COMMAND, (field,)),
+        Curve(Kind.actuator, "actuator", ACTUATOR, (field,)),
+        Curve(Kind.nominal, "nominal", NOMINAL, (f"reference_input.{field}", f"input.{field}")),
+        Curve(Kind.reference, "reference", NOMINAL, (f"reference_input.{field}",)),
+    )
+    return Panel(field, title, unit, "inputs", curves, shading=field)
+
+
+_FILTERED = Curve(Kind.filtered, "after the notch filter", FILTERED_STATE, ("filtered_pitch_rate",))
+
+PANELS = (
+    _state("trajectory", "Altitude h", "m", "altitude"),
+    _state("trajectory", "Velocity V", "m/s", "velocity"),
+    _state("attitude", "Angle of attack α", "rad", "angle_of_attack"),
+    _state("attitude", "Pitch angle θ", "rad", "pitch_angle"),
+    _state("attitude", "Pitch rate q", "rad/s", "pitch_rate", _FILTERED),
+    _state("elastic", "Elastic coordinate η₁", "kg^0.5 m", "elastic_coordinate_1"),
+    _state("elastic", "Elastic coordinate η₂", "kg^0.5 m", "elastic_coordinate_2"),
+    _state("elastic", "Elastic rate η̇₁", "kg^0.5 m/s", "elastic_rate_1"),
+    _state("elastic", "Elastic rate η̇₂", "kg^0.5 m/s", "elastic_rate_2"),
+    _input("Fuel equivalence ratio Φ", "1", "fuel_equivalence_ratio"),
+    _input("Elevator deflection δe", "rad", "elevator_deflection"),
+    Panel(
+        "level",
+        "Level of the error in the invariant set",
+        "1",
+        "tube",
+        (Curve(Kind.actual, "level", TUBE_STATUS, ("level",)),),
+        shading="tube",
+    ),
+)
+"""The panels that every flight has; that of the level only with an invariant set."""
+
+ERRORS = (
+    ("Error of altitude", "m"),
+    ("Error of velocity", "m/s"),
+    ("Error of angle of attack", "rad"),
+    ("Error of pitch angle", "rad"),
+    ("Error of pitch rate", "rad/s"),
+)
+
+MEASUREMENT_ERRORS = {
+    name: Panel(f"measurement_error_{name}", f"Measured less true {name.replace('_', ' ')}", unit, "sensors")
+    for name, unit in zip(STATE_NAMES, STATE_UNITS, strict=True)
+}
+"""Panels by state; the curve is the difference of two topics."""
+
+AIR_PANELS = {
+    "wind_forward": Panel("wind_forward", "Wind from behind", "m/s", "air"),
+    "wind_up": Panel("wind_up", "Wind from below", "m/s", "air"),
+    "density_factor": Panel("density_factor", "Density for that of the model", "1", "air"),
+}
+"""Panels by field of the air."""
+
+
+def error_panel(component: int) -> Panel:
+    """Return the panel of a component of the tube error: five rigid states, then pairs of notch-filter states."""
+    if component < len(ERRORS):
+        title, unit = ERRORS[component]
+    else:
+        number = component - len(ERRORS)
+        title, unit = f"Error of notch state {number + 1}", ("rad", "rad s")[number % 2]
+    curve = Curve(Kind.actual, "e", TUBE_STATUS, ("error",), component)
+    return Panel(f"error_{component + 1}", title, unit, "tube", (curve,), shading="tube")

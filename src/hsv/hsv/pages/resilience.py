@@ -1,0 +1,105 @@
+"""The results of a resilience campaign as a page, as Markdown, and as scenarios of its worst flights."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import tomli_w
+
+from hsv.base.errors import CampaignError, reason
+from hsv.base.units import UnitSystem
+from hsv.flight.campaign.store import write_whole
+from hsv.flight.resilience.faults import OBSERVED, SEVERITIES, TRIED, Moment
+from hsv.flight.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND
+from hsv.flight.resilience.summary import Cell, ResilienceResults, parameter_words, said_boundaries
+from hsv.flight.scenario import scenario_table
+from hsv.pages.engine import render
+
+FLIGHTS = "flights"
+"""Folder next to the page with the scenarios of the worst flights."""
+
+SECTIONS = {"map": "Map of survival", "controllers": "Controllers", "cells": "Numbers", "repeat": "Repeat a flight"}
+"""Headings in the order of the page."""
+
+
+def write_results(results: ResilienceResults, out: Path, command: str) -> list[Path]:
+    """Write page, Markdown and the scenario of the worst flight of every cell into ``out``; return page and Markdown.
+
+    Args:
+        results: Results of a campaign.
+        out: A folder.
+        command: Command that produces them, printed on the page.
+
+    Raises:
+        CampaignError: A file cannot be written.
+    """
+    folder = out / FLIGHTS
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CampaignError(f"{folder}: cannot be made ({reason(error)})") from error
+    for cell in results.cells:
+        write_whole(out / flight_file(cell), flight_text(cell).encode())
+    pages = {out / "index.html": "resilience.html.j2", out / "result.md": "resilience.md.j2"}
+    for path, template in pages.items():
+        write_whole(path, resilience_page(results, template, command).encode())
+    return list(pages)
+
+
+def flight_file(cell: Cell) -> str:
+    """Return the file of the scenario of a cell's worst flight, relative to the page."""
+    return f"{FLIGHTS}/{cell.case.label}_{cell.severity}.toml"
+
+
+def flight_text(cell: Cell) -> str:
+    """Return the scenario of a cell's worst flight as a file."""
+    worst, case = cell.worst, cell.case
+    subject, fault = case.subject, TRIED[case.fault]
+    table = scenario_table(subject.file(case.moment, worst.vehicle, fault, worst.value), subject.name)
+    words = f"{case.fault.replace('_', ' ')} ({fault.parameter.replace('_', ' ')} {fault.said(worst.value)})"
+    table["title"] = (
+        f"{subject.name} with {words} from {subject.start(case.moment):g} s, {vehicle_words(worst.vehicle)}"
+    )
+    return tomli_w.dumps(table)
+
+
+def vehicle_words(vehicle: int) -> str:
+    """Return the description of a vehicle by its number."""
+    return f"corner {vehicle}" if vehicle else "nominal vehicle"
+
+
+def sentence(results: ResilienceResults) -> str:
+    """Return the verdict: how many of its flights each controller survives, the best one first."""
+    counts = {}
+    for subject in results.campaign.subjects:
+        squares = [square for (_, name), square in results.squares.items() if name == subject.name]
+        survived, flown = (sum(numbers) for numbers in zip(*(square.survived for square in squares), strict=True))
+        counts[subject.name] = survived, flown
+    ranked = sorted(counts.items(), key=lambda item: item[1][0] / item[1][1], reverse=True)
+    return "Flights survived: " + ", ".join(f"{name} {survived} of {flown}" for name, (survived, flown) in ranked) + "."
+
+
+def resilience_page(results: ResilienceResults, template: str, command: str) -> str:
+    """Return the page or the Markdown, by its template; both name the ``command`` that makes them."""
+    return render(
+        template,
+        command=command,
+        campaign=results.campaign,
+        squares=results.squares,
+        moments=tuple(Moment),
+        severities=SEVERITIES,
+        tried=TRIED,
+        observed=OBSERVED,
+        attitude_band=ATTITUDE_BAND,
+        altitude_band=ALTITUDE_BAND,
+        units=UnitSystem.metric,
+        sections=SECTIONS,
+        sentence=sentence(results),
+        said_boundaries=said_boundaries,
+        corners=max(len(subject.vehicles) for subject in results.campaign.subjects) - 1,
+        parameter_words=parameter_words,
+        flight_file=flight_file,
+        vehicle_words=vehicle_words,
+        survived=sum(flight.survived for flight in results.flights),
+        flights=len(results.flights),
+    )

@@ -1,0 +1,71 @@
+"""Quantities as pages print them: in every system of units, of which the page shows one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from markupsafe import Markup, escape
+
+from hsv.base.units import UnitSystem, in_system
+
+SYSTEMS = {UnitSystem.metric: "SI, degrees", UnitSystem.si: "strict SI", UnitSystem.paper: "paper (ft, deg)"}
+"""Names of the systems of units in the switch of a page."""
+
+
+def quantity(value: float | None, unit: str, digits: int = 5, *, signed: bool = False, share: bool = False) -> Markup:
+    """Return a value with its unit in all systems of units; a dash for None.
+
+    Args:
+        value: The number, in the SI unit.
+        unit: Its SI unit.
+        digits: Significant digits.
+        signed: Whether a positive number has a sign too.
+        share: Whether it is a share, which the metric system gives in percent.
+    """
+    if value is None:
+        return Markup("–")
+    texts = {}
+    for system in SYSTEMS:
+        shown, name = in_system(value, unit, system, share=share)
+        sign = "+" if signed and value > 0.0 else ""
+        texts[system] = f"{sign}{number(shown, digits)}" + (f"&nbsp;{unit_html(name)}" if name not in ("1", "") else "")
+    return switched(texts)
+
+
+def in_brackets(unit: str, *, share: bool = False) -> Markup:
+    """Return the unit in all systems as it follows a heading; nothing for a pure number."""
+    names = {system: unit_html(in_system(1.0, unit, system, share=share)[1]) for system in SYSTEMS}
+    return switched({system: f" [{name}]" if name else "" for system, name in names.items()})
+
+
+def units_of(unit: str, *, share: bool = False) -> dict[str, dict[str, float | str]]:
+    """Return factor and name of the unit by system, for the page's script."""
+    found = {system: in_system(1.0, unit, system, share=share) for system in SYSTEMS}
+    return {str(system): {"unit": unit_html(name), "factor": scale} for system, (scale, name) in found.items()}
+
+
+def unit_html(unit: str) -> str:
+    """Return a unit as HTML: exponents raised, factors joined; nothing for a pure number."""
+    if unit == "1":
+        return ""
+    return str(escape(unit)).replace("^0.5", "<sup>½</sup>").replace("^2", "<sup>2</sup>").replace(" ", "·")
+
+
+def number(value: float, digits: int = 5) -> str:
+    """Return ``value`` with so many significant digits and a true minus sign."""
+    return f"{value:.{digits}g}".replace("-", "−")
+
+
+def capitalised(text: str) -> str:
+    """Return a text with its first letter in upper case, as a sentence begins."""
+    return text[:1].upper() + text[1:]
+
+
+def switched(texts: Mapping[UnitSystem, str]) -> Markup:
+    """Return HTML of which the page shows the text of one system of units; equal texts are there once."""
+    systems: dict[str, list[str]] = {}
+    for system, text in texts.items():
+        systems.setdefault(text, []).append(system)
+    if len(systems) == 1:
+        return Markup(next(iter(systems)))
+    return Markup("".join(f'<span class="{" ".join(names)}">{text}</span>' for text, names in systems.items()))
