@@ -203,14 +203,17 @@ class ProcessExecutor(_PoolExecutor):
 
 def _portably(job: Job, text: str, batch: int) -> bytes:
     """Fly a batch; an exception that cannot be unpickled again is replaced by one that can."""
+    failure: Exception
     try:
         return job(text, batch)
     except Exception as error:
-        try:
-            pickle.loads(pickle.dumps(error))
-        except Exception:
-            raise RunError(f"{type(error).__name__}: {error}") from None
-        raise
+        failure = error
+    try:
+        pickle.loads(pickle.dumps(failure))
+    except Exception:
+        failure = RunError(f"{type(failure).__name__}: {failure}")
+    # Raised here, it has no context: tblib, which Dask installs, would pickle that, too.
+    raise failure
 
 
 def _is_stopped(pid: int | None) -> bool:
