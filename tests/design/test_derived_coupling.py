@@ -6,7 +6,7 @@ import pytest
 from hsv.control.design import find_design, read_design
 from hsv.flight.corners import corners
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.linear_loop import sampled_loop
+from hsv_paper.linear_loop import Feedback
 
 WORST = 764
 """Index of the corner with the least moment of inertia, the largest mass and the strongest elevator."""
@@ -16,7 +16,7 @@ def elastic_damping(name, corner, coupling="derived", effectiveness=1.0):
     """Return the largest real part (1/s) of the elastic modes of the sampled loop where Case 1 ends."""
     design = read_design(find_design(name))
     vehicle = load_vehicle().coupled(coupling).perturbed(corner)
-    loop = sampled_loop(vehicle, design.feedback_gain, design.notch, design.period, effectiveness=effectiveness)
+    loop = Feedback.of(design).around(vehicle, effectiveness=effectiveness)
     return loop.poles[np.abs(loop.poles.imag) > 8.0].real.max()
 
 

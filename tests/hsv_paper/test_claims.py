@@ -6,19 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hsv.cli.claims import _as_json
 
 from hsv.flight.assembly import flight_parameters
 from hsv.flight.corners import corners
 from hsv.flight.scenario import load_scenario
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.claims import tracking
-from hsv_paper.claims.catalogue import GROUPS, judge
-from hsv_paper.claims.claim import Judged
-from hsv_paper.claims.evidence import Evidence, nominal, worst
-from hsv_paper.claims.finding import Finding, Reading, Verdict, shown
-from hsv_paper.claims.page import page
-from hsv_paper.claims.ranking import METRICS, Rank, ranking
+from hsv_paper.claims.evidence import Evidence, nominal, shown, worst
+from hsv_paper.claims.numbers import FAMILY, FLOWN_GAIN, losses
+from hsv_paper.claims.page import METRICS, Rank, page, ranking
+from hsv_paper.claims.table import GROUPS, Finding, Judged, Reading, Verdict, judge
+from hsv_paper.cli import claim_json
 
 CLAIMS = [claim for claims in GROUPS.values() for claim in claims]
 PUBLISHED = (Path(__file__).parents[2] / "docs" / "claims.md").read_text(encoding="utf-8")
@@ -122,7 +119,7 @@ def test_every_claim_is_measured_and_says_why(claim, evidence):
     for reading in result.readings:
         # Infinite is what grows without bound or has not decayed by the end, and is shown as that.
         assert not math.isnan(reading.value), reading.what
-    json.dumps(_as_json("group", Judged(claim, result)))
+    json.dumps(claim_json("group", Judged(claim, result)))
     verdict, rows = published(claim)
     assert [row.leads for row in rows] == [i < result.leading for i in range(len(result.readings))]
     for reading, row in zip(result.readings, rows, strict=True):
@@ -142,11 +139,9 @@ def test_every_claim_is_measured_and_says_why(claim, evidence):
 
 
 def test_the_robust_mpc_that_is_flown_has_the_tightest_gain_that_loses_none(evidence):
-    lost = tracking.losses(evidence)
-    assert (
-        min(lost) == tracking.FLOWN_GAIN == flight_parameters(load_scenario(tracking.FAMILY))["robust_mpc.gain_index"]
-    )
-    assert lost.pop(tracking.FLOWN_GAIN) == 0
+    lost = losses(evidence)
+    assert min(lost) == FLOWN_GAIN == flight_parameters(load_scenario(FAMILY))["robust_mpc.gain_index"]
+    assert lost.pop(FLOWN_GAIN) == 0
     assert all(lost.values())
 
 

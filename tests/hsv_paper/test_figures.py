@@ -10,13 +10,12 @@ from hsv.base.units import to_paper
 from hsv.control.notch_filter import notch_response
 from hsv.flight.scenario import load_scenario, scenario_names
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.figures import case1
-from hsv_paper.figures.catalogue import FIGURES
-from hsv_paper.figures.figure import Material
-from hsv_paper.figures.page import page
-from hsv_paper.figures.readings import gain_switches, in_words
-from hsv_paper.figures.style import RC, save
+from hsv_paper.designs import design
+from hsv_paper.figures import FIGURES
+from hsv_paper.figures.figure import gain_switches, in_words
+from hsv_paper.figures.over_time import NOTCH
 from hsv_paper.flights import Flights
+from hsv_paper.plots import RC, save
 
 PAGES = Path(__file__).parents[2] / "docs/figures"
 
@@ -25,7 +24,7 @@ NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 @pytest.fixture(scope="module")
 def flights(tmp_path_factory):
-    return Flights(tmp_path_factory.mktemp("flights"), graph=False)
+    return Flights(tmp_path_factory.mktemp("flights"))
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +34,7 @@ def draw(flights):
     @cache
     def drawn(number):
         with matplotlib.rc_context(RC):
-            return FIGURES[number].draw(Material(flights))
+            return FIGURES[number].draw(flights)
 
     return drawn
 
@@ -56,7 +55,7 @@ def test_a_figure_is_written_as_pdf_and_png_of_bearable_size_with_its_page(numbe
     assert png.read_bytes().startswith(b"\x89PNG")
     for axis in drawing.figure.axes:
         assert axis.get_lines()
-    text = page(figure, drawing)
+    text = figure.page(drawing)
     assert f"({figure.stem}.png)" in text
     assert figure.caption in text
     assert all(f"hsv run {name}`" in text for name in figure.scenarios)
@@ -67,7 +66,7 @@ def test_a_figure_is_written_as_pdf_and_png_of_bearable_size_with_its_page(numbe
 @pytest.mark.parametrize("number", FIGURES)
 def test_the_page_in_the_docs_says_what_the_drawing_says(number, draw):
     figure = FIGURES[number]
-    ours = page(figure, draw(number))
+    ours = figure.page(draw(number))
     theirs = (PAGES / f"{figure.stem}.md").read_text(encoding="utf-8")
     assert NUMBER.sub("#", theirs) == NUMBER.sub("#", ours)
     numbers = [[float(number) for number in NUMBER.findall(text)] for text in (theirs, ours)]
@@ -100,7 +99,7 @@ def test_the_limits_of_the_inputs_are_drawn_where_they_are_near(draw):
 
 
 def test_the_conditions_of_case_1_are_those_flown():
-    scenario, bounds = load_scenario(case1.NOTCH[0]), load_vehicle().uncertainty
+    scenario, bounds = load_scenario(NOTCH[0]), load_vehicle().uncertainty
     assert {name: abs(change) for name, change in scenario.vehicle.perturbation.items()} == pytest.approx(
         {name: 0.5 * bound for name, bound in bounds.items()}
     )
@@ -116,8 +115,8 @@ def test_gain_switches_are_where_the_index_changes(flights):
     assert in_words([1.2]) == "1"
 
 
-def test_the_notch_takes_out_its_centre_and_passes_the_rest(flights):
-    [section] = Material(flights).design("baseline").flown.notch
+def test_the_notch_takes_out_its_centre_and_passes_the_rest():
+    [section] = design("baseline").notch
     centre, low, high = np.abs(notch_response([section], np.array([section.zero_frequency, 1e-3, 1e4])))
     assert centre == pytest.approx(section.zero_damping / section.pole_damping)
     assert (low, high) == pytest.approx((1.0, 1.0), abs=1e-3)

@@ -39,6 +39,7 @@ from hsv_paper.limits.replay import fly_optimum
 from hsv_paper.limits.study import (
     BLEND,
     PERIODS,
+    STUDY,
     deepest_fault,
     fastest_transfer,
     least_survived,
@@ -46,7 +47,7 @@ from hsv_paper.limits.study import (
 )
 from hsv_paper.limits.transfer import straight, time_bound, transfer
 from hsv_paper.linear_loop import START, TARGET
-from hsv_paper.sensitivity.catalogue import STUDIES, page
+from hsv_paper.study import Scope
 
 ROOT = Path(__file__).parents[2]
 ENVELOPE = load_vehicle()
@@ -230,8 +231,8 @@ def test_elevator_is_needed_to_turn_and_to_hold():
 @pytest.mark.long
 def test_a_coarse_study_has_its_page_and_numbers(tmp_path):
     told = []
-    outcome = STUDIES["limits"].run(8.0, tmp_path, lambda *what: told.append(what))
-    text = page(STUDIES["limits"], outcome)
+    outcome = STUDY.run(Scope(8.0, tmp_path, lambda *what: told.append(what)))
+    text = STUDY.page(outcome)
     assert text.startswith("# Physical limits: Fastest transfer and deepest fault") and "{" not in text
     assert [row["flown"] for row in outcome.numbers["faults"]] == [True] * 3
     assert len(outcome.figure.axes) == 6

@@ -4,13 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hsv.control.design import find_design, read_design
 from hsv.model.actuators import ACTUATOR_SETS
 from hsv.model.sensors import SENSOR_SETS
 from hsv.model.signals import STATE_NAMES
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.linear_loop import Hardware, critical_coupling, crossings, sampled_loop, stability_limit, worst_growth
-from hsv_paper.sensitivity.controllers import WITHOUT_NOTCH, growth
+from hsv_paper.designs import design
+from hsv_paper.linear_loop import Feedback, Hardware, crossings, phase_margins, stability_limit
 
 
 def test_the_limit_of_stability_is_the_first_zero_on_the_way():
@@ -27,7 +26,7 @@ def test_a_loop_lost_at_once_or_never_has_no_crossing():
 
 def test_the_loop_changes_its_stability_at_the_limit():
     def over_coupling(kappa: float) -> float:
-        return growth(WITHOUT_NOTCH, load_vehicle().coupled(kappa))
+        return Feedback.of(design("baseline"), notched=False).growth(load_vehicle().coupled(kappa))
 
     limit = stability_limit(over_coupling, np.arange(0.0, 1.0, 0.1))
     assert 0.2 < limit < 0.3
@@ -35,17 +34,11 @@ def test_the_loop_changes_its_stability_at_the_limit():
 
 
 def test_the_paper_like_coupling_is_just_short_of_the_critical_one():
-    baseline = read_design(find_design("baseline"))
-    without, with_notch = (critical_coupling(baseline.feedback_gain, n, baseline.period) for n in ((), baseline.notch))
+    without, with_notch = (Feedback.of(design("baseline"), notched=n).critical_coupling() for n in (False, True))
     assert without == pytest.approx(0.2524, abs=5e-5)
     said = " ".join((Path(__file__).parents[2] / "docs" / "assumptions.md").read_text(encoding="utf-8").split())
     assert f"{without:.4f} times the derived set, {100.0 * (without / 0.25 - 1.0):.1f} % above" in said
     assert f"stable up to {with_notch:.2f} times the derived set" in said
-
-
-@pytest.fixture(scope="module")
-def baseline():
-    return read_design(find_design("baseline"))
 
 
 def behind(*names: str, delay: float = 0.0) -> Hardware:
@@ -56,11 +49,11 @@ def behind(*names: str, delay: float = 0.0) -> Hardware:
     ("elevator", "expected"),
     [((), -0.004), (("elevator_150",), 0.005), (("elevator_50",), -0.037), (("elevator_20",), -0.31)],
 )
-def test_without_the_notch_a_slow_elevator_stabilises_the_modes(baseline, elevator, expected):
+def test_without_the_notch_a_slow_elevator_stabilises_the_modes(elevator, expected):
     """The published numbers, of the worst of both ends of the step before the fault, to their own rounding."""
     vehicle = load_vehicle().coupled("paper_like")
     hardware = behind("fuel_10", *elevator) if elevator else Hardware()
-    found = worst_growth(vehicle, baseline.feedback_gain, (), baseline.period, hardware)
+    found = Feedback.of(design("baseline"), notched=False, hardware=hardware).growth(vehicle)
     assert found == pytest.approx(expected, abs=0.003)
     assert (found < 0.0) == (expected < 0.0)
 
@@ -75,18 +68,18 @@ def test_without_the_notch_a_slow_elevator_stabilises_the_modes(baseline, elevat
         (("elevator_20",), (2, 1), 0.15),
     ],
 )
-def test_delays_borne_and_rigid_damping_behind_published_elevators(baseline, elevator, samples, damping):
+def test_delays_borne_and_rigid_damping_behind_published_elevators(elevator, samples, damping):
     hardware = behind("fuel_10", *elevator) if elevator else Hardware()
-    gain, notch, period = baseline.feedback_gain, baseline.notch, baseline.period
+    loop = Feedback.of(design("baseline"), hardware=hardware)
     for coupling, borne in zip(("paper_like", "derived"), samples, strict=True):
         vehicle = load_vehicle().coupled(coupling)
 
         def growth(delay: int, vehicle=vehicle) -> float:
-            return worst_growth(vehicle, gain, notch, period, replace(hardware, delay=delay * period))
+            return replace(loop, hardware=replace(hardware, delay=delay * loop.period)).growth(vehicle)
 
         assert growth(borne) < 0.0 < growth(borne + 1)
-    loop = sampled_loop(load_vehicle().coupled("paper_like"), gain, notch, period, hardware=hardware)
-    rigid = [pole for pole in loop.poles if pole.imag > 3.0 and abs(pole) < 10.0]
+    poles = loop.around(load_vehicle().coupled("paper_like")).poles
+    rigid = [pole for pole in poles if pole.imag > 3.0 and abs(pole) < 10.0]
     assert min(-pole.real / abs(pole) for pole in rigid) == pytest.approx(damping, abs=0.006)
 
 
@@ -95,14 +88,12 @@ def test_stability_changes_where_the_growth_crosses_zero():
     assert crossings(lambda x: -1.0, [0.5, 1.0]) == []
 
 
-def test_noise_of_the_fine_sensors_is_half_a_degree_of_elevator(baseline):
+def test_noise_of_the_fine_sensors_is_half_a_degree_of_elevator():
     """The published number; and a simulation of the loop gives what the covariance says."""
     vehicle, noise = load_vehicle().coupled("paper_like"), np.zeros(9)
     channels = SENSOR_SETS["fine"].channels
     noise[:5] = [channels[name]["noise"] for name in STATE_NAMES[:5]]
-    loop = sampled_loop(
-        vehicle, baseline.feedback_gain, baseline.notch, baseline.period, hardware=behind("fuel_10", "elevator_50")
-    )
+    loop = Feedback.of(design("baseline"), hardware=behind("fuel_10", "elevator_50")).around(vehicle)
     said = loop.command_noise(noise)
     assert np.degrees(said[1]) == pytest.approx(0.5, abs=0.01)
     generator = np.random.default_rng(1)
@@ -118,7 +109,28 @@ def test_noise_of_the_fine_sensors_is_half_a_degree_of_elevator(baseline):
     assert np.std(seen[5000:], axis=0) == pytest.approx(said, rel=0.15)
 
 
-def test_an_unstable_loop_has_no_noise(baseline):
-    loop = sampled_loop(load_vehicle().coupled("derived"), baseline.feedback_gain, (), baseline.period)
+def test_an_unstable_loop_has_no_noise():
+    loop = Feedback.of(design("baseline"), notched=False).around(load_vehicle().coupled("derived"))
     with pytest.raises(np.linalg.LinAlgError, match="expected a stable loop"):
         loop.command_noise(np.ones(9))
+
+
+def test_the_sampled_loop_agrees_with_the_flights_on_who_is_stable():
+    growth = {
+        (coupling, notched): Feedback.of(design("baseline"), notched=notched)
+        .around(load_vehicle().coupled(coupling))
+        .growth
+        for coupling in ("paper_like", "derived")
+        for notched in (True, False)
+    }
+    assert growth["paper_like", True] == pytest.approx(-0.293, abs=2e-3)
+    assert -0.01 < growth["paper_like", False] < 0.0
+    assert growth["derived", True] < -0.15
+    assert growth["derived", False] > 1.0
+
+
+def test_phase_margin_of_an_integrator_is_a_right_angle():
+    frequencies = np.logspace(-2, 2, 2000)
+    [margin] = phase_margins(frequencies, 1.0 / (1j * frequencies))
+    assert margin.frequency == pytest.approx(1.0, rel=1e-3)
+    assert margin.phase == pytest.approx(np.pi / 2)

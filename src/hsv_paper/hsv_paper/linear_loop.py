@@ -1,6 +1,6 @@
 """The sampled closed loop, linear: the vehicle at trim under held inputs, the discrete notch filter, the feedback F.
 
-Actuators and a delay may stand between the two.
+Actuators and a delay may stand between controller and vehicle.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from scipy.linalg import solve_discrete_lyapunov
 from scipy.optimize import brentq
 
 from hsv.base.units import FOOT
+from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import NotchSection, discretise, with_notch
 from hsv.model.actuators import ActuatorSet
 from hsv.model.dynamics import VehicleParameters, jacobian
@@ -32,7 +33,12 @@ EFFECTIVENESS = (1.0, 0.9)
 ELEVATOR = 1
 
 COUPLING_SCALES = tuple(0.05 * step for step in range(26))
-"""kappa, times the derived coupling, between which the limit of stability is looked for."""
+"""Multiples kappa of the derived coupling in which limits of stability are bracketed."""
+
+Corners = Sequence[Mapping[str, float]]
+"""Relative changes of the vehicle's parameters, one vehicle each."""
+
+NOMINAL: Corners = ({},)
 
 
 @dataclass(frozen=True)
@@ -48,9 +54,9 @@ IDEAL = Hardware()
 
 @dataclass(frozen=True)
 class SampledLoop:
-    """A (n, n) of vehicle (9), actuators, delay and filter, the loop open; B (n, 2) of the inputs; gain (2, n) of u.
+    """A (n, n) of vehicle (9), actuators, delay and filter, loop open; B (n, 2); gain (2, n) of u; period (s).
 
-    ``period`` in s; the effectiveness of the elevator is in B.
+    B includes the effectiveness of the elevator.
     """
 
     A: np.ndarray
@@ -79,7 +85,7 @@ class SampledLoop:
             raise np.linalg.LinAlgError(f"growth {self.growth:.3g} 1/s, expected a stable loop")
         direct = self.gain[:, :N_STATES] * noise
         entering = self.B @ direct
-        # Of what follows the vehicle's states the pitch rate moves the filter alone.
+        # Of the measurements, only the pitch rate drives the filter.
         entering[N_STATES:, PITCH_RATE] += self.A[N_STATES:, PITCH_RATE] * noise[PITCH_RATE]
         P = solve_discrete_lyapunov(self.A + self.B @ self.gain, entering @ entering.T)
         return np.asarray(np.sqrt(np.diag(self.gain @ P @ self.gain.T + direct @ direct.T)))
@@ -93,69 +99,62 @@ class SampledLoop:
         return np.asarray(-(residues / (z[:, None] - poles)).sum(axis=1))
 
 
-def sampled_loop(
-    vehicle: VehicleParameters,
-    feedback: np.ndarray,
-    notch: Sequence[NotchSection],
-    period: float,
-    *,
-    point: tuple[float, float] = TARGET,
-    effectiveness: float = 1.0,
-    hardware: Hardware = IDEAL,
-) -> SampledLoop:
-    """Return the loop around ``vehicle``.
+@dataclass(frozen=True, eq=False)
+class Feedback:
+    """A state feedback with gain (2, 9), notch filter on the pitch rate, period (s) and hardware."""
 
-    Args:
-        vehicle: Coupled or not.
-        feedback: (2, 9) gain F (times tau) on the states, the filtered pitch rate among them.
-        notch: Sections of the filter, none: the pitch rate passes.
-        period: Control period (s).
-        point: Altitude (m) and velocity (m/s) of the trim.
-        effectiveness: Effectiveness of the elevator.
-        hardware: Between command and vehicle.
+    gain: np.ndarray
+    notch: tuple[NotchSection, ...]
+    period: float
+    hardware: Hardware = IDEAL
 
-    Raises:
-        TrimError: No equilibrium there.
-    """
-    held, inputs = _held(vehicle, point, period, hardware)
-    full = np.zeros((len(feedback), len(held)))
-    full[:, : feedback.shape[1]] = feedback
-    A, B, gain = with_notch(held, inputs, full, discretise(notch, period))
-    B[:, ELEVATOR] *= effectiveness
-    return SampledLoop(A, B, gain, period)
+    @classmethod
+    def of(
+        cls, design: ControlDesign, factor: float = 1.0, *, notched: bool = True, hardware: Hardware = IDEAL
+    ) -> Feedback:
+        """Return the feedback ``factor`` times F of a design, with its notch filter or without."""
+        return cls(factor * design.feedback_gain, design.notch if notched else (), design.period, hardware)
+
+    def around(
+        self, vehicle: VehicleParameters, point: tuple[float, float] = TARGET, effectiveness: float = 1.0
+    ) -> SampledLoop:
+        """Return the loop around a vehicle in trim at an altitude (m) and velocity (m/s).
+
+        Raises:
+            TrimError: There is no equilibrium at this point.
+        """
+        held, inputs = _held(vehicle, point, self.period, self.hardware)
+        full = np.zeros((len(self.gain), len(held)))
+        full[:, : self.gain.shape[1]] = self.gain
+        A, B, gain = with_notch(held, inputs, full, discretise(self.notch, self.period))
+        B[:, ELEVATOR] *= effectiveness
+        return SampledLoop(A, B, gain, self.period)
+
+    def growth(self, vehicle: VehicleParameters, over: Corners = NOMINAL) -> float:
+        """Return the largest growth (1/s) at both ends of Case 1's step, before and after the fault, over vehicles."""
+        return max(
+            self.around(vehicle.perturbed(corner), point, share).growth
+            for corner in over
+            for point in (START, TARGET)
+            for share in EFFECTIVENESS
+        )
+
+    def critical_coupling(self, over: Corners = NOMINAL) -> float | None:
+        """Return the multiple kappa of the derived coupling at which the first of the vehicles becomes unstable.
+
+        ``None``: all are stable up to the last of :data:`COUPLING_SCALES`.
+        """
+        return stability_limit(lambda kappa: self.growth(load_vehicle().coupled(kappa), over), COUPLING_SCALES)
 
 
 @lru_cache(maxsize=8192)
 def _held(
     vehicle: VehicleParameters, point: tuple[float, float], period: float, hardware: Hardware
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return A (n, n) and B (n, 2) of the vehicle at trim behind ``hardware``; kept, for many loops go around each."""
+    """Return A (n, n) and B (n, 2) of the vehicle at trim behind ``hardware``; many loops share each."""
     equilibrium = trim(vehicle, *point)
     A, B = jacobian(equilibrium.state, equilibrium.input, vehicle)
     return held_behind(A, B, period, hardware.actuators, hardware.delay)
-
-
-def worst_growth(
-    vehicle: VehicleParameters,
-    feedback: np.ndarray,
-    notch: Sequence[NotchSection],
-    period: float,
-    hardware: Hardware = IDEAL,
-) -> float:
-    """Return the largest growth (1/s) of the loop at both ends of Case 1's step, before and after its fault.
-
-    Args:
-        vehicle: See :func:`sampled_loop`, also for ``feedback``, ``notch`` and ``period``.
-        feedback: (2, 9).
-        notch: Sections of the filter.
-        period: Control period (s).
-        hardware: Between command and vehicle.
-    """
-    return max(
-        sampled_loop(vehicle, feedback, notch, period, point=point, effectiveness=share, hardware=hardware).growth
-        for point in (START, TARGET)
-        for share in EFFECTIVENESS
-    )
 
 
 def stability_limit(growth: Callable[[float], float], along: Sequence[float], tolerance: float = 1e-6) -> float | None:
@@ -163,12 +162,11 @@ def stability_limit(growth: Callable[[float], float], along: Sequence[float], to
 
     Args:
         growth: Largest real part (1/s) of a loop's poles over a scalar, such as kappa.
-        along: Values of the scalar, increasing or decreasing, so dense that no loss is over between two of them.
+        along: Values of the scalar, increasing or decreasing, dense enough to bracket every change of sign.
         tolerance: Tolerance of the limit, as a fraction of the interval it lies in.
 
     Returns:
-        The limit; the first value if the loop is not stable there; ``None`` if it
-        is stable at all values.
+        The limit; the first value if the loop is not stable there; ``None`` if it is stable at all values.
     """
     before = None
     for value in map(float, along):
@@ -181,12 +179,7 @@ def stability_limit(growth: Callable[[float], float], along: Sequence[float], to
 
 
 def crossings(growth: Callable[[float], float], along: Sequence[float]) -> list[float]:
-    """Return all values at which ``growth`` changes its sign going ``along`` its argument, by root finding.
-
-    Args:
-        growth: Largest real part (1/s) of a loop's poles over a scalar, such as a bandwidth.
-        along: Values of the scalar, increasing, so dense that at most one change is between two of them.
-    """
+    """Return all values at which ``growth`` changes its sign going ``along`` its increasing argument."""
     values = [growth(float(value)) for value in along]
     return [
         float(brentq(growth, along[i], along[i + 1], xtol=1e-6 * (along[i + 1] - along[i])))
@@ -195,36 +188,9 @@ def crossings(growth: Callable[[float], float], along: Sequence[float]) -> list[
     ]
 
 
-def critical_coupling(
-    feedback: np.ndarray,
-    notch: Sequence[NotchSection],
-    period: float,
-    over: Sequence[Mapping[str, float]] = ({},),
-    hardware: Hardware = IDEAL,
-) -> float | None:
-    """Return the scale kappa of the derived coupling at which the loop stops being stable, of the first vehicle to.
-
-    Args:
-        feedback: (2, 9), as for :func:`sampled_loop`, and so are ``notch`` and ``period``.
-        notch: Sections of the filter.
-        period: Control period (s).
-        over: Relative changes of the vehicle's parameters; the nominal vehicle alone unless given.
-        hardware: Between command and vehicle.
-
-    Returns:
-        ``None`` if every loop is stable up to the last of :data:`COUPLING_SCALES`.
-    """
-
-    def growth(kappa: float) -> float:
-        vehicle = load_vehicle().coupled(kappa)
-        return max(worst_growth(vehicle.perturbed(corner), feedback, notch, period, hardware) for corner in over)
-
-    return stability_limit(growth, COUPLING_SCALES)
-
-
 @dataclass(frozen=True)
 class Margin:
-    """A crossing of unit gain: frequency (rad/s) and phase margin (rad, its distance from -1 on the circle)."""
+    """A crossing of unit gain: frequency (rad/s) and phase margin (rad, the angle to -1)."""
 
     frequency: float
     phase: float

@@ -1,1 +1,1 @@
-"""The paper's checkable statements, measured: one module a part of the paper."""
+"""The paper's checkable statements: measured, judged, and written as a page."""

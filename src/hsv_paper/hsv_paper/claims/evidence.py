@@ -1,15 +1,17 @@
-"""Sources for measuring claims: designs with their certificates, flights of many vehicles, and the sampled loop."""
+"""Sources for measuring claims: certificates, flights of many vehicles, and the sampled loop."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hsv.base.processes import Progress
+from hsv.base.units import UnitSystem, in_system
 from hsv.control.design import find_design, read_parameters
 from hsv.control.notch_filter import NotchSection
 from hsv.flight.assembly import flight_parameters
@@ -17,10 +19,9 @@ from hsv.flight.corners import Corner, corners, screening_corners
 from hsv.flight.scenario import load_scenario
 from hsv.model.actuators import ACTUATOR_SETS, IDEAL
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.corner_flights import Table, corner_table, fly_over
-from hsv_paper.figures.figure import Design
-from hsv_paper.flights import Flights
-from hsv_paper.linear_loop import Hardware, worst_growth
+from hsv_paper.designs import certificate, design
+from hsv_paper.flights import Flights, Point, Table, fly_over
+from hsv_paper.linear_loop import Feedback, Hardware
 
 FUEL = ACTUATOR_SETS["fuel_10"]
 """The fuel delivery that goes with every elevator which is not ideal."""
@@ -44,7 +45,7 @@ class Evidence:
 
         Args:
             folder: Folder of tables and flights.
-            progress: Called with what is measured.
+            progress: Called with the current measurement.
             over: Vehicles that are flown, the nominal one first; by default all corners.
             actuators: Actuators in loops and flights, from :data:`ELEVATORS`.
             loops: Vehicles of the linear loops; by default those that are flown.
@@ -52,15 +53,11 @@ class Evidence:
         self._folder = folder
         self._progress = progress
         self.hardware = Hardware(ELEVATORS[actuators])
-        self._equipment = tuple(
-            (f"actuator.{ACTUATOR_SETS[name].channel}.set", name)
-            for name, entry in ACTUATOR_SETS.items()
-            if entry in ELEVATORS[actuators]
-        )
+        equipped = () if actuators == IDEAL else ("fuel_10", actuators)
+        self._equipment = tuple((f"actuator.{ACTUATOR_SETS[name].channel}.set", name) for name in equipped)
         self.over = corners(load_vehicle().uncertainty) if over is None else over
         self._loops = self.over if loops is None else loops
-        self.flights = Flights(folder, graph=False, progress=progress)
-        self.design = cache(Design)
+        self.flights = Flights(folder, progress)
         self.corners = cache(self._corners)
         self.changed = cache(self._changed)
         self.growth = cache(self._growth)
@@ -71,13 +68,6 @@ class Evidence:
         """Number of vehicles in a table: the nominal one and those at corners."""
         return len(self.over)
 
-    @cached_property
-    def half_width(self) -> np.ndarray:
-        """Half-widths (5) of the baseline's set, the scales by which errors of different states are compared."""
-        tube = self.design("baseline").flown.tube
-        assert tube is not None
-        return tube.half_width[:5]
-
     def _behind(self, actuators: str) -> Evidence:
         """Return the evidence with these actuators: this one if they are ideal, else flights of at most 32 corners."""
         if actuators == IDEAL:
@@ -85,18 +75,25 @@ class Evidence:
         over = [corner for corner in screening_corners(load_vehicle().uncertainty) if corner in self.over]
         return Evidence(self._folder, self._progress, over, actuators, self._loops)
 
+    def _values(self, scenario: str, changes: Sequence[tuple[str, Any]]) -> dict[str, Any]:
+        return {**flight_parameters(load_scenario(scenario)), **dict((*self._equipment, *changes))}
+
     def _corners(self, scenario: str, *changes: tuple[str, Any]) -> Table:
         """Return the measurements of a scenario with the nominal vehicle (first) and at all corners."""
-        changes = (*self._equipment, *changes)
-        return corner_table(scenario, self.over, self._folder, self.half_width, self._progress, changes)
+        what = " ".join((scenario, *(f"{name}={value}" for name, value in (*self._equipment, *changes))))
+        points = [Point(self._values(scenario, changes), self.over)]
+        return self.flights.tables(f"{self.vehicles} vehicles {what}", points)[0]
 
     def _changed(self, scenario: str, *changes: tuple[str, Any]) -> dict[str, float]:
         """Return the measurements of the nominal flight of a scenario with other parameters."""
-        values = {**flight_parameters(load_scenario(scenario)), **dict((*self._equipment, *changes))}
-        return self._flown(values)
+        return _nominal_flight(self._values(scenario, changes))
+
+    def adjustable_step(self) -> dict[str, float]:
+        """Return the measurements on the step of Case 1 with the adjustable design."""
+        return _nominal_flight({**read_parameters(find_design("adjustable")), **load_scenario("case1").parameters()})
 
     def uncertain(self, scenario: str, measure: str, *changes: tuple[str, Any]) -> float:
-        """Return the magnitude of a measure with the uncertain parameters of Case 1 and 2; nan where not defined.
+        """Return the magnitude of a measure with the uncertain parameters of Case 1 and 2; NaN where not defined.
 
         The uncertain flight of ``case1_...`` is that of ``case1_uncertain_...``, and so for Case 2.
         """
@@ -108,38 +105,39 @@ class Evidence:
         """Return the magnitude (vehicles) of a measure, the nominal vehicle first."""
         return np.abs(self.corners(scenario, *changes)[measure])
 
-    def certified(self, entry: str) -> np.ndarray:
-        """Return the numbers in an entry of a certificate, ``design:path.to.entry``, those of all elements of lists."""
-        design, _, path = entry.partition(":")
-        found = [self.design(design).certificate]
-        for key in path.split("."):
-            found = [item for value in found for item in np.atleast_1d(value[key])]
-        return np.array(found)
-
-    def adjustable_step(self) -> dict[str, float]:
-        """Return the measurements on the step of Case 1 with the adjustable design."""
-        design = read_parameters(find_design("adjustable"))
-        return self._flown({**design, **load_scenario("case1").parameters()})
-
-    def _flown(self, values: dict[str, Any]) -> dict[str, float]:
-        return {name: float(column[0]) for name, column in fly_over(values, [{}], self.half_width).items()}
-
     def _growth(
-        self, coupling: str, notch: tuple[NotchSection, ...], design: str = "baseline", factor: float = 1.0
+        self, coupling: str, notch: tuple[NotchSection, ...], name: str = "baseline", factor: float = 1.0
     ) -> np.ndarray:
         """Return the largest real part, 1/s, of the sampled loop's poles, by vehicle, the nominal one first.
 
         It is the largest of both ends of the step, before and after the fault. ``factor`` multiplies the feedback.
         """
-        flown, found = self.design(design).flown, []
-        what = f"poles, {coupling} coupling, {'with' if notch else 'without'} notch"
+        loop = Feedback(factor * design(name).feedback_gain, notch, design(name).period, self.hardware)
+        vehicle, what = load_vehicle().coupled(coupling), f"poles, {coupling}, {'with' if notch else 'without'} notch"
+        found = []
         for number, corner in enumerate(self._loops):
             if number % 50 == 0:
                 self._progress(what, number, len(self._loops))
-            vehicle = load_vehicle().coupled(coupling).perturbed(corner)
-            found.append(worst_growth(vehicle, factor * flown.feedback_gain, notch, flown.period, self.hardware))
+            found.append(loop.growth(vehicle, [corner]))
         self._progress(what, len(self._loops), len(self._loops))
         return np.array(found)
+
+
+def certified(entry: str) -> np.ndarray:
+    """Return the numbers in an entry of a certificate, ``design:path.to.entry``, those of all elements of lists."""
+    name, _, path = entry.partition(":")
+    found = [certificate(name)]
+    for key in path.split("."):
+        found = [item for value in found for item in np.atleast_1d(value[key])]
+    return np.array(found)
+
+
+def shown(value: float, unit: str, units: UnitSystem = UnitSystem.paper) -> str:
+    """Return a number (SI) with its unit, by default the paper's; an infinite time is beyond the end of the flight."""
+    if not math.isfinite(value):
+        return "not defined" if math.isnan(value) else "not by the end" if unit == "s" else "unbounded"
+    number, name = in_system(value, unit, units)
+    return f"{number:.4g}" + ("" if name == "1" else f" {name}")
 
 
 def nominal(table: Table, measure: str) -> float:
@@ -151,3 +149,7 @@ def worst(table: Table, measure: str) -> float:
     """Return the largest magnitude over all vehicles; infinite where one diverged or does not define it."""
     values = np.abs(table[measure])
     return float(np.inf) if np.any(np.isnan(values)) else float(values.max())
+
+
+def _nominal_flight(values: dict[str, Any]) -> dict[str, float]:
+    return {name: float(column[0]) for name, column in fly_over(Point(values, [{}])).items()}

@@ -1,21 +1,43 @@
-"""The page of the claims: a summary, every claim with its readings, and the ranking of the controllers."""
+"""The page of the claims: a summary, the ranking of the controllers, and every claim with its readings."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 
+import numpy as np
+
+from hsv.base.units import UnitSystem
 from hsv.flight.corners import screening_corners
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.claims.claim import Judged
-from hsv_paper.claims.evidence import ELEVATORS, FUEL
-from hsv_paper.claims.finding import Reading, Verdict, shown
-from hsv_paper.claims.ranking import METRICS, Rank
-from hsv_paper.claims.thresholds import REASONS
+from hsv_paper.claims.evidence import ELEVATORS, FUEL, Evidence, nominal, shown, worst
+from hsv_paper.claims.table import THRESHOLDS, Judged, Reading, Verdict
 
-_SCREENED = screening_corners(load_vehicle().uncertainty)
+CONTROLLERS = {
+    "RMPC, single gain (DM)": "case1_rmpc",
+    "RMPC, fourth gain (DM)": "case1_rmpc_fourth_k",
+    "tube without notch (CM)": "case1_no_notch",
+    "tube with notch (CM)": "case1",
+}
+"""Scenarios of the ranked controllers."""
+
+METRICS = {
+    "altitude_end_error": ("altitude error at the end", "m"),
+    "velocity_end_error": ("velocity error at the end", "m/s"),
+    "post_fault_altitude_error": ("largest altitude error after the fault", "m"),
+    "post_fault_attitude_deviation": ("attitude excursion after the fault", "rad"),
+    "attitude_settling_time": ("attitude settling time", "s"),
+    "elastic_decay_time": ("decay time of the elastic rates", "s"),
+    "elastic_rate_2_ringing": ("peak-to-peak second elastic rate, 10 s to 20 s after the fault", "kg^0.5 m/s"),
+    "altitude_integral_absolute_error": ("integral of the altitude error", "m s"),
+    "elevator_deflection_maximum": ("largest elevator deflection", "rad"),
+    "saturated_steps": ("steps with saturated inputs", "1"),
+}
+"""Name and unit of the metrics of the ranking; smaller is better for all of them."""
 
 _CORNERS = 2 ** len(load_vehicle().uncertainty)
+_SCREENED = len(screening_corners(load_vehicle().uncertainty)) - 1
 
 
 def _elevator(name: str) -> str:
@@ -47,37 +69,117 @@ actuators: none (the reading concerns only the filter or the vehicle), ideal, or
 bandwidth ({_BANDWIDTHS})
 together with a fuel delivery of {FUEL.natural_frequency:g} rad/s. The summary lists the actuators with which all
 readings hold (*yes*) and those with which at least one does not (*not*). If the elevator is not ideal, flights cover
-only {len(_SCREENED) - 1} of the corners, and the *worst corner* is the worst of these; linear loops cover all corners.
+only {_SCREENED} of the corners, and the *worst corner* is the worst of these; linear loops cover all corners.
 
-{REASONS}"""
+Several claims share these thresholds of ours: *accurate* means within 2 % of the step, the
+usual settling band ({shown(THRESHOLDS["ALTITUDE_BAND"], "m")}, {shown(THRESHOLDS["VELOCITY_BAND"], "m/s")}); *soon*, \
+within {THRESHOLDS["SOON"]:g} s, a tenth of
+the flight that the paper's figures show; a comparative such as *smaller*, a ratio of at most 1; *a lot more*, by at
+least half; a *significant* reduction, to at most half; a *slight* reduction, to at least three quarters; *stable*, that
+no flight is lost and that no pole of the linear loop has a positive real part.
+"""
+
+_RANKING = """The controllers are compared in Case 1 on the same metrics. Each cell gives the nominal vehicle / the \
+worst of all vehicles, with the rank of each in brackets; smaller is better. Robust MPC flies the decoupled model (DM) \
+without the filter, as in the paper; the tube controllers fly the coupled model (CM). Rates that have not decayed by \
+the end, 100 s after the fault, count as 100 s.
+"""
 
 
-def page(judged: dict[str, list[Judged]], ranks: dict[str, dict[str, Rank]]) -> str:
+@dataclass(frozen=True)
+class Rank:
+    """A controller on a metric (SI): value and rank for the nominal vehicle, and for the worst of all."""
+
+    nominal: float
+    worst: float
+    nominal_place: int
+    worst_place: int
+
+
+Ranks = dict[str, dict[str, Rank]]
+"""Ranks by metric and controller."""
+
+
+def ranking(evidence: Evidence) -> Ranks:
+    """Return the ranks of robust MPC and the tube controllers on the same metrics."""
+    tables = {name: evidence.corners(scenario) for name, scenario in CONTROLLERS.items()}
+
+    def place(values: dict[str, float], name: str) -> int:
+        # Values that differ by less than a thousandth share a rank.
+        return 1 + int(np.count_nonzero(np.array(list(values.values())) < values[name] * (1.0 - 1e-3)))
+
+    ranks: Ranks = {}
+    for metric in METRICS:
+        at_nominal = {name: abs(nominal(table, metric)) for name, table in tables.items()}
+        at_worst = {name: worst(table, metric) for name, table in tables.items()}
+        ranks[metric] = {
+            name: Rank(at_nominal[name], at_worst[name], place(at_nominal, name), place(at_worst, name))
+            for name in tables
+        }
+    return ranks
+
+
+def page(judged: dict[str, list[Judged]], ranks: Ranks) -> str:
     """Return the page in Markdown."""
-    parts = [_HEADER, tally(judged) + "\n", _summary(judged), "## Ranking\n" + _ranking(ranks)]
+    parts = [_HEADER, tally(judged) + "\n", summary(judged), "## Ranking\n" + ranking_table(ranks)]
     for group, entries in judged.items():
-        parts.append(f"## {group}\n")
-        parts += [_claim(entry) for entry in entries]
+        parts += [f"## {group}\n", *(details(entry) for entry in entries)]
     return "\n".join(parts)
 
 
 def tally(judged: dict[str, list[Judged]]) -> str:
     """Return a sentence with the number of claims for each verdict."""
     counts = Counter(entry.finding.verdict for group in judged.values() for entry in group)
-    *first, last = (f"{counts[verdict]} {_PLURAL[verdict]}" for verdict in Verdict)
-    return f"Of {counts.total()} claims, {', '.join(first)}, and {last}."
+    holds, conditions, fails = (counts[verdict] for verdict in Verdict)
+    return f"Of {counts.total()} claims, {holds} hold, {conditions} hold under conditions, and {fails} do not hold."
 
 
-_PLURAL = {Verdict.HOLDS: "hold", Verdict.CONDITIONS: "hold under conditions", Verdict.FAILS: "do not hold"}
-
-
-def _summary(judged: dict[str, list[Judged]]) -> str:
+def summary(judged: dict[str, list[Judged]]) -> str:
+    """Return the table of all claims with their verdicts."""
     rows = ["| claim | location | verdict | actuators |", "| --- | --- | --- | --- |"]
-    for entries in judged.values():
-        rows += [
-            f"| {e.claim.name} | {e.claim.location} | {e.finding.verdict} | {_conditions(e.finding.readings)} |"
-            for e in entries
+    rows += [
+        f"| {e.claim.name} | {e.claim.location} | {e.finding.verdict} | {_conditions(e.finding.readings)} |"
+        for entries in judged.values()
+        for e in entries
+    ]
+    return "\n".join(rows) + "\n"
+
+
+def details(entry: Judged, units: UnitSystem = UnitSystem.paper) -> str:
+    """Return a claim with its quote, its verdict with the reason, and its readings."""
+    claim, finding = entry.claim, entry.finding
+    named = any(reading.actuators for reading in finding.readings)
+    rows = ["| reading | measured | threshold | |", "| --- | ---: | --- | --- |"]
+    if named:
+        rows = ["| reading | actuators | measured | threshold | |", "| --- | --- | ---: | --- | --- |"]
+    for number, r in enumerate(finding.readings):
+        what = r.what.replace("|", "\\|")
+        what = f"**{what}**" if number < finding.leading else what
+        behind = f"{_elevator(r.actuators)} | " if named else ""
+        rows.append(f"| {what} | {behind}{r.measured(units)} | {r.threshold(units)} | {'yes' if r.holds else 'no'} |")
+    table = "\n".join(rows)
+    return (
+        f"### {claim.name[0].upper()}{claim.name[1:]}\n> {claim.quote}\n\n{claim.location}. "
+        f"**{finding.verdict.capitalize()}.** {finding.why}\n\n{table}\n"
+    )
+
+
+def ranking_table(ranks: Ranks, units: UnitSystem = UnitSystem.paper) -> str:
+    """Return the ranking with its description."""
+    controllers = list(next(iter(ranks.values())))
+    rows = [_RANKING, f"| | {' | '.join(controllers)} |", f"| --- |{' --- |' * len(controllers)}"]
+    for metric, row in ranks.items():
+        what, unit = METRICS[metric]
+        cells = [
+            f"{shown(r.nominal, unit, units)} ({r.nominal_place}) / {shown(r.worst, unit, units)} ({r.worst_place})"
+            for r in row.values()
         ]
+        rows.append(f"| {what} | {' | '.join(cells)} |")
+    means = [
+        [np.mean([getattr(row[name], place) for row in ranks.values()]) for place in ("nominal_place", "worst_place")]
+        for name in controllers
+    ]
+    rows.append(f"| **mean rank** | {' | '.join(f'{a:.1f} / {b:.1f}' for a, b in means)} |")
     return "\n".join(rows) + "\n"
 
 
@@ -88,60 +190,8 @@ def _conditions(readings: Sequence[Reading]) -> str:
         if reading.actuators:
             kept[reading.actuators] = kept.get(reading.actuators, True) and reading.holds
     sides = (("yes", True), ("not", False))
-    words = [f"{said}: {', '.join(_elevator(n) for n in kept if kept[n] is side)}" for said, side in sides]
-    return "; ".join(text for text, (_, side) in zip(words, sides, strict=True) if side in kept.values())
-
-
-def _claim(entry: Judged) -> str:
-    claim, finding = entry.claim, entry.finding
-    named = any(r.actuators for r in finding.readings)
-    rows = ["| reading | measured | threshold | |", "| --- | ---: | --- | --- |"]
-    if named:
-        rows = ["| reading | actuators | measured | threshold | |", "| --- | --- | ---: | --- | --- |"]
-    for number, r in enumerate(finding.readings):
-        what = f"**{_cell(r.what)}**" if number < finding.leading else _cell(r.what)
-        behind = f"{_elevator(r.actuators)} | " if named else ""
-        rows.append(f"| {what} | {behind}{r.measured()} | {r.threshold()} | {'yes' if r.holds else 'no'} |")
-    table = "\n".join(rows)
-    return (
-        f"### {claim.name[0].upper()}{claim.name[1:]}\n> {claim.quote}\n\n{claim.location}. "
-        f"**{finding.verdict.capitalize()}.** {finding.why}\n\n{table}\n"
+    return "; ".join(
+        f"{word}: {', '.join(_elevator(name) for name in kept if kept[name] is side)}"
+        for word, side in sides
+        if side in kept.values()
     )
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")
-
-
-def _ranking(ranks: dict[str, dict[str, Rank]]) -> str:
-    controllers = list(next(iter(ranks.values())))
-    rows = [
-        "The controllers are compared in Case 1 on the same metrics. Each cell gives the nominal vehicle / the worst "
-        "of all vehicles, with the rank of each in brackets; smaller is better. Robust MPC flies the decoupled model "
-        "(DM) without the filter, as in the paper; the tube controllers fly the coupled model (CM). Rates that have "
-        "not decayed by the end, 100 s after the fault, count as 100 s.\n",
-        "| | " + " | ".join(controllers) + " |",
-        "| --- |" + " --- |" * len(controllers),
-    ]
-    for metric, row in ranks.items():
-        what, unit = METRICS[metric]
-        cells = [
-            f"{shown(r.nominal, unit)} ({r.nominal_place}) / {shown(r.worst, unit)} ({r.worst_place})"
-            for r in row.values()
-        ]
-        rows.append(f"| {what} | " + " | ".join(cells) + " |")
-    places = mean_places(ranks)
-    rows.append("| **mean rank** | " + " | ".join(f"{a:.1f} / {b:.1f}" for a, b in places.values()) + " |")
-    return "\n".join(rows) + "\n"
-
-
-def mean_places(ranks: dict[str, dict[str, Rank]]) -> dict[str, tuple[float, float]]:
-    """Return the mean rank of each controller over all metrics: nominal vehicle, worst of all."""
-    rows = list(ranks.values())
-    return {
-        name: (
-            sum(row[name].nominal_place for row in rows) / len(rows),
-            sum(row[name].worst_place for row in rows) / len(rows),
-        )
-        for name in rows[0]
-    }

@@ -1,33 +1,39 @@
-"""Definition of a figure: the paper's number and caption, what it needs, how it is drawn, and the remarks on it."""
+"""Definition of a figure and its page, and numbers for the remarks, measured on the flights that are drawn."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any, Protocol
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
+import numpy as np
 from matplotlib.figure import Figure
 
-from hsv.control.design import ControlDesign, certificate_path, find_design, read_certificate, read_design
-from hsv.flight.metrics import FlightData
+from hsv.base.units import to_paper
+from hsv.flight.metrics import METRICS, FlightData, flight_metrics
+from hsv.model.vehicle import load_vehicle
 
+_LIMITS = load_vehicle().decoupled
 
-class Design:
-    """A shipped design with its certificate."""
+LIMITS = (
+    f"{_LIMITS.input_minimum[0]:g} to {_LIMITS.input_maximum[0]:g} and {np.degrees(_LIMITS.input_minimum[1]):g} deg to "
+    f"{np.degrees(_LIMITS.input_maximum[1]):g} deg"
+)
+"""Limits of both inputs, in words."""
 
-    def __init__(self, name: str) -> None:
-        self._path = find_design(name)
+_PAGE = """# Figure {number}
+Made by `hsv-paper figures --only {number} --out docs/figures`, including all numbers.
 
-    @cached_property
-    def flown(self) -> ControlDesign:
-        """The numbers that fly."""
-        return read_design(self._path)
+![Figure {number}, ours]({stem}.png)
 
-    @cached_property
-    def certificate(self) -> dict[str, Any]:
-        """The evidence for them."""
-        return read_certificate(certificate_path(self._path))
+**The paper's caption.** {caption}
+
+**Shown.** {shows}
+
+**What agrees.** {agrees}
+
+**What differs.** {differs}
+"""
 
 
 class FlightSource(Protocol):
@@ -35,19 +41,6 @@ class FlightSource(Protocol):
 
     def __getitem__(self, scenario: str, /) -> FlightData:
         """Return the flight of a shipped scenario."""
-
-
-@dataclass
-class Material:
-    """Data from which figures are drawn."""
-
-    flights: FlightSource
-    """Flights by scenario."""
-    _designs: dict[str, Design] = field(default_factory=dict)
-
-    def design(self, name: str) -> Design:
-        """Return a shipped design, read once."""
-        return self._designs.setdefault(name, Design(name))
 
 
 @dataclass(frozen=True)
@@ -62,16 +55,62 @@ class Drawing:
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """A figure of the paper."""
+    """A figure of the paper: its number, its caption, how it is drawn, and the scenarios that it shows."""
 
     number: int
     caption: str
-    """The paper's."""
-    draw: Callable[[Material], Drawing]
+    draw: Callable[[FlightSource], Drawing]
     scenarios: tuple[str, ...] = ()
-    """The flights it shows."""
 
     @property
     def stem(self) -> str:
-        """Name of its files without their endings."""
+        """Name of the figure's files without extension."""
         return f"figure_{self.number:02}"
+
+    def page(self, drawing: Drawing) -> str:
+        """Return the page of a drawing in Markdown."""
+        shown = {"shows": drawing.shows, "agrees": drawing.agrees, "differs": drawing.differs}
+        text = _PAGE.format(number=self.number, stem=self.stem, caption=self.caption, **shown)
+        runs = ", ".join(f"`hsv run {name}`" for name in self.scenarios)
+        return text + (f"\nThe flights can be repeated with {runs}.\n" if runs else "")
+
+
+def paper_figure(
+    number: int, caption: str, scenarios: tuple[str, ...] = ()
+) -> Callable[[Callable[[FlightSource], Drawing]], PaperFigure]:
+    """Return a decorator that makes a figure of the function that draws it."""
+    return lambda draw: PaperFigure(number, caption, draw, scenarios)
+
+
+def measured(flights: FlightSource, scenario: str, metric: str) -> float:
+    """Return a metric of a flight in the paper's unit."""
+    return to_paper(flight_metrics(flights[scenario])[metric], METRICS[metric].unit)[0]
+
+
+def input_extremes(flights: FlightSource, scenarios: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the smallest and the largest commands (2) of several flights: fuel ratio, elevator in deg."""
+    commands = np.concatenate([flights[scenario].command for scenario in scenarios]) * [1.0, to_paper(1.0, "rad")[0]]
+    return commands.min(axis=0), commands.max(axis=0)
+
+
+def input_ranges(flights: FlightSource, scenarios: Sequence[str]) -> str:
+    """Return the ranges of both commands over several flights, in words."""
+    least, largest = input_extremes(flights, scenarios)
+    return f"{least[0]:.2f} to {largest[0]:.2f} and {least[1]:.1f} deg to {largest[1]:.1f} deg"
+
+
+def limited(flights: FlightSource, scenarios: Sequence[str]) -> str:
+    """Return in how many steps of several flights a command was saturated, in words."""
+    steps = sum(int(np.any(flights[scenario].saturated, axis=1).sum()) for scenario in scenarios)
+    return f"saturated in {steps or 'no'} step{'s' if steps > 1 else ''} of the {len(scenarios)} flights"
+
+
+def gain_switches(flight: FlightData) -> np.ndarray:
+    """Return the steps (s) in which the nominal law switches to another gain of its nested family."""
+    return np.flatnonzero(np.diff(flight.gain_index)) + 1
+
+
+def in_words(values: Sequence[float] | np.ndarray, pattern: str = ".0f") -> str:
+    """Return numbers as a list in words: 1, 2 and 3."""
+    texts = [format(value, pattern) for value in values]
+    return f"{', '.join(texts[:-1])} and {texts[-1]}" if len(texts) > 1 else "".join(texts)

@@ -1,17 +1,15 @@
-"""The physical limits beside what the controllers reach: ``hsv-paper sensitivity limits``."""
+"""The physical limits next to what the controllers reach: ``hsv-paper limits``."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from hsv.base.processes import Progress
 from hsv.base.units import to_paper
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
@@ -23,7 +21,6 @@ from hsv.flight.scenario import load_scenario, parse_scenario
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.plant import FlightStatus
 from hsv.model.vehicle import Vehicle, load_vehicle
-from hsv_paper.figures.style import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
 from hsv_paper.limits.optimum import finer, solve
 from hsv_paper.limits.recovery import (
     DELAYS,
@@ -39,7 +36,8 @@ from hsv_paper.limits.recovery import (
 from hsv_paper.limits.replay import Flown, fly_optimum
 from hsv_paper.limits.transfer import straight, time_bound, transfer
 from hsv_paper.linear_loop import START, TARGET
-from hsv_paper.sensitivity.study import Outcome, Study
+from hsv_paper.plots import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
+from hsv_paper.study import Outcome, Scope, Study
 
 COUPLING = "paper_like"
 
@@ -190,9 +188,9 @@ def least_survived(scenario: str) -> float:
     return survived
 
 
-def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
-    """Solve both problems; ``coarseness`` above 1: half as many periods, few corners, and optima of none of them."""
-    whole = coarseness <= 1.0
+def run(scope: Scope) -> Outcome:
+    """Solve both problems; a coarse study has half as many periods, few corners, and optima of none of them."""
+    whole = scope.coarseness <= 1.0
     envelope = load_vehicle()
     vehicle = envelope.coupled(COUPLING)
     periods = PERIODS if whole else PERIODS // 2
@@ -201,7 +199,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
 
     def stage(what: str) -> None:
         nonlocal done
-        progress(what, done, total)
+        scope.progress(what, done, total)
         done += 1
 
     stage("fastest transfer to rest")
@@ -217,7 +215,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     survived = least_survived("case1")
     stage("corners")
     every = corners(envelope.uncertainty)
-    over = every if whole else every[:: min(512, round(64 * coarseness))]
+    over = every if whole else every[:: min(512, round(64 * scope.coarseness))]
     limits = corner_limits(vehicle, envelope, over, CURVE)
     faults = []
     for delay in DELAYS:
@@ -232,7 +230,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
                 stage(f"deepest fault known after {delay:g} s, corner {index}")
                 at = vehicle.perturbed(over[index])
                 worst[index].append(deepest_fault(at, envelope, delay, HORIZON, refine=False))
-    progress("done", total, total)
+    scope.progress("done", total, total)
     found = Limits(periods, rest, settled, bound, flights, flown, survived, faults, worst, over, limits)
     return Outcome(_figure(found), _shows(found), _findings(found), _numbers(found))
 
@@ -494,4 +492,4 @@ All vehicles, the nominal one and {count} corners of the parameter bounds:
 Of the passive controllers, that of `case1` loses the nominal vehicle below {survived:.3f}, by bisection with the fault
 at 100 s; [resilience](../resilience.md) has the others, and faults in the manoeuvre."""
 
-STUDY = Study("limits", "Fastest transfer and deepest fault", run, kind="Physical limits")
+STUDY = Study("limits", "Fastest transfer and deepest fault", run, 15, kind="Physical limits", command="limits")

@@ -1,40 +1,76 @@
-"""Limits of each controller: actuators, delay and sensor noise of its linear loop, and the gust of its flight."""
+"""Limits of each controller: actuators, delay and sensor noise of its linear loop, and the gust of its flight.
+
+Gusts are flown in level flight at the end of Case 1's step with its fault, the nominal vehicle behind an elevator of 50
+rad/s with its limits, including stops that are closer than the vehicle's. The transient of the fault has ended before
+the gust.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from itertools import pairwise
-from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsv.base.processes import Progress
-from hsv.base.units import to_paper
-from hsv.flight.corners import Corner
+from hsv.base.units import FOOT, to_paper
+from hsv.flight.assembly import assemble
+from hsv.flight.closed_loop import fly
+from hsv.flight.tables import breakpoints
 from hsv.model.actuators import ACTUATOR_SETS
-from hsv.model.dynamics import VehicleParameters
+from hsv.model.plant import FlightStatus
 from hsv.model.sensors import SENSOR_SETS
 from hsv.model.signals import STATE_NAMES
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.figures.style import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
-from hsv_paper.linear_loop import START, TARGET, Hardware, crossings, sampled_loop, stability_limit, worst_growth
-from hsv_paper.sensitivity.controllers import (
-    PURPLE,
-    SAID_RMPC,
-    WIDER_NOTCH,
-    WITH_NOTCH,
-    WITHOUT_NOTCH,
-    Controller,
-    corners_of,
-    feedback,
-    said_corners,
+from hsv_paper.linear_loop import (
+    ELEVATOR,
+    NOMINAL,
+    START,
+    TARGET,
+    Corners,
+    Feedback,
+    Hardware,
+    crossings,
+    stability_limit,
 )
-from hsv_paper.sensitivity.gusts import HALF_DEGREE, SHAPES, STOP, VELOCITIES, gust_limits, worse
-from hsv_paper.sensitivity.study import Outcome, Study
+from hsv_paper.plots import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, ZERO, letter, new_figure
+from hsv_paper.sensitivity.sweep import RMPC_GAIN, WIDER_NOTCH, WITH_NOTCH, WITHOUT_NOTCH, Controller, feedback
+from hsv_paper.study import Outcome, Scope, in_words
 
 REALISTIC = Controller("tube that knows its actuators", "case1", GREEN, "realistic")
 RMPC = Controller("RMPC without notch", "case1_rmpc_fourth_k", RED)
+
+FUEL, SURFACE = ACTUATOR_SETS["fuel_10"], ACTUATOR_SETS["elevator_50"]
+
+ELEVATORS: dict[str, Hardware] = {
+    "ideal actuators": Hardware(),
+    "an elevator of 150 rad/s": Hardware((FUEL, ACTUATOR_SETS["elevator_150"])),
+    "one of 50 rad/s": Hardware((FUEL, SURFACE)),
+    "one of 20 rad/s, first order": Hardware((FUEL, ACTUATOR_SETS["elevator_first_order_20"])),
+    "one of 20 rad/s": Hardware((FUEL, ACTUATOR_SETS["elevator_20"])),
+}
+"""Published elevators by their names in the results, each with the fuel delivery of 10 rad/s."""
+
+BANDWIDTHS = tuple(np.geomspace(3.0, 2000.0, 61).tolist())
+"""rad/s, of elevators of the second order."""
+
+DELAYS = tuple(np.arange(0.0, 0.3001, 0.01).tolist())
+"""s, in which the limit is bracketed."""
+
+VELOCITIES = tuple(np.linspace(0.0, 100.0, 9)[1:].tolist())
+"""m/s, up to the largest that a scenario may have, in which limits of gusts are bracketed."""
+
+HALF_DEGREE = float(np.radians(0.5))
+"""rad: the paper's largest allowable error of the attitude angles (5.1)."""
+
+_SHOWN_DELAY = 0.16
+_ONE_DEGREE = np.pi / 180.0
+_GUST, _END = 30.0, 50.0
+"""s: when the gust begins and the flight ends."""
+
+_ATTITUDE = [STATE_NAMES.index("angle_of_attack"), STATE_NAMES.index("pitch_angle")]
 
 
 @dataclass(frozen=True)
@@ -50,6 +86,31 @@ class Case:
         """Label in plots and sentences."""
         return f"{self.controller.label}, {self.coupling.replace('_', '-')} coupling"
 
+    def loop(self, hardware: Hardware) -> Feedback:
+        """Return the linear loop with this hardware."""
+        return replace(feedback(self.controller), hardware=hardware)
+
+    def growth(self, hardware: Hardware, over: Corners = NOMINAL) -> float:
+        """Return the largest real part (1/s) of all poles over both ends of the step, fault and corners."""
+        return self.loop(hardware).growth(load_vehicle().coupled(self.coupling), over)
+
+    def tolerated_delay(self, hardware: Hardware, over: Corners = NOMINAL) -> float | None:
+        """Return the delay (s) at which the loop becomes unstable; ``None``: beyond all of :data:`DELAYS`."""
+        return stability_limit(lambda delay: self.growth(replace(hardware, delay=delay), over), DELAYS)
+
+    def elevator_noise(self, hardware: Hardware, sensors: str) -> float:
+        """Return the rms elevator command (rad) from the noise of a sensor set, the worse end of the step.
+
+        NaN where the loop is unstable.
+        """
+        channels = SENSOR_SETS[sensors].channels
+        noise = np.array([channels.get(name, {}).get("noise", 0.0) for name in STATE_NAMES])
+        vehicle = load_vehicle().coupled(self.coupling)
+        loops = [self.loop(hardware).around(vehicle, point) for point in (START, TARGET)]
+        if any(loop.growth >= 0.0 for loop in loops):
+            return float("nan")
+        return max(float(loop.command_noise(noise)[ELEVATOR]) for loop in loops)
+
 
 CASES = (
     Case(WITH_NOTCH, "paper_like", BLUE),
@@ -60,159 +121,125 @@ CASES = (
     Case(WIDER_NOTCH, "derived", GREY),
 )
 
-FUEL, ELEVATOR = ACTUATOR_SETS["fuel_10"], ACTUATOR_SETS["elevator_50"]
-
-ELEVATORS: dict[str, Hardware] = {
-    "ideal actuators": Hardware(),
-    "an elevator of 150 rad/s": Hardware((FUEL, ACTUATOR_SETS["elevator_150"])),
-    "one of 50 rad/s": Hardware((FUEL, ELEVATOR)),
-    "one of 20 rad/s, first order": Hardware((FUEL, ACTUATOR_SETS["elevator_first_order_20"])),
-    "one of 20 rad/s": Hardware((FUEL, ACTUATOR_SETS["elevator_20"])),
-}
-"""Published elevators by their names in the results, each with the fuel delivery of 10 rad/s."""
-
-_SAID = {name: name.replace("one of", "an elevator of") for name in ELEVATORS}
-"""Their descriptions in words."""
-
-BANDWIDTHS = tuple(np.geomspace(3.0, 2000.0, 61).tolist())
-"""rad/s, of elevators of the second order."""
-
-DELAYS = tuple(np.arange(0.0, 0.3001, 0.01).tolist())
-"""s, the grid in which the limit is bracketed."""
-
-_SHOWN_DELAY = 0.16
-
-_SHOWN_GUST = SHAPES[-1]
-
-_ONE_DEGREE = np.pi / 180.0
-
 
 def elevator(bandwidth: float, delay: float = 0.0) -> Hardware:
     """Return the realistic elevator with another ``bandwidth`` (rad/s), its fuel delivery, and a ``delay`` (s)."""
-    return Hardware((FUEL, replace(ELEVATOR, natural_frequency=bandwidth)), delay)
+    return Hardware((FUEL, replace(SURFACE, natural_frequency=bandwidth)), delay)
 
 
-def growth(case: Case, hardware: Hardware, over: Sequence[Corner] = ({},)) -> float:
-    """Return the largest real part (1/s) of all poles over both ends of the step, fault and corners."""
-    gain, notch, period = feedback(case.controller)
-    vehicle = load_vehicle().coupled(case.coupling)
-    return max(worst_growth(vehicle.perturbed(corner), gain, notch, period, hardware) for corner in over)
+@dataclass(frozen=True)
+class Gust:
+    """A 1 - cos gust that builds up over ``length`` (m), and then stays or decays over the same length."""
+
+    length: float
+    stays: bool
+
+    @property
+    def key(self) -> str:
+        """Name in the results of the study."""
+        return f"1 - cos over {self.length / FOOT:g} ft that {'stays' if self.stays else 'falls as it rose'}"
+
+    def __str__(self) -> str:
+        after = "persists" if self.stays else "decays in the same way"
+        return f"1 - cos gust that builds up over {self.length / FOOT:g} ft and then {after}"
 
 
-def delay_borne(case: Case, hardware: Hardware, over: Sequence[Corner] = ({},)) -> float | None:
-    """Return the delay (s) at which the loop becomes unstable; ``None``: beyond all of :data:`DELAYS`."""
-    return stability_limit(lambda delay: growth(case, replace(hardware, delay=delay), over), DELAYS)
+GUSTS = (Gust(350.0 * FOOT, False), Gust(1750.0 * FOOT, True))
+"""The longest of CS-25.341, and that of MIL-F-8785C with the length of turbulence at this altitude."""
 
 
-def elevator_noise(case: Case, hardware: Hardware, sensors: str) -> float:
-    """Return the rms elevator command (rad) from the noise of a published sensor set, the worse end of the step.
+class Response(NamedTuple):
+    """Response to a gust: largest change of an attitude angle and largest unsaturated |elevator command| (rad)."""
 
-    Not a number where the loop is unstable.
-    """
-    gain, notch, period = feedback(case.controller)
-    vehicle: VehicleParameters = load_vehicle().coupled(case.coupling)
-    channels = SENSOR_SETS[sensors].channels
-    noise = np.array([channels.get(name, {}).get("noise", 0.0) for name in STATE_NAMES])
-    loops = [sampled_loop(vehicle, gain, notch, period, point=p, hardware=hardware) for p in (START, TARGET)]
-    if any(loop.growth >= 0.0 for loop in loops):
-        return float("nan")
-    return max(float(loop.command_noise(noise)[1]) for loop in loops)
+    attitude: float
+    elevator: float
+    lost: bool
 
 
-def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
-    """Linearise every controller with elevators of all bandwidths and with delays."""
-    over = corners_of(1.0, coarseness)
-    bandwidths = np.geomspace(5.0, 500.0, max(4, round(31 / coarseness)))
-    delays = np.linspace(0.0, _SHOWN_DELAY, max(3, round(33 / coarseness)))
-    velocities = VELOCITIES[:: max(1, round(coarseness))]
-    figure = new_figure(9.0)
-    panels = figure.subplots(3, 2).ravel()
-    findings, numbers = [], {}
-    for done, case in enumerate(CASES):
-        progress("linear loops", done, len(CASES))
-        growths = [growth(case, elevator(float(w))) for w in bandwidths]
-        late = [growth(case, elevator(ELEVATOR.natural_frequency, float(delay))) for delay in delays]
-        borne = [delay_borne(case, elevator(float(w))) for w in bandwidths]
-        noise = [elevator_noise(case, elevator(float(w)), "fine") for w in bandwidths]
-        style = "-" if case.coupling == "paper_like" else "--"
-        panels[0].semilogx(bandwidths, growths, style, color=case.color, label=case.label)
-        panels[1].plot(1e3 * delays, late, style, color=case.color)
-        panels[2].semilogx(bandwidths, [np.nan if d is None else 1e3 * d for d in borne], style, color=case.color)
-        panels[3].semilogx(bandwidths, [to_paper(n, "rad")[0] for n in noise], style, color=case.color)
-        in_gusts = [worse(case.controller, case.coupling, _SHOWN_GUST, velocity) for velocity in velocities]
-        for panel, answers in zip(panels[4:], list(zip(*in_gusts, strict=True))[:2], strict=True):
-            degrees = [to_paper(one, "rad")[0] for one in answers]
-            panel.plot([to_paper(v, "m/s")[0] for v in velocities], degrees, style, color=case.color)
-        limits = Limits.of(case, over)
-        gusts = [gust_limits(case.controller, case.coupling, shape) for shape in SHAPES]
-        in_words = "; ".join(f"in a {s.said}, {one.said}" for s, one in zip(SHAPES, gusts, strict=True))
-        findings.append(f"{case.label}: {limits.said(said_corners(over))}; {in_words}")
-        numbers[case.label] = {
-            **limits.report(),
-            "gust_limits_m_per_s": {s.key: vars(one) for s, one in zip(SHAPES, gusts, strict=True)},
-            "in_gusts": [one._asdict() for one in in_gusts],
-            "growth_per_s": growths,
-            "growth_behind_delay_per_s": late,
-            "delay_borne_s": borne,
-            "elevator_noise_rad": noise,
-        }
-    progress("linear loops", len(CASES), len(CASES))
-    for panel, label in zip(
-        panels,
-        (
-            "largest real part (1/s)",
-            "largest real part (1/s)",
-            "delay borne (ms)",
-            "elevator rms, fine sensors (deg)",
-            "largest change of attitude (deg)",
-            "largest elevator command (deg)",
-        ),
-        strict=True,
-    ):
-        panel.set_ylabel(label)
-        panel.set_xlabel("bandwidth of the elevator (rad/s)")
-    panels[1].set_xlabel(f"delay (ms), elevator of {ELEVATOR.natural_frequency:g} rad/s")
-    for panel in panels[:2]:
-        panel.axhline(0.0, color="black", linewidth=0.6)
-        panel.set_ylim(-0.6, 1.0)
-    panels[2].set_ylim(bottom=0.0)
-    panels[3].set_ylim(0.0, 1.0)
-    for panel, limit, shown in zip(panels[4:], (HALF_DEGREE, STOP), ((0.0, 5.0), (10.0, 30.0)), strict=True):
-        panel.set_xlabel("velocity of the gust (ft/s)")
-        panel.axhline(to_paper(limit, "rad")[0], color="black", linewidth=0.6)
-        panel.set_ylim(*shown)
-    letter(panels)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return Outcome(
-        figure,
-        "Linear sampled loop of Case 1 around the coupled nominal vehicle, with a second-order elevator (damping "
-        f"{ELEVATOR.damping_ratio:g}) and the fuel delivery of {FUEL.natural_frequency:g} rad/s; each value is the "
-        "worst over both ends of the step, before and after the fault. (a) Largest real part of the poles over the "
-        "bandwidth of the elevator. (b) The same over a delay of the command. (c) Delay at which the loop becomes "
-        "unstable, by root finding. (d) Rms elevator command due to the noise of the fine sensor set, without a fault; "
-        "there is no line where the loop is unstable. The limits of the actuators are not included in (a) to (d). "
-        f"(e), (f) Flight through a {_SHOWN_GUST.said}, from below or from above, whichever is worse, at the end of "
-        f"the step and after the fault, with an elevator of {ELEVATOR.natural_frequency:g} rad/s and its limits: (e) "
-        "largest change of an attitude angle, with a line at half a degree, and (f) largest elevator command, with a "
-        "line at the stop. The gust velocity at which an attitude angle changes by half a degree, the elevator command "
-        f"exceeds its stop, or the flight is lost is found by root finding over such flights. {SAID_RMPC}.",
-        tuple(findings),
-        {
-            "bandwidth_rad_per_s": bandwidths.tolist(),
-            "delay_s": delays.tolist(),
-            "gust_m_per_s": list(velocities),
-            "cases": numbers,
-        },
+@cache
+def response(case: Case, gust: Gust, up: float) -> Response:
+    """Return the response of a flight to a gust of velocity ``up`` (m/s)."""
+    altitude, velocity = TARGET
+    level = breakpoints(altitude, velocity, ())._asdict()
+    flight = fly(
+        assemble(
+            case.controller.parameters()
+            | {f"reference.{name}": list(column) for name, column in level.items()}
+            | {
+                "vehicle.model": "CM",
+                "vehicle.coupling": case.coupling,
+                "initial.altitude": altitude,
+                "initial.velocity": velocity,
+                "duration": _END,
+                "fault.starts": [0.0],
+                "actuator.fuel_equivalence_ratio.set": "fuel_10",
+                "actuator.elevator_deflection.set": "elevator_50",
+                "gust.starts": [_GUST],
+                "gust.up": [up],
+                "gust.lengths": [gust.length],
+                "gust.stays": [float(gust.stays)],
+            }
+        )
     )
+    first = round(_GUST / flight.period)
+    attitude = flight.history.state[first:, _ATTITUDE]
+    return Response(
+        float(np.abs(attitude - attitude[0]).max()),
+        float(np.abs(flight.history.u_unsaturated[first:, ELEVATOR]).max()),
+        flight.status is FlightStatus.DIVERGED,
+    )
+
+
+def worse(case: Case, gust: Gust, velocity: float) -> Response:
+    """Return the largest numbers of a gust of this ``velocity`` (m/s) from below and from above."""
+    up, down = (response(case, gust, sign * velocity) for sign in (1.0, -1.0))
+    return Response(max(up.attitude, down.attitude), max(up.elevator, down.elevator), up.lost or down.lost)
+
+
+def gust_limits(case: Case, gust: Gust) -> dict[str, float | None]:
+    """Return the velocities (m/s) of a gust from which a controller exceeds its limits, ``None`` if it never does.
+
+    ``attitude``: an attitude angle changes by half a degree; ``elevator``: its command exceeds its stop; ``lost``: the
+    flight is lost.
+    """
+
+    def excess(name: str, velocity: float) -> float:
+        found = worse(case, gust, velocity)
+        if name == "lost":
+            return 1.0 if found.lost else -1.0
+        return found.attitude / HALF_DEGREE - 1.0 if name == "attitude" else found.elevator / SURFACE.stop - 1.0
+
+    # Beginning in still air, because the first of the velocities may already be beyond a limit.
+    velocities = (0.0, *VELOCITIES)
+    return {name: stability_limit(partial(excess, name), velocities, 1e-3) for name in Response._fields}
+
+
+def gust_limits_in_words(limits: dict[str, float | None]) -> str:
+    """Return the limits in gusts in words."""
+
+    def velocity(value: float) -> str:
+        number, unit = to_paper(value, "m/s")
+        return f"{number:.0f} {unit}"
+
+    words = {
+        "attitude": ("the attitude changes by half a degree", "the attitude changes by less than half a degree"),
+        "elevator": ("the elevator reaches its stop", "the elevator does not reach its stop"),
+        "lost": ("the flight is lost", "the flight is not lost"),
+    }
+    if all(value is None for value in limits.values()):
+        return f"no limit is reached up to {velocity(VELOCITIES[-1])}"
+    parts = [f"{words[name][0]} from {velocity(value)} on" for name, value in limits.items() if value is not None]
+    parts += [f"{words[name][1]} up to {velocity(VELOCITIES[-1])}" for name, value in limits.items() if value is None]
+    return f"{', '.join(parts[:-1])}, and {parts[-1]}"
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits that a case tolerates.
+    """Limits that a linear loop tolerates, each of the nominal vehicle and of the worst corner where there are two.
 
-    ``growths`` (1/s) with each of :data:`ELEVATORS`; ``bandwidths`` (rad/s) at which stability changes, of the nominal
-    vehicle and of the worst of the corners; ``delays`` (s) with ideal and realistic actuators, nominal and worst;
-    ``noise`` (rad) of the elevator by sensor set, realistic actuators.
+    ``growths`` (1/s) with each of :data:`ELEVATORS`; ``bandwidths`` (rad/s) at which stability changes; ``ends``:
+    whether the loop is stable at the lowest; ``delays`` (s) with ideal and realistic actuators; ``noise`` (rad) of the
+    elevator by sensor set, realistic actuators.
     """
 
     growths: dict[str, float]
@@ -222,53 +249,49 @@ class Limits:
     noise: dict[str, float]
 
     @classmethod
-    def of(cls, case: Case, over: Sequence[Corner]) -> Limits:
+    def of(cls, case: Case, over: Corners) -> Limits:
         """Return the limits of ``case`` over the nominal vehicle and the corners ``over``."""
-
-        def nominal(bandwidth: float) -> float:
-            return growth(case, elevator(bandwidth))
-
-        def worst(bandwidth: float) -> float:
-            return growth(case, elevator(bandwidth), over)
-
         chosen = {name: ELEVATORS[name] for name in ("ideal actuators", "one of 50 rad/s")}
+        sparse = BANDWIDTHS[:: max(1, len(BANDWIDTHS) // 30)]
         return cls(
-            {name: growth(case, hardware) for name, hardware in ELEVATORS.items()},
-            (crossings(nominal, BANDWIDTHS), crossings(worst, BANDWIDTHS[:: max(1, len(BANDWIDTHS) // 30)])),
-            (nominal(BANDWIDTHS[0]) < 0.0, worst(BANDWIDTHS[0]) < 0.0),
-            {name: (delay_borne(case, h), delay_borne(case, h, over)) for name, h in chosen.items()},
-            {name: elevator_noise(case, ELEVATORS["one of 50 rad/s"], name) for name in ("fine", "ghv")},
+            {name: case.growth(hardware) for name, hardware in ELEVATORS.items()},
+            (
+                crossings(lambda w: case.growth(elevator(w)), BANDWIDTHS),
+                crossings(lambda w: case.growth(elevator(w), over), sparse),
+            ),
+            (case.growth(elevator(BANDWIDTHS[0])) < 0.0, case.growth(elevator(BANDWIDTHS[0]), over) < 0.0),
+            {name: (case.tolerated_delay(h), case.tolerated_delay(h, over)) for name, h in chosen.items()},
+            {name: case.elevator_noise(ELEVATORS["one of 50 rad/s"], name) for name in ("fine", "ghv")},
         )
 
-    def said(self, corners: str) -> str:
+    def in_words(self, corners: str) -> str:
         """Return the limits in words."""
-        spans = [
+        vehicles = ("nominal vehicle", f"worst of {corners}")
+        spans = " and ".join(
             f"{_stable(changes, first)} ({vehicle})"
-            for changes, first, vehicle in zip(
-                self.bandwidths, self.ends, ("nominal vehicle", f"worst of {corners}"), strict=True
-            )
-        ]
-        growths = ", ".join(f"{value:+.3f} with {_SAID[name]}" for name, value in self.growths.items())
+            for changes, first, vehicle in zip(self.bandwidths, self.ends, vehicles, strict=True)
+        )
+        growths = ", ".join(f"{value:+.3f} with {_elevator_in_words(name)}" for name, value in self.growths.items())
         delays = "; ".join(
-            f"with {_SAID[name]}, the tolerated delay is {_milliseconds(nominal)} (nominal vehicle) and "
+            f"with {_elevator_in_words(name)}, the tolerated delay is {_milliseconds(nominal)} (nominal vehicle) and "
             f"{_milliseconds(worst)} (worst corner)"
             for name, (nominal, worst) in self.delays.items()
         )
+        noise = "the response to sensor noise is undefined: the loop is unstable with an elevator of 50 rad/s"
+        if not any(np.isnan(value) for value in self.noise.values()):
+            rms = " and ".join(
+                f"{to_paper(value, 'rad')[0]:.2f} deg ({name} set)" for name, value in self.noise.items()
+            )
+            noise = (
+                f"sensor noise causes an rms elevator command of {rms}; it is 1 deg with "
+                f"{_ONE_DEGREE / self.noise['fine']:.1f} times the noise of the fine set"
+            )
         return (
-            f"over the bandwidth of the elevator, the loop is {' and '.join(spans)}; the largest real part of the "
-            f"poles (1/s) is {growths}; {delays}; {self._said_noise()}"
+            f"over the bandwidth of the elevator, the loop is {spans}; the largest real part of the poles (1/s) is "
+            f"{growths}; {delays}; {noise}"
         )
 
-    def _said_noise(self) -> str:
-        if any(np.isnan(value) for value in self.noise.values()):
-            return "the response to sensor noise is undefined: the loop is unstable with an elevator of 50 rad/s"
-        said = " and ".join(f"{to_paper(value, 'rad')[0]:.2f} deg ({name} set)" for name, value in self.noise.items())
-        return (
-            f"sensor noise causes an rms elevator command of {said}; it is 1 deg with "
-            f"{_ONE_DEGREE / self.noise['fine']:.1f} times the noise of the fine set"
-        )
-
-    def report(self) -> dict[str, object]:
+    def report(self) -> dict[str, Any]:
         """Return the limits for JSON."""
         return {
             "growth_with_published_elevators_per_s": self.growths,
@@ -277,6 +300,94 @@ class Limits:
             "delay_borne_s_of": {name: {"nominal": n, "worst": w} for name, (n, w) in self.delays.items()},
             "elevator_rms_rad": self.noise,
         }
+
+
+def run(scope: Scope) -> Outcome:
+    """Linearise every controller with elevators of all bandwidths and with delays, and fly it through gusts."""
+    bandwidths = np.geomspace(5.0, 500.0, scope.count(31, 4)).tolist()
+    delays = np.linspace(0.0, _SHOWN_DELAY, scope.count(33, 3)).tolist()
+    velocities, degrees = VELOCITIES[:: scope.every], to_paper(1.0, "rad")[0]
+    figure = new_figure(9.0)
+    panels = figure.subplots(3, 2).ravel()
+    findings, numbers = [], {}
+    for done, case in enumerate(CASES):
+        scope.progress("linear loops", done, len(CASES))
+        growths = [case.growth(elevator(w)) for w in bandwidths]
+        late = [case.growth(elevator(SURFACE.natural_frequency, delay)) for delay in delays]
+        borne = [case.tolerated_delay(elevator(w)) for w in bandwidths]
+        noise = [case.elevator_noise(elevator(w), "fine") for w in bandwidths]
+        in_gusts = [worse(case, GUSTS[-1], velocity) for velocity in velocities]
+        style: Any = {"linestyle": "-" if case.coupling == "paper_like" else "--", "color": case.color}
+        panels[0].semilogx(bandwidths, growths, label=case.label, **style)
+        panels[1].plot(1e3 * np.array(delays), late, **style)
+        panels[2].semilogx(bandwidths, [np.nan if d is None else 1e3 * d for d in borne], **style)
+        panels[3].semilogx(bandwidths, degrees * np.array(noise), **style)
+        feet = [to_paper(v, "m/s")[0] for v in velocities]
+        panels[4].plot(feet, [degrees * one.attitude for one in in_gusts], **style)
+        panels[5].plot(feet, [degrees * one.elevator for one in in_gusts], **style)
+        limits = Limits.of(case, scope.over)
+        gusts = {gust: gust_limits(case, gust) for gust in GUSTS}
+        words = "; ".join(f"in a {gust}, {gust_limits_in_words(found)}" for gust, found in gusts.items())
+        findings.append(f"{case.label}: {limits.in_words(in_words(scope.over))}; {words}")
+        numbers[case.label] = {
+            **limits.report(),
+            "gust_limits_m_per_s": {gust.key: found for gust, found in gusts.items()},
+            "in_gusts": [one._asdict() for one in in_gusts],
+            "growth_per_s": growths,
+            "growth_behind_delay_per_s": late,
+            "delay_borne_s": borne,
+            "elevator_noise_rad": noise,
+        }
+    scope.progress("linear loops", len(CASES), len(CASES))
+    bandwidth, delay = (
+        "bandwidth of the elevator (rad/s)",
+        f"delay (ms), elevator of {SURFACE.natural_frequency:g} rad/s",
+    )
+    gust = "velocity of the gust (ft/s)"
+    for panel, x, y, shown in zip(
+        panels,
+        (bandwidth, delay, bandwidth, bandwidth, gust, gust),
+        (
+            "largest real part (1/s)",
+            "largest real part (1/s)",
+            "delay borne (ms)",
+            "elevator rms, fine sensors (deg)",
+            "largest change of attitude (deg)",
+            "largest elevator command (deg)",
+        ),
+        ((-0.6, 1.0), (-0.6, 1.0), (0.0, None), (0.0, 1.0), (0.0, 5.0), (10.0, 30.0)),
+        strict=True,
+    ):
+        panel.set(xlabel=x, ylabel=y, ylim=shown)
+    for panel, limit in ((panels[0], 0.0), (panels[1], 0.0), (panels[4], HALF_DEGREE), (panels[5], SURFACE.stop)):
+        panel.axhline(degrees * limit, **ZERO)
+    letter(panels)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return Outcome(
+        figure,
+        "Linear sampled loop of Case 1 around the coupled nominal vehicle, with a second-order elevator (damping "
+        f"{SURFACE.damping_ratio:g}) and the fuel delivery of {FUEL.natural_frequency:g} rad/s; each value is the "
+        "worst over both ends of the step, before and after the fault. (a) Largest real part of the poles over the "
+        "bandwidth of the elevator. (b) The same over a delay of the command. (c) Delay at which the loop becomes "
+        "unstable, by root finding. (d) Rms elevator command due to the noise of the fine sensor set, without a fault; "
+        "there is no line where the loop is unstable. The limits of the actuators are not included in (a) to (d). "
+        f"(e), (f) Flight through a {GUSTS[-1]}, from below or from above, whichever is worse, at the end of "
+        f"the step and after the fault, with an elevator of {SURFACE.natural_frequency:g} rad/s and its limits: (e) "
+        "largest change of an attitude angle, with a line at half a degree, and (f) largest elevator command, with a "
+        "line at the stop. The gust velocity at which an attitude angle changes by half a degree, the elevator command "
+        f"exceeds its stop, or the flight is lost is found by root finding over such flights. {RMPC_GAIN}.",
+        findings,
+        {
+            "bandwidth_rad_per_s": bandwidths,
+            "delay_s": delays,
+            "gust_m_per_s": list(velocities),
+            "cases": numbers,
+        },
+    )
+
+
+def _elevator_in_words(name: str) -> str:
+    return name.replace("one of", "an elevator of")
 
 
 def _stable(changes: Sequence[float], first: bool) -> str:
@@ -294,6 +405,3 @@ def _milliseconds(delay: float | None) -> str:
     if delay is None:
         return f"at least {1e3 * DELAYS[-1]:g} ms"
     return f"{1e3 * delay:.0f} ms" if delay > 0.0 else "none"
-
-
-STUDY = Study("hardware", "Actuators, delay, noise and gusts", run)

@@ -1,79 +1,260 @@
-"""The flights of a sweep, stored by controller, so that an interrupted study continues where it stopped."""
+"""The controllers that the studies compare, the runner of all sweeps of flights, and the plots and findings of one."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from functools import cache
+from itertools import cycle
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
-from hsv.base.processes import Progress
-from hsv.flight.corners import Corner
-from hsv.flight.sources import DIGITS, code_digest, digest_of, kept, measuring_code
-from hsv_paper.corner_flights import fly_over
-from hsv_paper.sensitivity.controllers import Controller
-from hsv_paper.sensitivity.sweep_result import SweepResult, sweep_result
+from hsv.base.units import to_paper
+from hsv.control.design import ControlDesign, find_design, read_parameters
+from hsv.control.notch_filter import flown_sections
+from hsv.flight.assembly import assemble_flight, scenario_parameters
+from hsv.flight.metrics import METRICS
+from hsv.flight.scenario import load_scenario
+from hsv_paper.flights import Point, Table
+from hsv_paper.linear_loop import COUPLING_SCALES, Corners, Feedback
+from hsv_paper.plots import BLUE, GREEN, ORANGE, PURPLE, RED, letter, plain_log
+from hsv_paper.study import Scope, in_words
 
-_HALF_WIDTH = np.ones(5)
-"""The sweeps use no measure that compares errors of different rigid-body states."""
+Columns = dict[str, list[float]]
+"""Numbers of one controller over the points of a sweep, by name."""
+
+SWEPT = (
+    "post_fault_attitude_deviation",
+    "post_fault_attitude_from_nominal",
+    "altitude_end_error",
+    "altitude_error_maximum",
+    "velocity_error_maximum",
+    "elastic_decay_time",
+    "altitude_settling_time",
+    "velocity_settling_time",
+    "fuel_equivalence_ratio_maximum",
+)
+"""Metrics that a sweep keeps, of the nominal vehicle and of the worst."""
+
+SATURATED_STEPS = 50
+"""Limited steps, one second, up to which a flight does not count as saturated."""
+
+SATURATED = "A flight counts as saturated if its inputs are at their limits for more than a second, or if it is lost."
+
+LOSSES = (
+    "(a) Share of the flights that are not lost (solid), and of those that are not saturated (dotted). (b), (c) "
+    f"Nominal vehicle (solid) and worst corner (dashed); a line ends where a flight is lost. {SATURATED}"
+)
+"""Description of the plot of :func:`draw_losses`."""
 
 
 @dataclass(frozen=True)
-class Point:
-    """One point of a sweep: flat parameters and the vehicles flown there."""
+class Controller:
+    """A scenario with changes, and its colour in the plots."""
 
-    values: Mapping[str, Any]
-    over: Sequence[Corner]
+    label: str
+    scenario: str
+    color: str
+    design: str = "baseline"
+    changes: tuple[tuple[str, Any], ...] = ()
+    kept: bool = True
+    """Whether its flights are kept, because they depend only on the parameters and this library."""
+
+    def parameters(self) -> dict[str, Any]:
+        """Flat parameters of the flight."""
+        return {
+            **(read_parameters(find_design(self.design)) if self.design else {}),
+            **scenario_parameters(load_scenario(self.scenario)),
+            **dict(self.changes),
+        }
 
 
-def sweep(
-    name: str, along: Mapping[Controller, Sequence[Point]], folder: Path, progress: Progress
-) -> dict[Controller, SweepResult]:
-    """Fly every controller at its points and return the results.
+_ON_CM = (("vehicle.model", "CM"),)
+
+WITH_NOTCH = Controller("tube with notch at 15 rad/s", "case1", BLUE)
+WIDER_NOTCH = Controller("tube with notch at 14 rad/s, wider", "case1", GREEN, "baseline_derived")
+WITHOUT_NOTCH = Controller("tube without notch", "case1_no_notch", ORANGE)
+RMPC = Controller("RMPC without notch", "case1_rmpc_fourth_k", RED, changes=_ON_CM)
+RMPC_WITH_NOTCH = Controller(
+    "RMPC, were it given the notch", RMPC.scenario, PURPLE, RMPC.design, (*_ON_CM, ("notch.enabled", True))
+)
+RMPC_DECOUPLED = Controller("RMPC as the paper flies it, on the decoupled model", RMPC.scenario, RED)
+
+ALL = (WITH_NOTCH, WIDER_NOTCH, WITHOUT_NOTCH, RMPC, RMPC_WITH_NOTCH)
+
+RMPC_GAIN = "RMPC flies the fourth gain of the nominal family"
+"""Description of the RMPC gain for the pages."""
+
+_OTHER_COLORS = ("#008b8b", "#8c564b", "#c71585", "#556b2f")
+
+
+def of_scenarios(names: Sequence[str]) -> list[Controller]:
+    """Return the controllers of scenarios, labelled with their titles.
+
+    Raises:
+        ScenarioError: There is no such scenario, or it is invalid.
+    """
+    found = []
+    for name, color in zip(names, cycle(_OTHER_COLORS), strict=False):
+        scenario = load_scenario(name)
+        assemble_flight(scenario)
+        found.append(Controller(scenario.title, name, color, scenario.design, kept=False))
+    return found
+
+
+@cache
+def feedback(controller: Controller) -> Feedback:
+    """Return the feedback of a controller's linear loop."""
+    values = controller.parameters()
+    design = ControlDesign.from_parameters(values)
+    gain = design.adjusted_gain(design.tau)
+    if values["controller"] == "robust_mpc":
+        gain = design.nominal_gains[values["robust_mpc.gain_index"]]
+    return Feedback(gain, flown_sections(values) if values["notch.enabled"] else (), design.period)
+
+
+def sweep(scope: Scope, name: str, along: Mapping[Controller, Sequence[Point]]) -> dict[Controller, Columns]:
+    """Fly every controller at its points and return the columns; the nominal vehicle is the first of each point."""
+    return {
+        controller: columns_of(
+            scope.flights.tables(f"{name} flights {number} of {len(along)}", points, keep=controller.kept)
+        )
+        for number, (controller, points) in enumerate(along.items(), 1)
+    }
+
+
+def columns_of(tables: Sequence[Table]) -> Columns:
+    """Return the columns of one controller from the table of each point, SI.
+
+    A metric that a lost flight does not define is NaN, for the nominal vehicle and for the worst.
+    """
+    columns: Columns = {"finished": [], "without_limits": [], "nominal_finished": []}
+    for table in tables:
+        finished = table["diverged"] == 0.0
+        columns["finished"].append(float(finished.mean()))
+        columns["nominal_finished"].append(float(finished[0]))
+        columns["without_limits"].append(float((finished & (table["saturated_steps"] <= SATURATED_STEPS)).mean()))
+        for name in SWEPT:
+            values = np.where(finished, np.abs(table.get(name, np.full(len(finished), np.nan))), np.nan)
+            columns.setdefault(f"{name}_nominal", []).append(float(values[0]))
+            columns.setdefault(f"{name}_worst", []).append(float(values.max()))
+    return columns
+
+
+def labelled(results: Mapping[Controller, Columns]) -> dict[str, Columns]:
+    """Return results by the controllers' labels, for JSON."""
+    return {controller.label: columns for controller, columns in results.items()}
+
+
+@dataclass(frozen=True)
+class CouplingLimits:
+    """kappa at which a linear loop becomes unstable, for the nominal vehicle and for the worst of ``over``."""
+
+    nominal: float | None
+    worst: float | None
+    over: Corners
+
+    @classmethod
+    def of(cls, loop: Feedback, over: Corners) -> CouplingLimits:
+        """Return the limits of a loop; the nominal vehicle is the first of ``over``."""
+        return cls(loop.critical_coupling(), loop.critical_coupling(over), over)
+
+    def in_words(self) -> str:
+        """Return both limits in words."""
+        nominal, worst = (
+            f"at least κ = {COUPLING_SCALES[-1]:g}" if limit is None else f"κ = {limit:.2f}"
+            for limit in (self.nominal, self.worst)
+        )
+        corners = in_words(self.over)
+        return f"the linear loop is stable up to {nominal} (nominal vehicle) and {worst} (worst of {corners})"
+
+    def report(self) -> dict[str, float | None]:
+        """Return the limits for JSON."""
+        return {"nominal": self.nominal, "worst": self.worst}
+
+
+def widths(count: int) -> np.ndarray:
+    """Return line widths for curves drawn one after another, each thinner, so that none hides another."""
+    return 0.8 + 0.3 * np.arange(count)[::-1]
+
+
+def draw_metric(axis: Axes, x: np.ndarray, results: Mapping[Controller, Columns], name: str, label: str) -> None:
+    """Draw a metric of every controller in the paper's unit: nominal vehicle solid, worst dashed."""
+    factor = to_paper(1.0, METRICS[name].unit)[0]
+    for (controller, columns), width in zip(results.items(), widths(len(results)), strict=True):
+        for suffix, style in (("nominal", "-"), ("worst", "--")):
+            axis.plot(x, factor * np.array(columns[f"{name}_{suffix}"]), style, color=controller.color, linewidth=width)
+    axis.set_ylabel(label)
+
+
+def draw_losses(figure: Figure, x: np.ndarray, results: Mapping[Controller, Columns], label: str) -> np.ndarray:
+    """Draw and return three panels over ``x``: flights not lost or saturated, attitude excursion, altitude error.
 
     Args:
-        name: Name of the study.
-        along: Points by controller; the nominal vehicle is the first of each point.
-        folder: Folder of the results, named by a digest of what they depend on.
-        progress: Called with what is done.
+        figure: An empty figure.
+        x: Values along the sweeps.
+        results: Columns by controller.
+        label: Label of ``x``.
     """
-    total, done = sum(map(len, along.values())), 0
-    results = {}
-    for number, (controller, points) in enumerate(along.items()):
-
-        def flown(points: Sequence[Point] = points, before: int = done) -> SweepResult:
-            tables = []
-            for index, point in enumerate(points):
-                progress(f"{name}, flights", before + index, total)
-                tables.append(fly_over(dict(point.values), point.over, _HALF_WIDTH))
-            return sweep_result(tables)
-
-        path = folder / f"sweep_{name}_{number}_{_digest(points)[:DIGITS]}.json"
-        results[controller] = kept(path, flown, _save, _load) if controller.kept else flown()
-        done += len(points)
-    progress(f"{name}, flights", total, total)
-    return results
+    axes = np.asarray(figure.subplots(3, 1, sharex=True))
+    for (controller, columns), width in zip(results.items(), widths(len(results)), strict=True):
+        for name, style, key in (("finished", "-", controller.label), ("without_limits", ":", None)):
+            shares = 100.0 * np.array(columns[name])
+            axes[0].plot(x, shares, style, color=controller.color, linewidth=width, label=key)
+    axes[0].set(ylabel="flights (%)", ylim=(-5.0, 105.0))
+    draw_metric(axes[1], x, results, "post_fault_attitude_deviation", "attitude excursion (deg)")
+    draw_metric(axes[2], x, results, "altitude_end_error", "altitude error at end (ft)")
+    for axis in axes[1:]:
+        plain_log(axis)
+    axes[2].set_xlabel(label)
+    letter(axes)
+    legend(figure, shares=True)
+    return axes
 
 
-def _digest(points: Sequence[Point]) -> str:
-    flown = [[dict(point.values), [dict(corner) for corner in point.over]] for point in points]
-    text = json.dumps(flown, sort_keys=True, default=np.ndarray.tolist)
-    return digest_of(
-        [
-            text.encode(),
-            code_digest().encode(),
-            *measuring_code(sweep_result.__module__, "hsv_paper.corner_flights", "hsv_paper.measures"),
-        ]
-    )
+def legend(figure: Figure, *, shares: bool) -> None:
+    """Add a legend of controllers and line styles above the panels; ``shares``: panel (a) shows shares."""
+    controllers, _ = figure.axes[0].get_legend_handles_labels()
+    styles = {"-": "nominal vehicle", "--": "worst corner"}
+    if shares:
+        styles |= {"-": "nominal vehicle; (a): flown to the end", ":": "(a): not a second at the limits"}
+    keys = [Line2D([], [], color="black", linestyle=s, linewidth=0.9, label=text) for s, text in styles.items()]  # type: ignore[arg-type]
+    figure.legend(handles=[*controllers, *keys], loc="outside upper center", ncols=3, frameon=False)
 
 
-def _save(path: Path, columns: SweepResult) -> None:
-    path.write_text(json.dumps(columns), encoding="utf-8")
+def lost_where(
+    x: np.ndarray, columns: Columns, words: str, *, digits: int = 2, rising: bool = True, nominal: bool = True
+) -> str:
+    """Return in words between which points flights begin to saturate and to be lost, along ``x``.
 
+    Args:
+        x: Values along the sweep, increasing.
+        columns: Columns of the sweep.
+        words: Text around a value, with ``{}`` in its place.
+        digits: Decimals of a value.
+        rising: Begin at the smallest value, otherwise at the largest.
+        nominal: Whether the sweep also changes the flight of the nominal vehicle.
+    """
+    order = slice(None) if rising else slice(None, None, -1)
+    along = [f"{value:.{digits}f}" for value in x[order]]
 
-def _load(path: Path) -> SweepResult:
-    columns: SweepResult = json.loads(path.read_text(encoding="utf-8"))
-    return columns
+    def first(name: str, begin: str, none: str) -> str:
+        lost = np.array(columns[name])[order] < 1.0
+        begins = np.flatnonzero(lost & ~np.concatenate(([False], lost[:-1])))
+        where = (
+            f"between {words.format(f'{along[i - 1]} and {along[i]}')}" if i else f"already at {words.format(along[0])}"
+            for i in begins
+        )
+        return f"{begin} {' and again '.join(where)}" if len(begins) else none
+
+    parts = [
+        first("without_limits", "saturation begins", "no flight is saturated"),
+        first("finished", "losses begin", "no flight is lost"),
+    ]
+    if nominal and min(columns["finished"]) < 1.0:
+        parts.append(first("nominal_finished", "the nominal vehicle is first lost", "the nominal vehicle is not lost"))
+    return f"{', '.join(parts[:-1])}, and {parts[-1]}"

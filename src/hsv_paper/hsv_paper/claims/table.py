@@ -1,0 +1,240 @@
+"""The table of the paper's statements, ``claims.toml``, and how each is measured and judged."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib.resources import files
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel
+
+from hsv.base.processes import Progress
+from hsv.base.units import UnitSystem, parse_quantity
+from hsv.model.actuators import IDEAL
+from hsv_paper.claims import numbers
+from hsv_paper.claims.evidence import Evidence, certified, shown
+
+Vehicle = Literal["uncertain", "nominal", "worst"]
+Actuators = Literal["none", "ideal", "elevator_150", "elevator_50", "elevator_20"]
+
+_AS_PAPER = ("", "none", IDEAL)
+"""Readings with the paper's actuators: none named, independent of actuators, and ideal."""
+
+_VEHICLES = {"uncertain": "uncertain parameters", "nominal": "nominal vehicle", "worst": "worst corner"}
+
+_TABLE = tomllib.loads(files(__package__).joinpath("claims.toml").read_text(encoding="utf-8"))
+
+THRESHOLDS = {
+    name: parse_quantity(value, unit, name) if unit else float(value)
+    for name, (value, unit) in _TABLE.pop("thresholds").items()
+}
+"""Thresholds that several claims share, SI."""
+
+
+class Verdict(StrEnum):
+    """Verdict on a claim."""
+
+    HOLDS = "holds"
+    CONDITIONS = "holds under conditions"
+    FAILS = "does not hold"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One way to read a claim: a number (SI) that must be at most, or at least, a threshold."""
+
+    what: str
+    value: float
+    unit: str
+    at_most: float | None = None
+    at_least: float | None = None
+    actuators: str = ""
+    """Name of the actuators between command and vehicle; empty for the paper's, if the claim names none."""
+
+    def measured(self, units: UnitSystem = UnitSystem.paper) -> str:
+        """Return the number with its unit."""
+        return shown(self.value, self.unit, units)
+
+    def threshold(self, units: UnitSystem = UnitSystem.paper) -> str:
+        """Return the threshold in words."""
+        word, limit = ("least", self.at_least) if self.at_most is None else ("most", self.at_most)
+        assert limit is not None
+        return f"at {word} {shown(limit, self.unit, units)}"
+
+    @property
+    def holds(self) -> bool:
+        """Whether the number satisfies the threshold; NaN does not."""
+        if self.at_most is not None:
+            return bool(self.value <= self.at_most)
+        return bool(self.at_least is not None and self.value >= self.at_least)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The readings of a claim, and the reasons for their results.
+
+    The first ``leading`` readings are the statement itself under the paper's own conditions, one for each number in it;
+    the others repeat it under further conditions.
+    """
+
+    readings: tuple[Reading, ...]
+    why: str
+    leading: int = 1
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the claim holds in all readings, only in those of the statement itself, or not in these."""
+        kept = [reading.holds for reading in self.readings]
+        if not all(kept[: self.leading]):
+            return Verdict.FAILS
+        return Verdict.HOLDS if all(kept) else Verdict.CONDITIONS
+
+
+class Row(BaseModel, frozen=True, extra="forbid"):
+    """Quantity of a reading, its vehicles and its threshold; ``claims.toml`` explains the fields."""
+
+    what: str = ""
+    flight: str = ""
+    measure: str = ""
+    over: str = ""
+    changes: dict[str, str | float] = {}
+    certificate: str = ""
+    number: str = ""
+    vehicle: Vehicle | None = None
+    vehicles: tuple[Vehicle, ...] = ("uncertain", "nominal", "worst")
+    beyond: float | str | None = None
+    unit: str = "1"
+    at_most: float | str | None = None
+    at_least: float | str | None = None
+    lead: int = 0
+    actuators: tuple[Actuators, ...] | None = None
+
+
+class Claim(BaseModel, frozen=True, extra="forbid"):
+    """A claim of ``claims.toml``: quote, location in the paper, and how it is measured."""
+
+    name: str
+    quote: str
+    location: str
+    why: str
+    readings: tuple[Row, ...]
+    facts: dict[str, Row] = {}
+    numbers: str = ""
+    actuators: tuple[Actuators, ...] = ()
+
+    def measure(self, evidence: Evidence) -> Finding:
+        """Return the readings, those of the statement itself first, and the explanation with its numbers."""
+        measured = self._measured(evidence)
+        facts = {
+            name: _Fact(measured.value(row, row.vehicle or "nominal"), row.unit) for name, row in self.facts.items()
+        }
+        words = measured.numbers | facts | THRESHOLDS
+        behind = {
+            name: measured if name in _AS_PAPER else self._measured(evidence.behind(name))
+            for name in {name for row in self.readings for name in self._actuators(row)}
+        }
+        first: list[Reading] = []
+        further: list[Reading] = []
+        leads = [row.lead for row in self.readings]
+        for row, lead in zip(self.readings, leads if any(leads) else [1, *leads[1:]], strict=True):
+            found = [
+                reading
+                for name in self._actuators(row)
+                for reading in behind[name].readings(row, row.what.format_map(words | behind[name].numbers), name)
+            ]
+            first += found[:lead]
+            further += found[lead:]
+        return Finding((*first, *further), self.why.format_map(words), sum(leads) or 1)
+
+    def _actuators(self, row: Row) -> tuple[str, ...]:
+        return (self.actuators or ("",)) if row.actuators is None else row.actuators
+
+    def _measured(self, evidence: Evidence) -> _Measured:
+        found = getattr(numbers, self.numbers)(evidence) if self.numbers else {}
+        return _Measured(evidence, {"vehicles": evidence.vehicles, "corners": evidence.vehicles - 1, **found})
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """The numbers of a claim's function by name, and the evidence from which its rows are measured."""
+
+    evidence: Evidence
+    numbers: dict[str, Any]
+
+    def readings(self, row: Row, what: str, actuators: str) -> list[Reading]:
+        """Return the readings of a row: one, or one per vehicle."""
+        most, least = (None if limit is None else self.named(limit) for limit in (row.at_most, row.at_least))
+        if row.vehicle or not row.flight or row.beyond is not None:
+            asked = {what: row.vehicle or "nominal"}
+        else:
+            asked = {f"{what}, {_VEHICLES[vehicle]}": vehicle for vehicle in row.vehicles}
+        return [
+            Reading(text, self.value(row, vehicle), row.unit, most, least, actuators) for text, vehicle in asked.items()
+        ]
+
+    def named(self, limit: float | str) -> float:
+        """Return a limit that is a number or the name of one."""
+        if isinstance(limit, str):
+            return float(self.numbers[limit] if limit in self.numbers else THRESHOLDS[limit])
+        return limit
+
+    def value(self, row: Row, vehicle: Vehicle) -> float:
+        """Return the number (SI) of a row for a vehicle; ``worst``: infinite where a lost flight does not define it."""
+        if vehicle == "uncertain":
+            return float(self._of_flights(row, self.evidence.uncertain))
+        if row.flight:
+            values = self._of_flights(row, self.evidence.magnitudes)
+        else:
+            values = self.numbers[row.number] if row.number else certified(row.certificate)
+        values = np.atleast_1d(values)
+        if row.beyond is not None:
+            return float(np.count_nonzero(~(values <= self.named(row.beyond))))
+        if vehicle == "nominal":
+            return float(values[0])
+        if row.at_least is not None:
+            return float(values.min())
+        return float(np.inf) if np.any(np.isnan(values)) else float(values.max())
+
+    def _of_flights(self, row: Row, measured: Callable[..., Any]) -> Any:
+        values = measured(row.flight, row.measure, *row.changes.items())
+        return values / measured(row.over, row.measure) if row.over else values
+
+
+@dataclass(frozen=True)
+class _Fact:
+    """A number (SI) for a text: in the paper's unit, or formatted as its format specifies."""
+
+    value: float
+    unit: str
+
+    def __format__(self, spec: str) -> str:
+        return format(self.value, spec) if spec else shown(self.value, self.unit)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A claim with its finding."""
+
+    claim: Claim
+    finding: Finding
+
+
+GROUPS = {group: tuple(map(Claim.model_validate, claims)) for group, claims in _TABLE.items()}
+"""All claims by part of the paper and topic."""
+
+
+def judge(evidence: Evidence, progress: Progress = lambda what, done, total: None) -> dict[str, list[Judged]]:
+    """Return all claims with their findings, by group."""
+    total = sum(map(len, GROUPS.values()))
+    judged: dict[str, list[Judged]] = {}
+    for group, claims in GROUPS.items():
+        judged[group] = []
+        for claim in claims:
+            progress("claims", sum(map(len, judged.values())), total)
+            judged[group].append(Judged(claim, claim.measure(evidence)))
+    progress("claims", total, total)
+    return judged

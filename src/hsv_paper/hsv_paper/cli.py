@@ -1,0 +1,236 @@
+"""The hsv-paper command: the paper's figures and claims, what its choices are sensitive to, and physical limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hsv.base.errors import QuantityError
+from hsv.base.units import UnitSystem
+from hsv.cli.entry import Command
+from hsv.cli.main import run
+from hsv.cli.options import JsonOption, UnitsOption
+from hsv.cli.output import check_folder, check_target, console, errors, new_table, print_json, stages
+
+if TYPE_CHECKING:
+    from hsv_paper.claims.page import Ranks
+    from hsv_paper.claims.table import Judged
+    from hsv_paper.study import Study
+
+COMMANDS = {name: Command(__name__) for name in ("figures", "claims", "sensitivity", "limits")}
+"""Places of the commands."""
+
+FlightsOption = Annotated[Path, typer.Option(help="Folder in which the study's flights are stored and reused.")]
+CoarsenessOption = Annotated[float, typer.Option(help="1: as in the docs; 4: a quarter of the points.")]
+StudyOption = Annotated[Path, typer.Option("--out", help="Folder for a PDF, a PNG and a page on the study.")]
+
+_FLIGHTS = Path("bags/study")
+
+_COLOURS = {"holds": "green", "holds under conditions": "yellow", "does not hold": "red"}
+
+_NAME, _LOCATION = 43, 11
+"""Widths of the columns of names and locations: with the longest verdict they fill the 80 of a terminal."""
+
+
+def main() -> None:
+    """Run the command line."""
+    run("hsv-paper", COMMANDS, "Draw the figures of the paper, judge its claims, and vary its choices.")
+
+
+def figures(
+    only: Annotated[list[int] | None, typer.Option(help="Draw only this figure of the paper; can be repeated.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page of each figure.")] = Path("figures"),
+    flights: FlightsOption = _FLIGHTS,
+    json: JsonOption = False,
+) -> None:
+    """Draw the paper's figures from this project's designs and flights, for comparison with the paper's.
+
+    The flights are runs of the graph, recorded to bags. The bags are reused as long as nothing they depend on changes,
+    including the nodes and their messages. Without the nodes, the flights are computed in this process, with the same
+    numbers.
+
+    Example: hsv-paper figures --only 9 --only 11 --out figures
+    """
+    import matplotlib
+
+    from hsv_paper.figures import FIGURES
+    from hsv_paper.flights import Flights, graph_is_there
+    from hsv_paper.plots import RC, save
+
+    for number in only or ():
+        if number not in FIGURES:
+            raise QuantityError(f"only = {number}: expected one of {', '.join(map(str, FIGURES))}")
+    chosen = [figure for number, figure in FIGURES.items() if not only or number in only]
+    check_folder(out, "out")
+    check_folder(flights, "flights")
+    graph = graph_is_there()
+    flown = len({scenario for figure in chosen for scenario in figure.scenarios})
+    if flown and graph:
+        errors.print(f"{flown} flights of the nodes, about {20 * flown} s, less with those kept in {flights}")
+    elif flown:
+        errors.print("no built ROS workspace is sourced: flown in this process, with the same numbers bit for bit")
+    out.mkdir(parents=True, exist_ok=True)
+    written = {}
+    with stages() as progress, matplotlib.rc_context(RC):
+        source = Flights(flights, progress, graph=graph)
+        for done, figure in enumerate(chosen):
+            progress("figures", done, len(chosen))
+            drawing = figure.draw(source)
+            written[figure.number] = save(drawing.figure, out / figure.stem)
+            (out / f"{figure.stem}.md").write_text(figure.page(drawing), encoding="utf-8")
+        progress("figures", len(chosen), len(chosen))
+    if json:
+        rows = [{"number": number, "paths": list(map(str, paths))} for number, paths in written.items()]
+        print_json({"figures": rows})
+        return
+    for number, paths in written.items():
+        console.print(f"Figure {number:2}  {', '.join(map(str, paths))}", soft_wrap=True)
+
+
+def claims(
+    out: Annotated[Path | None, typer.Option(help="Also write a page on all claims to this file, in Markdown.")] = None,
+    flights: FlightsOption = _FLIGHTS,
+    verbose: Annotated[bool, typer.Option("--verbose", help="Print quotes, readings and reasons, too.")] = False,
+    units: UnitsOption = UnitSystem.metric,
+    json: JsonOption = False,
+) -> None:
+    """Measure and judge every checkable claim of the paper, for the nominal vehicle and all corners of the parameters.
+
+    The first run takes several minutes: more than a dozen scenarios are flown with 1025 vehicles each. The flights are
+    stored and reused.
+
+    Example: hsv-paper claims --out docs/claims.md
+    """
+    from hsv_paper.claims.evidence import Evidence
+    from hsv_paper.claims.page import page, ranking
+    from hsv_paper.claims.table import judge
+
+    if out:
+        check_target(out, "out")
+    check_folder(flights, "flights")
+    errors.print(f"17 scenarios with 1025 vehicles each: about 15 min, less with the flights kept in {flights}")
+    with stages() as progress:
+        evidence = Evidence(flights, progress)
+        judged = judge(evidence, progress)
+        ranks = ranking(evidence)
+    if out:
+        out.write_text(page(judged, ranks), encoding="utf-8")
+    if json:
+        ranked = {metric: {name: vars(rank) for name, rank in row.items()} for metric, row in ranks.items()}
+        entries = [claim_json(group, entry) for group, entries in judged.items() for entry in entries]
+        print_json({"claims": entries, "ranking": ranked})
+    else:
+        print_claims(judged, ranks, verbose, units)
+
+
+def claim_json(group: str, entry: Judged) -> dict[str, Any]:
+    """Return a claim with its finding for JSON."""
+    return {
+        "group": group,
+        "name": entry.claim.name,
+        "quote": entry.claim.quote,
+        "location": entry.claim.location,
+        "verdict": str(entry.finding.verdict),
+        "why": entry.finding.why,
+        "readings": [{**vars(reading), "holds": reading.holds} for reading in entry.finding.readings],
+    }
+
+
+def print_claims(judged: dict[str, list[Judged]], ranks: Ranks, verbose: bool, units: UnitSystem) -> None:
+    """Print a line for each claim, or all that its page says, and the ranking."""
+    from rich.markdown import Markdown
+    from rich.text import Text
+
+    from hsv_paper.claims.page import details, ranking_table, tally
+
+    for group, entries in judged.items():
+        console.print(group, style="bold")
+        if verbose:
+            for entry in entries:
+                console.print(Markdown(details(entry, units)))
+            continue
+        table = new_table("claim", "location", "verdict", head=False)
+        for column, width in zip(table.columns, (_NAME, _LOCATION, None), strict=True):
+            column.width, column.no_wrap = width, True
+        for entry in entries:
+            where = entry.claim.location.rpartition(", ")[2]
+            where = where.replace("Figures", "Fig.").replace("Figure", "Fig.").replace(" and ", ", ")
+            verdict = str(entry.finding.verdict)
+            table.add_row(entry.claim.name, where, Text(verdict, _COLOURS[verdict]))
+        console.print(table)
+    if verbose:
+        console.print("In bold: the statement itself; the other readings repeat it under other conditions.")
+    console.print(f"{tally(judged)}\n", style="bold")
+    console.print(Markdown(ranking_table(ranks, units)))
+
+
+def sensitivity(
+    name: Annotated[
+        str, typer.Argument(help="coupling, sampling, notch, parameters, fault, weights, ramp, factor or hardware.")
+    ],
+    out: StudyOption = Path("study"),
+    flights: FlightsOption = _FLIGHTS,
+    coarseness: CoarsenessOption = 1.0,
+    beside: Annotated[
+        list[str], typer.Option("--with", help="Also fly the controller of this scenario; can be repeated.")
+    ] = [],  # noqa: B006
+    json: JsonOption = False,
+) -> None:
+    """Vary one thing that the paper leaves open until each controller is lost; plot the results and state the limits.
+
+    Example: hsv-paper sensitivity fault --with examples/lqr/lqr.toml --out study
+    """
+    from hsv_paper.sensitivity import STUDIES
+    from hsv_paper.sensitivity.flown import others_with_elevator_fault
+
+    if name not in STUDIES:
+        raise QuantityError(f"sensitivity = {name!r}: expected one of {', '.join(STUDIES)}")
+    if beside and not STUDIES[name].flies_others:
+        able = ", ".join(n for n, study in STUDIES.items() if study.flies_others)
+        raise QuantityError(f"with = {beside[0]!r}: study {name} flies its own controllers, expected study {able}")
+    others_with_elevator_fault(beside)
+    make(STUDIES[name], out, flights, coarseness, beside, json)
+
+
+def make(study: Study, out: Path, flights: Path, coarseness: float, beside: list[str], json: bool) -> None:
+    """Make a study, write its figure and its page, and print its findings."""
+    import matplotlib
+
+    from hsv_paper.plots import RC, save
+    from hsv_paper.study import Scope
+
+    if not 1.0 <= coarseness <= 100.0:
+        raise QuantityError(f"coarseness = {coarseness}: expected 1 to 100")
+    check_folder(out, "out")
+    check_folder(flights, "flights")
+    minutes = max(1, round(study.minutes / coarseness))
+    errors.print(f"about {minutes} min on one processor, less with the flights kept in {flights}")
+    out.mkdir(parents=True, exist_ok=True)
+    with stages() as progress, matplotlib.rc_context(RC):
+        outcome = study.run(Scope(coarseness, flights, progress, beside))
+        written = save(outcome.figure, out / study.name)
+    target = out / f"{study.name}.md"
+    target.write_text(study.page(outcome), encoding="utf-8")
+    if json:
+        print_json({"study": study.name, "findings": list(outcome.findings), "numbers": outcome.numbers})
+        return
+    for finding in outcome.findings:
+        console.print(f"- {finding}", soft_wrap=True)
+    console.print(f"written {', '.join(map(str, (*written, target)))}", soft_wrap=True)
+
+
+def limits(
+    out: StudyOption = Path("study"),
+    flights: FlightsOption = _FLIGHTS,
+    coarseness: CoarsenessOption = 1.0,
+    json: JsonOption = False,
+) -> None:
+    """Find by optimal control the fastest transfer and the deepest fault from which any controller could recover.
+
+    Example: hsv-paper limits --out study
+    """
+    from hsv_paper.limits.study import STUDY
+
+    make(STUDY, out, flights, coarseness, [], json)

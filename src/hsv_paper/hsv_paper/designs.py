@@ -1,0 +1,62 @@
+"""Shipped designs with their certificates, and the models that the paper compares at one point."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from hsv.base.units import FOOT
+from hsv.control.design import ControlDesign, certificate_path, find_design, read_certificate, read_design
+from hsv.control.notch_filter import NotchSection, continuous, series
+from hsv.design.inputs import DesignInputs, inputs_from_report
+from hsv.design.model import polytopic_model
+from hsv.model.lpv.linearisation import Filter, extended_jacobian, extended_state, zero_order_hold
+from hsv.model.trim import trim
+from hsv.model.vehicle import load_vehicle
+
+BETWEEN = (85817.0 * FOOT, 8037.0 * FOOT)
+"""Altitude (m) and velocity (m/s) of Figures 2 and 8, between the samples of the models."""
+
+CODESIGN_FREQUENCIES = np.logspace(-2.0, 2.0, 1500)
+"""rad/s: over which the co-designed model is compared."""
+
+
+@cache
+def design(name: str) -> ControlDesign:
+    """Return a shipped design as it flies."""
+    return read_design(find_design(name))
+
+
+@cache
+def certificate(name: str) -> dict[str, Any]:
+    """Return the certificate of a shipped design."""
+    return read_certificate(certificate_path(find_design(name)))
+
+
+def inputs_of(name: str) -> DesignInputs:
+    """Return the inputs from which a shipped design was made, as its certificate states them."""
+    return inputs_from_report(certificate(name)["inputs"])
+
+
+def extended_model(inputs: DesignInputs, coupling: str | float) -> tuple[np.ndarray, np.ndarray]:
+    """Return A (11, 11), B (11, 2) of the ECM (paper eq. 40) at :data:`BETWEEN` under held inputs.
+
+    Args:
+        inputs: Inputs of the co-design, with its filter and period.
+        coupling: Name of the set, or a multiple of the derived one.
+    """
+    vehicle, filter_ = load_vehicle().coupled(coupling), Filter(*series(continuous(_sections(inputs))))
+    equilibrium = trim(vehicle, *BETWEEN)
+    state = extended_state(equilibrium.state, filter_)
+    return zero_order_hold(*extended_jacobian(state, equilibrium.input, vehicle, filter_, False), inputs.model.period)
+
+
+def codesigned_model(inputs: DesignInputs) -> tuple[np.ndarray, np.ndarray]:
+    """Return A (11, 11), B (11, 2) of the co-designed polytopic model at :data:`BETWEEN`."""
+    return polytopic_model(inputs.model, load_vehicle(), _sections(inputs)).whole.at(*BETWEEN)
+
+
+def _sections(inputs: DesignInputs) -> tuple[NotchSection, ...]:
+    return tuple(NotchSection(**section.model_dump()) for section in inputs.notch)

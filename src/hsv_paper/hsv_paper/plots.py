@@ -1,0 +1,104 @@
+"""The look of all figures: the paper's panels, units and notation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator, MultipleLocator, NullFormatter
+
+from hsv.model.lpv.linearisation import bode
+
+RC: Any = {
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "legend.fontsize": 8,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 1.0,
+    "grid.linewidth": 0.4,
+    "grid.alpha": 0.35,
+    "axes.grid": True,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "legend.framealpha": 0.9,
+    "legend.fancybox": False,
+    "pdf.fonttype": 42,
+    "figure.facecolor": "white",
+}
+"""Matplotlib settings of all figures."""
+
+BLUE, RED, GREEN, ORANGE, GREY, PURPLE = "#0b4f9e", "#c0392b", "#1f7a3d", "#c77700", "#777777", "#7d3c98"
+
+WIDTH = 7.0
+"""Inches: the text width of the journal's page."""
+
+DOTTED_GREY: Any = {"color": GREY, "linewidth": 0.6, "linestyle": ":"}
+ZERO: Any = {"color": "black", "linewidth": 0.6}
+"""Line styles of marked values and of limits."""
+
+
+def new_figure(height: float) -> Figure:
+    """Return an empty figure of the page's width and of ``height`` inches."""
+    return Figure(figsize=(WIDTH, height), layout="constrained")
+
+
+def letter(axes: Iterable[Axes]) -> None:
+    """Mark panels (a), (b), ... as the paper does."""
+    for index, axis in enumerate(axes):
+        axis.set_title(f"({chr(ord('a') + index)})", loc="left", fontweight="bold")
+
+
+def plain_log(axis: Axes) -> None:
+    """Make the vertical axis logarithmic, with plain numbers on it."""
+    axis.set_yscale("log")
+    axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.yaxis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.yaxis.set_minor_formatter(NullFormatter())
+
+
+def save(figure: Figure, stem: Path) -> list[Path]:
+    """Write ``figure`` as vector PDF and as PNG; equal figures give equal files."""
+    paths = [stem.with_suffix(".pdf"), stem.with_suffix(".png")]
+    with matplotlib.rc_context(RC):
+        figure.savefig(paths[0], metadata={"CreationDate": None})
+        figure.savefig(paths[1], dpi=150, metadata={"Software": None})
+    return paths
+
+
+def bode_panels(height: float = 5.0) -> tuple[Figure, Axes, Axes]:
+    """Return a figure with a magnitude panel above a phase panel."""
+    figure = new_figure(height)
+    magnitude, phase = figure.subplots(2, 1, sharex=True)
+    return figure, magnitude, phase
+
+
+def bode_lines(
+    magnitude: Axes, phase: Axes, frequencies: np.ndarray, response: np.ndarray, label: str, **style: Any
+) -> None:
+    """Draw a response (f) into a magnitude and a phase panel.
+
+    The phase at the lowest frequency is within half a turn of -270 deg, the phase of elevator to pitch rate between
+    the slow modes and the elastic ones, so that all figures show the same branch.
+    """
+    decibel, degree = bode(response)
+    degree = degree - 360.0 * np.round((degree[0] + 270.0) / 360.0)
+    magnitude.semilogx(frequencies, decibel, label=label, **style)
+    phase.semilogx(frequencies, degree, **style)
+
+
+def label_bode(magnitude: Axes, phase: Axes, frequencies: np.ndarray) -> None:
+    """Label the axes of a magnitude and a phase panel."""
+    magnitude.set_ylabel("Magnitude (dB)")
+    phase.set_ylabel("Phase (deg)")
+    phase.set_xlabel("Frequency (rad/s)")
+    phase.yaxis.set_major_locator(MultipleLocator(45.0))
+    for axis in (magnitude, phase):
+        axis.set_xlim(frequencies[0], frequencies[-1])
+        axis.grid(which="minor", linewidth=0.25, alpha=0.25)

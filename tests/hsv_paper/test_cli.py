@@ -1,0 +1,127 @@
+import pytest
+
+from hsv.base.units import UnitSystem
+from hsv.cli.output import console
+from hsv_paper.claims.page import CONTROLLERS, METRICS, Rank
+from hsv_paper.claims.table import GROUPS, Finding, Judged, Reading
+from hsv_paper.cli import print_claims
+
+FINDING = Finding((Reading("first", 0.5, "1", at_most=1.0), Reading("second", 2.0, "1", at_most=1.0)), "It is so.")
+RANKS = {metric: {name: Rank(123456.0, 2e5, 1, 2) for name in CONTROLLERS} for metric in METRICS}
+
+
+def test_a_figure_is_drawn_with_its_page(hsv_paper, tmp_path):
+    ran = hsv_paper("figures", "--only", "4", "--out", "drawn")
+    assert ran.code == 0
+    assert sorted(path.name for path in (tmp_path / "drawn").iterdir()) == [
+        "figure_04.md",
+        "figure_04.pdf",
+        "figure_04.png",
+    ]
+    assert not (tmp_path / "bags").exists()
+
+
+def test_a_figure_that_is_none_of_the_paper_s_is_named(hsv_paper):
+    ran = hsv_paper("figures", "--only", "7")
+    assert ran.code == 2
+    assert ran.error == "only = 7: expected one of 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17"
+
+
+def test_a_study_is_plotted_and_printed_as_json(hsv_paper, tmp_path):
+    ran = hsv_paper("sensitivity", "notch", "--coarseness", "20", "--out", "plots", "--json")
+    assert ran.code == 0
+    assert ran.json["study"] == "notch"
+    assert len(ran.json["numbers"]["centre_rad_per_s"]) == 3
+    assert (tmp_path / "plots" / "notch.png").is_file()
+
+
+def test_the_fault_study_flies_the_controllers_of_other_scenarios_beside(hsv_paper, tmp_path):
+    (tmp_path / "mine.toml").write_text('extends = "case1_integral_heavy"\ntitle = "with integral action"\n')
+    ran = hsv_paper("sensitivity", "fault", "--with", "mine.toml", "--coarseness", "33", "--out", "plots", "--json")
+    assert ran.code == 0
+    assert "with integral action" in ran.json["numbers"]["flights"]
+    assert ran.json["findings"][-1].startswith("with integral action: ")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("weather",), "sensitivity = 'weather': expected one of coupling, sampling, notch, parameters"),
+        (("coupling", "--coarseness", "0.1"), "coarseness = 0.1: expected 1 to 100"),
+        (
+            ("coupling", "--with", "case1"),
+            "with = 'case1': study coupling flies its own controllers, expected study fault",
+        ),
+        (("fault", "--with", "nowhere"), "scenario 'nowhere': expected a"),
+        (
+            ("fault", "--with", "none.toml"),
+            "scenario 'none.toml': fault: of nothing, expected one, of elevator_deflection",
+        ),
+    ],
+)
+def test_what_a_study_cannot_fly_is_named(hsv_paper, tmp_path, words, message):
+    (tmp_path / "none.toml").write_text('extends = "case1"\nfault = []\n')
+    ran = hsv_paper("sensitivity", *words)
+    assert ran.code == 2
+    assert ran.error.startswith(message)
+
+
+@pytest.mark.parametrize(
+    "words", [("figures", "--only", "9"), ("sensitivity", "coupling"), ("claims",)], ids=lambda w: w[0]
+)
+@pytest.mark.parametrize("folder", ["file", "file/below", "/proc/absent"])
+def test_flights_that_could_not_be_kept_are_refused_before_they_are_flown(hsv_paper, tmp_path, words, folder):
+    (tmp_path / "file").touch()
+    ran = hsv_paper(*words, "--flights", folder)
+    assert ran.code == 2
+    assert ran.error == f"flights = {folder!r}: cannot be written, expected a folder or the name of a new one"
+
+
+@pytest.mark.parametrize("words", [("figures", "--only", "4"), ("sensitivity", "coupling")], ids=lambda w: w[0])
+@pytest.mark.parametrize("folder", ["file", "/proc/absent"])
+def test_a_folder_that_could_not_be_made_is_refused_before_anything_is_drawn(hsv_paper, tmp_path, words, folder):
+    (tmp_path / "file").touch()
+    ran = hsv_paper(*words, "--out", folder)
+    assert ran.code == 2
+    assert ran.error == f"out = {folder!r}: cannot be written, expected a folder or the name of a new one"
+
+
+@pytest.mark.parametrize("page", ["absent/claims.md", "/proc/claims.md", "."])
+def test_claims_refuse_a_page_that_could_not_be_written_before_they_fly(hsv_paper, page):
+    ran = hsv_paper("claims", "--out", page)
+    assert ran.code == 2
+    assert ran.error == f"out = {page!r}: cannot be written, expected a file in an existing folder"
+
+
+@pytest.fixture
+def printed(monkeypatch, capsys):
+    monkeypatch.setattr(console, "width", 80)
+    judged = {group: [Judged(claim, FINDING) for claim in claims] for group, claims in GROUPS.items()}
+
+    def lines(verbose):
+        print_claims(judged, RANKS, verbose, UnitSystem.paper)
+        return [line.rstrip() for line in capsys.readouterr().out.splitlines()]
+
+    return lines
+
+
+def test_every_claim_is_one_whole_line_of_a_terminal(printed):
+    lines = printed(verbose=False)
+    for claims in GROUPS.values():
+        for claim in claims:
+            [line] = [line for line in lines if line.startswith(f"{claim.name} ")]
+            assert line.endswith("holds under conditions")
+    assert f"Of {sum(map(len, GROUPS.values()))} claims, 0 hold, " in " ".join(lines)
+    assert max(map(len, lines)) <= 80
+
+
+def test_details_are_printed_when_asked_for(printed):
+    text = " ".join(" ".join(printed(verbose=True)).replace("▌", "").split())
+    assert "It is so." in text
+    assert all(" ".join(claim.quote.split()) in text for claims in GROUPS.values() for claim in claims)
+
+
+def test_limits_are_a_command_of_their_own(hsv_paper):
+    ran = hsv_paper("sensitivity", "limits")
+    assert ran.error.startswith("sensitivity = 'limits': expected one of coupling, ")
+    assert hsv_paper("limits", "--coarseness", "0.1").error == "coarseness = 0.1: expected 1 to 100"
