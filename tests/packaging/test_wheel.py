@@ -101,6 +101,8 @@ def test_both_distributions_hold_every_file_of_the_package(sdist: Path, wheel: P
     assert expected <= in_sdist
     assert {"setup.py", "pyproject.toml", "package.xml", "resource/hsv"} <= in_sdist
     in_wheel = set(ZipFile(wheel).namelist())
+    # The paper's claims and figures are in hsv_paper.
+    assert not [name for name in in_wheel if "claims" in name or "figures" in name or name.startswith("hsv_paper")]
     assert {name for name in in_wheel if name.startswith("hsv/")} == expected | {"hsv/core/_core.abi3.so"}
     assert wheel.stem.split("-")[2:4] == ["cp311", "abi3"]  # one for every Python from 3.11 on
 

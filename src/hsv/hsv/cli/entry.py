@@ -39,7 +39,7 @@ MOVED = {
     "equipment": "is called hsv list equipment now",
     "figures": "is called hsv-paper figures now",
     "claims": "is called hsv-paper claims now",
-    "study": "is called hsv-paper sensitivity now",
+    "study": "is called hsv-paper sensitivity now, and its limits hsv-paper limits",
     "cluster": "is gone: start Dask workers on other hosts and use --scheduler, see docs/montecarlo.md",
 }
 """New names of commands that were renamed."""

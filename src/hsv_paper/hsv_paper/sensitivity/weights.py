@@ -95,9 +95,8 @@ def varied(law: str, group: Group, factor: float) -> ControlDesign:
         return replace(flown, feedback_gain=gain, tube=None)
     changed = inputs.model_copy(update={"nominal": group.times(inputs.nominal, factor)})
     problem = nominal_problem(changed, flown.polytope, changed.nominal.input_bound.array())
-    scales = {"nominal_state_scale": problem.state_scale, "nominal_input_scale": problem.input_scale}
-    family = nominal_family(changed, problem, lambda *_: None)
-    return with_family(replace(flown, tube=None, **scales), problem, family)
+    scaled = replace(flown, tube=None, nominal_state_scale=problem.state_scale, nominal_input_scale=problem.input_scale)
+    return with_family(scaled, problem, nominal_family(changed, problem, lambda *_: None))
 
 
 def run(scope: Scope) -> Outcome:
