@@ -103,7 +103,7 @@ def test_the_report_plots_measured_less_true_effector_and_wind(equipped):
     assert np.isnan(effector[-1]) and np.isfinite(effector[:-1]).all()
     assert not any(curve.kind == "effector" for curve in curves["fuel_equivalence_ratio"])
     np.testing.assert_allclose(curves["wind_up"][0].y[:-1], 0.9144)
-    assert {panel.group for panel in run.curves.panels} >= {"sensors", "air"}
+    assert {panel.group for panel in run.curves.panels.values()} >= {"sensors", "air"}
     page = report_page([run])
     assert "filtered, effector" in page and 'id="plot-measurement_error_pitch_rate"' in page and 'id="air"' in page
 

@@ -87,6 +87,7 @@ def report_page(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.m
         happened=happened(runs, differences),
         verdict=verdict,
         picture=_picture(runs),
+        effectors=any(curve.kind is Kind.effector for run in runs for c in run.curves.curves.values() for curve in c),
         equal=[found[0].panel.title for found in differences if not any(d.largest for d in found)],
         criteria=CRITERIA,
         metrics=_grouped(runs),
