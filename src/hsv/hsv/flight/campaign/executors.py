@@ -9,6 +9,7 @@ import os
 import pickle
 import socket
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures import Executor as Pool
@@ -72,7 +73,7 @@ class Executor:
             yield batch, job(text, batch)
 
 
-class _PoolExecutor(Executor):
+class _PoolExecutor(Executor, ABC):
     """Flies the batches in a pool of workers, and reports when no result comes."""
 
     def __init__(self, notice: Notice) -> None:
@@ -129,8 +130,9 @@ class _PoolExecutor(Executor):
                 self._notice(f"waiting for {first}{f' and {others} more' if others else ''}{obstacle}")
         return done
 
+    @abstractmethod
     def _submit(self, job: Job, text: str, batch: int) -> Future[bytes]:
-        raise NotImplementedError
+        """Start the flight of a batch."""
 
     def _result(self, future: Future[bytes]) -> bytes:
         return future.result()
