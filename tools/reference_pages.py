@@ -6,6 +6,7 @@ import pkgutil
 import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -20,8 +21,13 @@ def commands() -> str:
     Raises:
         subprocess.CalledProcessError: If the command line cannot be imported.
     """
-    words = ["-m", "typer", "hsv.cli.entry", "utils", "docs", "--name", "hsv"]
-    text = subprocess.run([sys.executable, *words], check=True, capture_output=True, text=True).stdout
+    with tempfile.TemporaryDirectory() as folder:
+        program = Path(folder, "command_line.py")
+        program.write_text(
+            "from hsv.cli.entry import COMMANDS\nfrom hsv.cli.main import application\n\napp = application(COMMANDS)\n"
+        )
+        words = ["-m", "typer", str(program), "utils", "docs", "--name", "hsv"]
+        text = subprocess.run([sys.executable, *words], check=True, capture_output=True, text=True).stdout
     # Lists of commands have the beginnings of sentences alone, which stand whole under each command.
     text = re.sub(r"^\*\*Commands\*\*:\n\n(\* .*\n)+\n?", "", text, flags=re.MULTILINE)
     return re.sub(r"^# `hsv`$", "## `hsv`", text, flags=re.MULTILINE)

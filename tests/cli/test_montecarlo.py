@@ -13,7 +13,9 @@ def campaign(hsv, tmp_path):
     short_scenario(tmp_path, duration=3, fault=2)
 
     def fly(*words):
-        return hsv("montecarlo", "short.toml", "--samples", "12", "--workers", "1", *words)
+        defaults = {"--samples": "12", "--workers": "1"}
+        given = [word for option in defaults if option not in words for word in (option, defaults[option])]
+        return hsv("montecarlo", "short.toml", *given, *words)
 
     return fly
 

@@ -82,6 +82,8 @@ def test_bad_settings_end_with_one_line(hsv, tmp_path, words, expected):
     short_scenario(tmp_path, duration=6, fault=2)
     (tmp_path / "sub").mkdir()
     short_scenario(tmp_path / "sub", duration=6, fault=2)
-    refused = hsv("resilience", "--controllers", "short.toml", "--faults", "elevator_loss", *words)
+    defaults = {"--controllers": "short.toml", "--faults": "elevator_loss"}
+    given = [word for option in defaults if option not in words for word in (option, defaults[option])]
+    refused = hsv("resilience", *given, *words)
     assert refused.code == 2 and expected in refused.error
     assert not list(tmp_path.glob("*/cases"))

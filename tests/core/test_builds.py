@@ -39,7 +39,7 @@ def build(folder, compiler="", flags=""):
 def fly(library, first, stride, **environment):
     """Fly golden flights three ways with the core of a build; return the instructions that it used."""
     program = PROGRAM.format(
-        tests=str(ROOT / "tests" / "simulation"),
+        tests=str(ROOT / "tests" / "flight"),
         support=str(ROOT / "tests" / "support"),
         folder=str(library),
         first=first,

@@ -34,7 +34,7 @@ def test_it_imports_nothing_that_an_installation_without_the_bench_lacks() -> No
 
 
 def test_it_has_an_argument_for_every_option_of_hsv_run() -> None:
-    of_the_terminal = {"verbose", "json"}
+    of_the_terminal = {"every", "json", "strict", "verbose"}
     options = set(inspect.signature(run).parameters) - of_the_terminal
     assert arguments() >= options
     assert set(inspect.signature(prepare).parameters) - {"folder", "json"} <= options
