@@ -157,7 +157,7 @@ def package_key(folder: Path, identity: str, pins: str) -> str:
 
 
 def build(route: str, names: list[str], env: dict[str, str]) -> Step:
-    """Start colcon on some packages, from nothing: what was made of files that are gone would stay."""
+    """Start colcon on packages after removing their builds, which may hold products of deleted files."""
     for path in (base / name for base in (BUILD, INSTALL) for name in names):
         shutil.rmtree(path, ignore_errors=True)
     # The number of jobs is set here, because colcon's own choice also limits by load and crawls on a busy machine.

@@ -92,7 +92,7 @@ INEXACT_NAMES = {"sum", "pow", "fsum"}
 """Functions of Python; sum() of numbers is compensated from 3.12 on."""
 
 EXEMPT = {
-    "flight/metrics.py": "what is said of a flight, after it",
+    "flight/metrics.py": "metrics are computed after the flight",
     "flight/fingerprint.py": "a digest",
     "control/design.py": "eigenvalues decide whether a design is refused, not how it flies",
     "control/coverage.py": "what is said of a flight; no input depends on it",

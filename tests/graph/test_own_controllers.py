@@ -1,4 +1,4 @@
-"""Controllers of one's own over DDS: a class, a function in C, and a node that knows the messages alone."""
+"""Custom controllers over DDS: a class, a function in C, and a node that knows only the messages."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from hsv.base.units import UnitSystem
 
 BagArgument = Annotated[Path, Argument(help="Bag directory, or its .mcap file.")]
 DesignArgument = Annotated[
-    str, Argument(help="Design: a parameter file with its certificate beside it, or a shipped name.")
+    str, Argument(help="Design: a parameter file with its certificate next to it, or a shipped name.")
 ]
 ScenarioArgument = Annotated[str, Argument(help="Name of a shipped scenario, or path of a TOML file.")]
 

@@ -117,7 +117,7 @@ def rounded_matrix(matrix: np.ndarray) -> np.ndarray:
 def outward(values: np.ndarray) -> np.ndarray:
     """Return ``values`` rounded away from zero to :data:`BOUND_DIGITS` significant digits.
 
-    A value that exceeds such a number by less than 1e-12 of itself becomes that number.
+    A value that exceeds such a number by a relative 1e-12 or less becomes that number.
     """
     values = np.asarray(values, float)
     size = np.where(values == 0.0, 1.0, np.abs(values))

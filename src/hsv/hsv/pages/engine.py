@@ -136,7 +136,7 @@ def render(template: str, *, plots: Sequence[Plot] = (), numbers: Numbers | None
 
 
 def _asset(name: str) -> Markup:
-    """Return a style or script of the template folder as it is."""
+    """Return the text of a style sheet or script of the template folder."""
     return Markup(files("hsv.pages").joinpath("template", name).read_text(encoding="utf-8"))
 
 
