@@ -47,7 +47,6 @@ setup(
             "core/*.[ch]",
             "designs/*",
             "pages/template/*",
-            "pages/layouts/*",
             "pages/plotly/*",
         ]
     },

@@ -21,7 +21,8 @@ from hsv.bags.replay.engine import rerun
 from hsv.bags.roles import naming, roles
 from hsv.base.errors import ParameterError, RecordingError
 from hsv.model.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC
-from hsv.pages.viewers import LAYOUTS, layout_for
+from hsv.pages.layouts import LAYOUTS
+from hsv.pages.viewers import layout_for
 
 
 @pytest.fixture(scope="module")
@@ -81,18 +82,17 @@ def test_topics_of_two_graphs_are_refused(flown: Path, tmp_path: Path) -> None:
     assert roles(shadow, {}, "one.mcap") == {role: resolved(role) for role in TOPICS}
 
 
-@pytest.mark.parametrize("layout", ["foxglove.json", "plotjuggler.xml"])
+@pytest.mark.parametrize("layout", LAYOUTS)
 def test_layouts_are_made_for_the_names_of_a_bag(flown: Path, tmp_path: Path, layout: str) -> None:
-    assert layout_for(Bag(flown), layout) == LAYOUTS / layout
     bag = Bag(moved(flown, tmp_path / "moved", lambda name: f"/lab/veh1{name}"))
     made = layout_for(bag, layout)
     assert made.parent == bag.folder
-    text, shipped = made.read_text(encoding="utf-8"), (LAYOUTS / layout).read_text(encoding="utf-8")
-    assert text.replace("/lab/veh1", "") == shipped
+    text, usual = made.read_text(encoding="utf-8"), LAYOUTS[layout](resolved)
+    assert text.replace("/lab/veh1", "") == usual
     # Topics of pictures are called the same in every bag.
     for added in (OVERVIEW_TOPIC, SCENE_TOPIC, TRANSFORMS_TOPIC, resolved(MARKERS)):
-        text, shipped = text.replace(added, ""), shipped.replace(added, "")
-    assert text.count("/lab/veh1/hsv/") == shipped.count("/hsv/") > 30 and '"/hsv/' not in text
+        text, usual = text.replace(added, ""), usual.replace(added, "")
+    assert text.count("/lab/veh1/hsv/") == usual.count("/hsv/") > 30 and '"/hsv/' not in text
 
 
 @pytest.mark.parametrize("text", ["veh1", "/veh1", "/lab/veh_1", "/"])

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 from recorded_flight import message_types, record_flight
 
-from hsv.bags.description import TOPICS
+from hsv.bags.description import TOPICS, resolved
 from hsv.bags.reader import Bag
+from hsv.pages.layouts import foxglove_layout
 from hsv.pages.live.hub import Hub
 from hsv.pages.live.server import PageServer
 
@@ -49,6 +50,6 @@ def hub(decode: Callable[[str, bytes], Any]) -> Hub:
 
 @pytest.fixture
 def server(hub: Hub) -> Iterator[PageServer]:
-    server = PageServer(0, hub)
+    server = PageServer(0, hub, foxglove_layout(resolved))
     yield server
     server.close()

@@ -15,7 +15,7 @@ from hsv.pages.live.server import PageServer
 def serve(request, hub):
     """Return the parameter that a server's port is, and what starts it on one."""
     if request.param == "live.page_port":
-        return request.param, lambda port: PageServer(port, hub)
+        return request.param, lambda port: PageServer(port, hub, "{}")
     return request.param, lambda port: FoxgloveServer(port, {resolved(topic): kind for topic, kind in TOPICS.items()})
 
 

@@ -48,7 +48,9 @@ def test_the_page_is_whole_and_may_ask_its_own_server_only(server):
     assert f"connect-src ws://127.0.0.1:{server.port} ws://localhost:{server.port}" in policy
     assert policy.startswith("default-src 'none'")
     assert server.url.rpartition("#token=")[2] not in page
-    assert get(server, "/etc/passwd") == (404, "path = '/etc/passwd': expected / or /flight\n")
+    status, layout = get(server, "/foxglove.json")
+    assert status == 200 and "/hsv/state.altitude" in layout and json.loads(layout)["layout"]
+    assert get(server, "/etc/passwd") == (404, "path = '/etc/passwd': expected /, /foxglove.json or /flight\n")
 
 
 def test_pages_of_other_places_are_refused(server):

@@ -39,12 +39,12 @@ from hsv.bags.infrastructure_parameters import LIVE_PARAMETERS
 from hsv.bags.messages import stamp_in
 from hsv.graph.settable import SETTABLE, step_in
 from hsv.graph.standstill import Standstill
+from hsv.pages.layouts import foxglove_layout
 from hsv.pages.live.commands import Change, Command, Inject
 from hsv.pages.live.foxglove_server import FoxgloveServer
 from hsv.pages.live.hub import Hub
 from hsv.pages.live.server import Answer, PageServer
 from hsv.pages.panels import INPUTS
-from hsv.pages.viewers import LAYOUTS, VIEWERS
 from hsv_bringup.client import ABSENT_AFTER, SILENT_AFTER
 from hsv_bringup.flow_executor import FlowExecutor
 from hsv_node.main import run_node
@@ -110,7 +110,8 @@ class LiveNode(ProcessNode):
         self.hub = Hub(self._decode, {"title": values["live.title"], "bag": values["live.bag"]})
         names = {self._names[topic]: kind for topic, kind in (TOPICS | OTHER_TOPICS).items()}
         self.foxglove = FoxgloveServer(values["live.port"], names)
-        self.page = PageServer(values["live.page_port"], self.hub)
+        layout = foxglove_layout(lambda topic: self._names.get(topic) or self.resolve_topic_name(topic))
+        self.page = PageServer(values["live.page_port"], self.hub, layout)
         self._run: Run | None = None
         self._plant = ""
         """Full name of the plant's node, once it has answered."""
@@ -124,9 +125,9 @@ class LiveNode(ProcessNode):
             if topic != RUN:
                 self._watch(topic, partial(self._on_other_message, topic))
         self.create_subscription(VehicleState, LAST_STATE, self._on_last_state, WATCHING)
-        layout = LAYOUTS / VIEWERS["foxglove"].layout
+        data = f"ws://127.0.0.1:{self.foxglove.port}"
         print(f"live page: {self.page.url}", flush=True)
-        print(f"live data: ws://127.0.0.1:{self.foxglove.port} (Foxglove, Lichtblick; layout {layout})", flush=True)
+        print(f"live data: {data} (Foxglove, Lichtblick; layout {self.page.layout_url})", flush=True)
 
     def poll(self) -> None:
         """Sample the messages that have arrived, and continue with the commands."""

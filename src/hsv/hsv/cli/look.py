@@ -126,7 +126,8 @@ def view(
         sources = "; ".join(f"{viewer.name}: {viewer.source}" for viewer in tried)
         raise RecordingError(
             f"{mcap}: no viewer is installed, expected one of these ({sources}); "
-            f"or drop the file into a browser at https://app.foxglove.dev, or use: hsv report {bag}"
+            f"or drop the file into a browser at https://app.foxglove.dev and import "
+            f"{layout_for(opened, 'foxglove.json')} there, or use: hsv report {bag}"
         )
     made = layout_for(opened, viewer.layout) if viewer.layout else None
     if viewer.scene:

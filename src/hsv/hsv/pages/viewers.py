@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 
-from hsv.bags.description import DIAGNOSTICS, TOPICS, resolved
 from hsv.bags.reader import Bag
 from hsv.base.errors import RecordingError
-
-LAYOUTS = Path(str(files("hsv.pages").joinpath("layouts")))
-"""Folder of the layouts."""
+from hsv.pages.layouts import LAYOUTS
 
 
 @dataclass(frozen=True)
@@ -41,24 +36,14 @@ class Viewer:
 
 
 def layout_for(bag: Bag, name: str) -> Path:
-    """Return the layout of file name ``name`` for the topics of ``bag``.
-
-    That is the shipped one, or, for a graph in a namespace or with remapped topics, one beside the bag, written now.
+    """Write the layout of file name ``name`` for the topics of ``bag`` beside the bag, and return its path.
 
     Raises:
         RecordingError: It cannot be written.
     """
-    shipped = LAYOUTS / name
-    names = {resolved(role): bag.name_of(role) for role in (*TOPICS, DIAGNOSTICS)}
-    if all(usual == name for usual, name in names.items()):
-        return shipped
-    # What follows a topic in a layout is a field, or the end of the text.
-    pattern = re.compile(rf"(?<=[\">])({'|'.join(map(re.escape, names))})(?=[./\"<])")
     target = bag.folder / f"layout_{name}"
     try:
-        target.write_text(
-            pattern.sub(lambda found: names[found[1]], shipped.read_text(encoding="utf-8")), encoding="utf-8"
-        )
+        target.write_text(LAYOUTS[name](bag.name_of), encoding="utf-8")
     except OSError as error:
         raise RecordingError(f"{target}: the layout cannot be written: {error.strerror}") from None
     return target

@@ -27,6 +27,9 @@ from hsv.pages.live.page import live_page
 SOCKET = "/flight"
 """Path of the WebSocket."""
 
+LAYOUT = "/foxglove.json"
+"""Path of the layout for Foxglove and Lichtblick."""
+
 LONGEST_REQUEST = 10_000
 """Bytes that a page may send at once."""
 
@@ -47,7 +50,8 @@ class PageServer:
         ParameterError: The port is in use.
     """
 
-    def __init__(self, port: int, hub: Hub) -> None:
+    def __init__(self, port: int, hub: Hub, layout: str) -> None:
+        """Listen on ``port``, 0 for a free one; ``layout`` is that for Foxglove, which is served beside the page."""
         self._hub = hub
         self._token = secrets.token_urlsafe(16)
         self.commands: SimpleQueue[tuple[Command, Answer]] = SimpleQueue()
@@ -62,7 +66,11 @@ class PageServer:
                 f"live.page_port = {port}: {reason(error).lower()}, expected a free port of this machine"
             ) from None
         self.port = int(self._server.sockets[0].getsockname()[1])
-        self._page = live_page(hub, self.port).encode()
+        self._documents = {
+            "/": ("text/html; charset=utf-8", live_page(hub, self.port).encode()),
+            LAYOUT: ("application/json", layout.encode()),
+        }
+        """Type and bytes of what is served, by path."""
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
 
@@ -70,6 +78,11 @@ class PageServer:
     def url(self) -> str:
         """Address of the page, with the token for commands in the fragment, which browsers do not send."""
         return f"http://{HOST}:{self.port}/#token={self._token}"
+
+    @property
+    def layout_url(self) -> str:
+        """Address of the layout for Foxglove and Lichtblick."""
+        return f"http://{HOST}:{self.port}{LAYOUT}"
 
     @property
     def watched(self) -> bool:
@@ -125,7 +138,7 @@ class PageServer:
         )
 
     def _respond(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer requests for the page, and refuse pages of other origins."""
+        """Answer requests for the page and the layout, and refuse pages of other origins."""
         origin, allowed = request.headers.get("Origin"), origins(self.port)
         socket = request.path == SOCKET and "Upgrade" in request.headers
         if origin not in allowed and (origin is not None or socket):
@@ -133,13 +146,14 @@ class PageServer:
             return connection.respond(HTTPStatus.FORBIDDEN, f"Origin: {said}, expected {' or '.join(allowed)}\n")
         if socket:
             return None
-        if request.path != "/":
-            return connection.respond(HTTPStatus.NOT_FOUND, f"path = {request.path!r}: expected / or {SOCKET}\n")
+        if request.path not in self._documents:
+            known = f"{', '.join(self._documents)} or {SOCKET}"
+            return connection.respond(HTTPStatus.NOT_FOUND, f"path = {request.path!r}: expected {known}\n")
         response = connection.respond(HTTPStatus.OK, "")
-        response.body = self._page
+        kind, response.body = self._documents[request.path]
         del response.headers["Content-Type"], response.headers["Content-Length"]
-        response.headers["Content-Type"] = "text/html; charset=utf-8"
-        response.headers["Content-Length"] = str(len(self._page))
+        response.headers["Content-Type"] = kind
+        response.headers["Content-Length"] = str(len(response.body))
         response.headers["Cache-Control"] = "no-store"
         return response
 
