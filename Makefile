@@ -74,17 +74,16 @@ lint: setup ## set up, then check style, types and the direction of imports
 # Versions move only if named: make locks ARGS="--upgrade-package scipy"; --upgrade moves all, those of ROS too.
 LOCK := .venv/bin/uv pip compile --universal --system-certs --quiet --no-annotate --custom-compile-command "make locks"
 locks: setup ## set up, then write the exact versions of all requirements to constraints.txt and constraints-jazzy.txt
-	@$(LOCK) --python-version 3.11 requirements{,-ros,-test,-viewers,-bench,-docs}.txt --output-file constraints.txt $(ARGS)
-	@$(LOCK) --python-version 3.12 requirements{,-jazzy,-test,-viewers,-bench,-docs}.txt --output-file constraints-jazzy.txt $(ARGS)
+	@$(LOCK) --python-version 3.11 requirements{,-ros,-test,-viewers,-docs}.txt --output-file constraints.txt $(ARGS)
+	@$(LOCK) --python-version 3.12 requirements{,-jazzy,-test,-viewers,-docs}.txt --output-file constraints-jazzy.txt $(ARGS)
 
 references: lint ## run all tests, then fly the reference bags of bags/reference anew: all or none
 	@$(PYTEST) -n auto -m "not (graph or reference or $(NOT_IN_TEST))" && \
 	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -m "graph and not (reference or long)" && \
 	python3 tools/references.py
 
-bench: setup ## set up, then measure this machine; replaces the table in docs/benchmarks.md (ARGS="--scale 0.5")
-	-@$(INSTALL) --requirement requirements-bench.txt
-	@source ./env.sh && exec hsv bench --out docs/benchmarks.md $(ARGS)
+bench: setup ## set up, then measure this machine (ARGS="--scale 0.5")
+	@source ./env.sh && exec hsv bench $(ARGS)
 
 docs: setup ## set up, then build the documentation into docs/_build (open docs/_build/index.html)
 	@$(INSTALL) --requirement requirements-docs.txt

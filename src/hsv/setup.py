@@ -41,7 +41,6 @@ setup(
         "hsv": [
             "py.typed",
             "**/*.toml",
-            "bench/*.c",
             "control/*.c",
             "control/include/*.h",
             "core/*.[ch]",

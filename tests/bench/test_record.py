@@ -1,69 +1,65 @@
-"""A run of the bench held against a recorded one."""
+"""The ratios of the bench, and a run held against a recorded one."""
 
 import json
+import time
 
 import pytest
 
 from hsv.base.errors import QuantityError
-from hsv.bench.figure import Figure
+from hsv.bench.figure import Figure, interleaved
 from hsv.bench.record import as_json, changes, not_measured, read_run
 
 
-def ratio(*ours):
-    return Figure("graph", "ours", "theirs", "s", ours, (1.0,) * len(ours))
+def figure(*ours, theirs=None, name="graph"):
+    return Figure(name, "ours", "theirs", ours, theirs or (1.0,) * len(ours), limit=1.5)
 
 
-def rate(*ours):
-    return Figure("pace", "ours", "", "x real time", ours, bound="least", limit=1.0)
-
-
-def recorded(folder, *figures, **changed):
+def recorded(folder, *figures):
     path = folder / "run.json"
-    path.write_text(json.dumps(as_json({"laps": figures}, {}) | changed))
+    path.write_text(json.dumps(as_json({"laps": figures}, {})))
     return read_run(path)
+
+
+def test_ratios_are_taken_pair_by_pair():
+    measured = figure(2.0, 6.0, 4.0, theirs=(1.0, 2.0, 4.0))
+    assert measured.ratio == 2.0
+    assert measured.spread == pytest.approx((1.2, 2.8))
+
+
+@pytest.mark.parametrize(
+    ("value", "verdict"), [(1.4, "at most 1.5, as promised"), (1.6, "WORSE than the limit, at most 1.5")]
+)
+def test_a_ratio_is_compared_with_its_limit(value, verdict):
+    assert figure(value).verdict == verdict
+
+
+def test_the_two_sides_are_measured_alternately_and_the_first_pair_is_discarded():
+    order = []
+    ours, theirs = interleaved(lambda: order.append("a"), lambda: order.append("b"), 3, time.perf_counter)
+    assert "".join(order) == "ab" * 4
+    assert len(ours) == len(theirs) == 3
 
 
 @pytest.mark.parametrize(
     ("before", "after", "slower"),
     [
-        (ratio(1.0, 1.02), ratio(1.2, 1.22), 1.21 / 1.01 - 1.0),
-        (ratio(1.2, 1.22), ratio(1.0, 1.02), 1.01 / 1.21 - 1.0),
-        (rate(12.0, 12.2), rate(10.0, 10.2), 12.1 / 10.1 - 1.0),
+        (figure(1.0, 1.02), figure(1.2, 1.22), 1.21 / 1.01 - 1.0),
+        (figure(1.2, 1.22), figure(1.0, 1.02), 1.01 / 1.21 - 1.0),
         # Within the resolution, and within the spreads.
-        (ratio(1.0, 1.0), ratio(1.04, 1.04), 0.0),
-        (ratio(0.8, 1.0, 1.3), ratio(1.1, 1.2, 1.4), 0.0),
+        (figure(1.0, 1.0), figure(1.04, 1.04), 0.0),
+        (figure(0.8, 1.0, 1.3), figure(1.1, 1.2, 1.4), 0.0),
     ],
 )
-def test_what_became_slower_or_faster_is_told(tmp_path, before, after, slower):
-    [change] = changes([after], recorded(tmp_path, before))
+def test_a_change_beyond_the_spread_counts(tmp_path, before, after, slower):
+    [change] = changes([after, figure(5.0, name="new")], recorded(tmp_path, before))
     assert change.slower == pytest.approx(slower)
-    assert change.before == before.median
+    assert change.before == before.ratio
 
 
-def test_only_ratios_are_held_against_other_hardware(tmp_path):
-    run = recorded(tmp_path, ratio(1.0), rate(10.0), hardware="another")
-    assert [change.figure.name for change in changes([ratio(2.0), rate(5.0)], run)] == ["graph"]
-
-
-def test_what_was_not_measured_before_is_left_out(tmp_path):
-    assert changes([rate(5.0)], recorded(tmp_path, ratio(1.0))) == []
-
-
-@pytest.mark.parametrize(
-    ("only", "names"), [(None, ["pace"]), (("laps",), ["pace"]), (("laps", "other"), ["pace"]), (("other",), [])]
-)
-def test_what_was_measured_before_only_is_named_where_its_group_was_asked_for(tmp_path, only, names):
-    run = recorded(tmp_path, ratio(1.0), rate(10.0))
-    assert not_measured([ratio(1.0)], run, only) == names
-
-
-def test_a_run_of_an_earlier_version_has_no_groups(tmp_path):
-    old = as_json({"laps": [rate(10.0)]}, {})
-    for figure in old["figures"]:
-        del figure["group"]
-    run = recorded(tmp_path, **old)
-    assert not_measured([], run, None) == ["pace"]
-    assert not_measured([], run, ("laps",)) == []
+@pytest.mark.parametrize(("only", "names"), [(None, ["lost"]), (("laps", "other"), ["lost"]), (("other",), [])])
+def test_a_recorded_figure_that_is_missing_is_named_where_its_group_is_measured(tmp_path, only, names):
+    run = recorded(tmp_path, figure(1.0), figure(1.0, name="lost"))
+    assert not_measured([figure(1.0)], run, only) == names
 
 
 @pytest.mark.parametrize(
@@ -72,10 +68,10 @@ def test_a_run_of_an_earlier_version_has_no_groups(tmp_path):
         (None, "cannot be read"),
         ("{", "Expecting property name"),
         ("[]", "all of it: "),
-        ('{"commit": "a", "hardware": "b", "figures": [{"name": "graph"}]}', "figures.0.spread: Field required"),
+        ('{"commit": "a", "figures": [{"name": "graph", "group": "graph"}]}', "figures.0.spread: Field required"),
     ],
 )
-def test_what_is_no_run_is_refused(tmp_path, text, message):
+def test_a_file_that_is_no_run_is_refused(tmp_path, text, message):
     path = tmp_path / "run.json"
     if text is not None:
         path.write_text(text)

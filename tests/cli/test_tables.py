@@ -51,7 +51,7 @@ SLOW = [
     ("certify", str(DESIGNS / "baseline.yaml")),
     ("certify", str(DESIGNS / "realistic.yaml"), "--density", "1 %", "--units", "paper"),
     ("check", "tube_mpc"),
-    ("bench", "--only", "mcap", "--scale", "0.01"),
+    ("bench", "--only", "in_process", "--scale", "0.01"),
 ]
 
 
@@ -119,7 +119,7 @@ def test_campaigns_do_so_too(hsv, printed, tmp_path) -> None:
 def test_the_steps_of_a_design_and_the_figures_of_a_machine_do_so_too(pair) -> None:
     report = load_subject(DESIGNS / "adjustable.yaml").certificate
     check(*pair(lambda: console.print(_steps(report, UnitSystem.paper))))
-    figure = Figure("name", "what is measured, in a sentence " * 3, "another", "s", (1.0, 1.1), (2.0, 2.1), 3.0)
+    figure = Figure("name", "what is measured, in a sentence " * 3, "another", (1.0, 1.1), (2.0, 2.1), 3.0)
     check(*pair(lambda: _print_figures([figure])))
 
 

@@ -71,8 +71,6 @@ ELSEWHERE = {
     ("docs/airframe.md", "ros2 run hsv_bringup airframe --ros-args -p exaggeration:=20.0 -p rate:=50.0"): (
         "tests/graph/test_airframe.py"
     ),
-    ("docs/benchmarks.md", "hsv bench --only controllers"): "tests/cli/test_bench.py",
-    ("docs/benchmarks.md", "hsv bench --only montecarlo"): "tests/cli/test_bench.py",
     ("docs/benchmarks.md", "hsv bench --json > before.json"): "tests/cli/test_bench.py",
     ("docs/figures/index.md", "hsv-paper figures --out docs/figures"): "tests/hsv_paper/test_figures.py",
     ("docs/installation.md", "$ python3 -m venv venv"): "tests/packaging/test_wheel.py",

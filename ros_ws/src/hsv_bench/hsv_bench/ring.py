@@ -1,7 +1,7 @@
-"""The ring: bare processes that pass messages on as the graph does; ``hsv bench`` starts them.
+"""The bare ring: processes that pass messages on as the graph does and compute nothing; ``hsv bench`` starts them.
 
-A process says ``ready`` when its links stand; the one with the plant starts on a line on standard input and says in the
-end how many seconds the laps took. Standard input closed ends a process.
+A process prints ``ready`` when its links stand. A line on standard input starts the plant, which prints in the end how
+many seconds the laps took. Then all processes wait until they are killed.
 """
 
 from __future__ import annotations
@@ -10,87 +10,106 @@ import argparse
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import rclpy
 from rclpy.experimental import EventsExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
 
 from hsv.bags import description
-from hsv_bench.ring_node import Recorder, RingNode
+from hsv.bags.definitions import definition, type_hash
+from hsv.bags.topic import Qos, Topic
+from hsv.bags.writer import BagWriter
+from hsv_node.middleware import STEP, message_class
 
-LOOPS = ("events", "wait_set", "ordered")
-
-
-def spin_events(nodes: Sequence[RingNode]) -> None:
-    """Let the EventsExecutor of rclpy call."""
-    executor = EventsExecutor()
-    for node in nodes:
-        executor.add_node(node.ros)
-    while not all(node.finished for node in nodes):
-        executor.spin_once(timeout_sec=0.25)
+_FILLED = {
+    description.FILTERED_STATE: {"filter_state": [0.0] * 2},
+    description.TUBE_STATUS: {"error": [0.0] * 7, "tube_centre": [0.0] * 7, "tube_half_width": [0.0] * 7},
+}
+"""Arrays with as many elements as in a flight of Case 1."""
 
 
-def spin_wait_set(nodes: Sequence[RingNode]) -> None:
-    """Wait on a wait set and take, without any executor: the least that rclpy can do between processes."""
-    inputs = [(node, subscription) for node in nodes for subscription in node.inputs]
-    handle = rclpy.get_default_context().handle
-    assert handle is not None
-    with handle:
-        wait_set = rclpy_implementation.WaitSet(len(inputs), 0, 0, 0, 0, 0, handle)
-        while not all(node.finished for node in nodes):
-            wait_set.clear_entities()
-            indices = [wait_set.add_subscription(subscription.handle) for _, subscription in inputs]
-            wait_set.wait(250_000_000)
-            for index, (node, subscription) in zip(indices, inputs, strict=True):
-                if wait_set.is_ready("subscription", index):
-                    _take(node, subscription)
+class RingNode:
+    """A node of the graph without its work: it publishes when all inputs of a step have arrived.
 
+    Args:
+        role: The name of the node in the graph.
+        laps: The number of laps until the node has finished.
+        bag: A new directory; the recorder writes its inputs to it.
+    """
 
-def spin_ordered(nodes: Sequence[RingNode]) -> None:
-    """Take in the order of the data flow: the least that rclpy can do within one process."""
-    while not all(node.finished for node in nodes):
-        for node in nodes:
-            for subscription in node.inputs:
-                _take(node, subscription)
+    def __init__(self, role: str, laps: int, bag: Path) -> None:
+        self.ros = Node(role)
+        self.lap = 0
+        self._laps = laps
+        self._arrived = 0
+        self._role = next(node for node in description.graph() if node.name == role)
+        kinds = {topic: message_class(kind) for topic, kind in description.TOPICS.items()}
+        self._bag = BagWriter(bag) if self._role is description.RECORDER else None
+        self._outputs = [
+            (topic, self.ros.create_publisher(kinds[topic], topic, STEP), kinds[topic](**_FILLED.get(topic, {})))
+            for topic in self._role.publishes
+        ]
+        self._inputs = {}
+        for topic in self._role.subscribes:
+            callback, raw = partial(self._receive, topic), self._bag is not None
+            self._inputs[topic] = self.ros.create_subscription(kinds[topic], topic, callback, STEP, raw=raw)
+            if self._bag:
+                kind = description.TOPICS[topic]
+                self._bag.add_topic(Topic(topic, kind, definition(kind), type_hash(kind), Qos(depth=STEP.depth)))
 
+    def matched(self) -> bool:
+        """Return whether all links of the graph description are connected."""
+        links = [topic for topic, _ in description.links(self._role, description.TUBE_MPC.name, True)]
+        counts = {topic: publisher.get_subscription_count() for topic, publisher, _ in self._outputs}
+        counts |= {topic: subscription.get_publisher_count() for topic, subscription in self._inputs.items()}
+        return all(count >= links.count(topic) for topic, count in counts.items())
 
-def _take(node: RingNode, subscription: object) -> None:
-    taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)  # type: ignore[attr-defined]
-    if taken is not None:
-        subscription.callback(taken[0])  # type: ignore[attr-defined]
+    def publish(self) -> None:
+        """Publish the messages of this node for a step."""
+        for topic, publisher, message in self._outputs:
+            if topic != description.CLOCK:
+                message.step = self.lap
+            publisher.publish(message)
+
+    def finished(self) -> bool:
+        """Return whether all laps are done."""
+        return self.lap == self._laps
+
+    def _receive(self, topic: str, message: Any) -> None:
+        """Record an input or count it; publish when all inputs of a step have arrived."""
+        if self._bag:
+            self._bag.write(topic, self.lap, message)
+        self._arrived = (self._arrived + 1) % len(self._inputs)
+        if self._arrived == 0:
+            self.lap += 1
+            if self._role is not description.PLANT or not self.finished():
+                self.publish()
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run one process of the ring, or all of it in one."""
+    """Run one process of the ring."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("role", help="a node of the graph, or all")
+    parser.add_argument("role", help="a node of the graph")
     parser.add_argument("laps", type=int)
-    parser.add_argument("loop", choices=LOOPS)
     parser.add_argument("bag", type=Path, help="bag of the recorder, a new directory")
     arguments = parser.parse_args(args)
-    names = [node.name for node in description.graph()]
-    # In the order of the data flow, so that a loop that takes in order takes once a lap.
-    roles = [*names[1:], names[0]] if arguments.role == "all" else [arguments.role]
     rclpy.init(args=[])
-    try:
-        nodes = [
-            Recorder(arguments.laps, arguments.bag) if role == names[0] else RingNode(role, arguments.laps)
-            for role in roles
-        ]
-        while not all(node.matched() for node in nodes):
-            time.sleep(0.02)
-        print("ready", flush=True)
+    node = RingNode(arguments.role, arguments.laps, arguments.bag)
+    executor = EventsExecutor()
+    executor.add_node(node.ros)
+    while not node.matched():
+        time.sleep(0.02)
+    print("ready", flush=True)
+    if arguments.role == description.PLANT.name:
         sys.stdin.readline()
         started = time.perf_counter()
-        for node in nodes:
-            if node.ros.get_name() == description.PLANT.name:
-                node.publish()
-        {"events": spin_events, "wait_set": spin_wait_set, "ordered": spin_ordered}[arguments.loop](nodes)
+        node.publish()
+    while not node.finished():
+        executor.spin_once(timeout_sec=0.25)
+    if arguments.role == description.PLANT.name:
         print(time.perf_counter() - started, flush=True)
-        for node in nodes:
-            node.close()
-        sys.stdin.readline()
-    finally:
-        rclpy.try_shutdown()
+    sys.stdin.readline()
     return 0

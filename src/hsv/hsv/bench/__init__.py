@@ -1,1 +1,1 @@
-"""Benchmarks: the bench is compared with the same work done by other means, timed in the same run."""
+"""Benchmarks: the library and the graph against the same work done by other means, timed in the same run."""

@@ -1,4 +1,4 @@
-"""A figure of the bench: two sides measured in turn, their ratio, and what it is held against."""
+"""A figure of the bench: two sides of the same work, measured alternately, and their ratio."""
 
 from __future__ import annotations
 
@@ -11,60 +11,32 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Figure:
-    """A measured figure and what it is compared with, in ``unit``; without a comparison, ``theirs`` is empty."""
+    """A measured ratio: the times (s) of both sides, pair by pair, and the largest ratio that is promised."""
 
     name: str
     what: str
     against: str
-    unit: str
     ours: tuple[float, ...]
-    theirs: tuple[float, ...] = ()
-    bound: str = ""
-    """``"most"`` or ``"least"``: which side of the limit is good, where ``"least"`` is for what is better if larger;
-    without a limit nothing is promised."""
-    limit: float | None = None
-    goal: float | None = None
+    theirs: tuple[float, ...]
+    limit: float
     note: str = ""
 
     @property
-    def ratios(self) -> np.ndarray:
-        """Ours over theirs, pair by pair; ours alone where there is no other side."""
-        return np.array(self.ours) / np.array(self.theirs) if self.theirs else np.array(self.ours)
+    def ratio(self) -> float:
+        """Median of the ratios of the pairs."""
+        return float(np.median(np.divide(self.ours, self.theirs)))
 
     @property
-    def median(self) -> float:
-        """Median of the ratios."""
-        return float(np.median(self.ratios))
-
-    @property
-    def percentiles(self) -> tuple[float, float]:
-        """10th and 90th percentile of the ratios."""
-        low, high = np.percentile(self.ratios, (10.0, 90.0))
+    def spread(self) -> tuple[float, float]:
+        """10th and 90th percentile of the ratios of the pairs."""
+        low, high = np.percentile(np.divide(self.ours, self.theirs), (10.0, 90.0))
         return float(low), float(high)
 
     @property
-    def is_rate(self) -> bool:
-        """Whether more is better."""
-        return self.bound == "least"
-
-    @property
     def verdict(self) -> str:
-        """Comparison of the median with limit and goal, in words; empty if nothing is promised."""
-        if self.limit is None:
-            return ""
-        sign = -1.0 if self.is_rate else 1.0
-        limit = self._written(self.limit)
-        if sign * self.median > sign * self.limit:
-            return f"WORSE than the limit, {limit}"
-        if self.goal is None:
-            return f"{limit}, as promised"
-        goal = self._written(self.goal)
-        if sign * self.median > sign * self.goal:
-            return f"{limit}, as promised; short of the goal, {goal}"
-        return f"{goal}, which is the goal"
-
-    def _written(self, value: float) -> str:
-        return f"at {self.bound} {value:g}{'' if self.theirs else f' {self.unit}'}"
+        """Comparison of the ratio with the limit, in words."""
+        limit = f"at most {self.limit:g}"
+        return f"{limit}, as promised" if self.ratio <= self.limit else f"WORSE than the limit, {limit}"
 
 
 def interleaved(
@@ -73,16 +45,23 @@ def interleaved(
     repeats: int,
     clock: Callable[[], float] = time.thread_time,
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the times (s) of both sides, measured in turn after one run of each that is not counted.
+    """Return the times (s) of both sides, measured alternately after one discarded run of each.
 
-    The processor time of the thread by default: what other programs take does not count.
+    The default clock is the processor time of the thread, which other programs influence little.
     """
-    times: tuple[list[float], list[float]] = [], []
-    for job in (ours, theirs):
-        job()
-    for _ in range(repeats):
-        for job, taken in zip((ours, theirs), times, strict=True):
+    times: list[list[float]] = []
+    for _ in range(repeats + 1):
+        pair = []
+        for job in (ours, theirs):
             started = clock()
             job()
-            taken.append(clock() - started)
-    return tuple(times[0]), tuple(times[1])
+            pair.append(clock() - started)
+        times.append(pair)
+    first, second = zip(*times[1:], strict=True)
+    return first, second
+
+
+def readable(seconds: float) -> str:
+    """Return a time with three digits, in s, ms or us."""
+    scale, unit = (1.0, "s") if seconds >= 1.0 else (1e3, "ms") if seconds >= 1e-3 else (1e6, "us")
+    return f"{scale * seconds:.3g} {unit}"

@@ -1,9 +1,11 @@
-"""Runs of the bench as JSON, and what became slower or faster from one to another."""
+"""Runs of the bench as JSON, and the changes from a recorded run to another one."""
 
 from __future__ import annotations
 
+import os
+import platform
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,29 +14,25 @@ import pydantic
 from hsv.base.errors import DocumentError, QuantityError
 from hsv.base.files import parse_json, read_text
 from hsv.bench.figure import Figure
-from hsv.bench.machine import hardware, machine
 from hsv.graph.preparation import commit
 
 RESOLUTION = 0.05
-"""Relative change that is none: what the same commit shows from run to run on an idle machine."""
+"""Largest relative change that the same commit shows from run to run on an idle machine."""
 
 
 class RecordedFigure(pydantic.BaseModel):
     """Data of a figure in a recorded run that are needed for a comparison."""
 
     name: str
-    group: str = ""
-    """What ``--only`` calls the figures measured together; empty in runs of earlier versions."""
+    group: str
     spread: tuple[float, float]
-    ratio: float | None = None
-    value: float | None = None
+    ratio: float = pydantic.Field(gt=0.0)
 
 
 class RecordedRun(pydantic.BaseModel):
     """A run of the bench as ``hsv bench --json`` prints it."""
 
     commit: str
-    hardware: str
     figures: list[RecordedFigure]
 
 
@@ -48,17 +46,26 @@ class Change:
 
 
 def as_json(measured: Mapping[str, Sequence[Figure]], skipped: Mapping[str, str]) -> dict[str, Any]:
-    """Return a run for :func:`read_run`: commit, machine, figures with all samples, what was not measured and why.
+    """Return a run for :func:`read_run`: commit, machine, figures with all samples, and the groups not measured.
 
     Args:
         measured: Figures by their group.
-        skipped: Why groups were not measured.
+        skipped: The reasons why groups were not measured.
     """
     return {
         "commit": commit(),
-        "hardware": hardware(),
         "machine": machine(),
-        "figures": [_as_json(figure, group) for group, figures in measured.items() for figure in figures],
+        "figures": [
+            {
+                **asdict(figure),
+                "group": group,
+                "ratio": figure.ratio,
+                "spread": figure.spread,
+                "verdict": figure.verdict,
+            }
+            for group, figures in measured.items()
+            for figure in figures
+        ],
         "skipped": dict(skipped),
     }
 
@@ -81,25 +88,17 @@ def read_run(path: Path) -> RecordedRun:
 
 
 def changes(figures: Sequence[Figure], run: RecordedRun) -> list[Change]:
-    """Return the changes of figures since a recorded run, for those that can be compared.
+    """Return the changes of figures since a recorded run, for those that the run has.
 
-    Ratios of two sides hold on any machine; a figure of one side alone is compared on the same hardware only. A change
-    counts as one where it is more than :data:`RESOLUTION` and the percentiles do not overlap; else it is zero.
+    A change counts where it is more than :data:`RESOLUTION` and the percentiles do not overlap; else it is zero.
     """
     before = {figure.name: figure for figure in run.figures}
     found = []
     for figure in figures:
-        old = before.get(figure.name)
-        if old is None or not (figure.theirs or run.hardware == hardware()):
-            continue
-        value = old.ratio if figure.theirs else old.value
-        if value is None or not value > 0.0:
-            continue
-        apart = figure.percentiles[0] > old.spread[1] or figure.percentiles[1] < old.spread[0]
-        # Of a rate the smaller number is the slower one.
-        relation = value / figure.median if figure.is_rate else figure.median / value
-        counts = apart and abs(relation - 1.0) > RESOLUTION
-        found.append(Change(figure, value, relation - 1.0 if counts else 0.0))
+        if old := before.get(figure.name):
+            slower = figure.ratio / old.ratio - 1.0
+            apart = figure.spread[0] > old.spread[1] or figure.spread[1] < old.spread[0]
+            found.append(Change(figure, old.ratio, slower if apart and abs(slower) > RESOLUTION else 0.0))
     return found
 
 
@@ -109,20 +108,10 @@ def not_measured(figures: Sequence[Figure], run: RecordedRun, only: Collection[s
     return [old.name for old in run.figures if old.name not in names and (not only or old.group in only)]
 
 
-def _as_json(figure: Figure, group: str) -> dict[str, Any]:
-    return {
-        "name": figure.name,
-        "group": group,
-        "what": figure.what,
-        "against": figure.against or None,
-        "unit": figure.unit,
-        "ours": list(figure.ours),
-        "theirs": list(figure.theirs),
-        "ratio" if figure.theirs else "value": figure.median,
-        "spread": figure.percentiles,
-        "bound": figure.bound or None,
-        "limit": figure.limit,
-        "goal": figure.goal,
-        "verdict": figure.verdict or None,
-        "note": figure.note or None,
-    }
+def machine() -> str:
+    """Return processor, cores, system, Python and the load of the machine, in one line."""
+    info = Path("/proc/cpuinfo").read_text().splitlines()
+    models = [line.partition(": ")[2] for line in info if line.startswith("model name")]
+    processor = models[0] if models else platform.machine()
+    system = f"{platform.system()}, Python {platform.python_version()}"
+    return f"{processor}, {os.cpu_count()} cores, {system}, load average {os.getloadavg()[0]:.1f}"

@@ -16,7 +16,6 @@ from hsv.base.errors import HsvError, ParameterError, QuantityError, RunError, d
 from hsv.base.units import UnitSystem, in_system, significant
 from hsv.cli.options import JsonOption, ListJsonOption, UnitsOption
 from hsv.cli.output import (
-    check_target,
     console,
     errors,
     folded,
@@ -259,7 +258,6 @@ def check(
 def bench(
     only: Annotated[list[str] | None, Option(help="Measure only this group; can be repeated.")] = None,
     scale: Annotated[float, Option(help="Factor on the number of repetitions.")] = 1.0,
-    out: Annotated[Path | None, Option(help="Page whose table to replace.")] = None,
     compare: Annotated[Path | None, Option(help="Report changes since this run, saved with --json > FILE.")] = None,
     json: JsonOption = False,
 ) -> None:
@@ -267,21 +265,13 @@ def bench(
 
     The exit code is 1 if a group of --only could not be measured, and with --compare if anything became slower.
 
-    Example: hsv bench --only in_process --only mcap
+    Example: hsv bench --only in_process --only startup
     """
-    from hsv.bench.machine import busy, machine
-    from hsv.bench.page import Page
+    from hsv.bench.measure import groups
     from hsv.bench.record import as_json, changes, not_measured, read_run
-    from hsv.bench.suite import groups
 
     if not 0.0 < scale <= 100.0:
         raise QuantityError(f"scale = {scale}: expected above 0, at most 100")
-    if out and only:
-        raise QuantityError(f"out = {str(out)!r}: expected no --only with it, the page has the table of a complete run")
-    page = None
-    if out:
-        check_target(out, "out")
-        page = Page(out)
     recorded = read_run(compare) if compare else None
     available = groups(scale)
     for name in only or ():
@@ -290,9 +280,6 @@ def bench(
                 f"only = {name!r}: expected one of {', '.join(available)}{did_you_mean(name, available)}"
             )
     chosen = [name for name in available if not only or name in only]
-    measured_on = machine()
-    if warning := busy():
-        errors.print(warning, style="yellow", soft_wrap=True)
     measured: dict[str, list[Figure]] = {}
     skipped: dict[str, str] = {}
     with stages() as progress:
@@ -303,9 +290,6 @@ def bench(
             except RunError as error:
                 # Without a compiler or a built workspace, the rest can still be measured.
                 skipped[name] = str(error)
-                continue
-            if not measured[name]:
-                skipped[name] = "not installed"
     figures = [figure for found in measured.values() for figure in found]
     since = changes(figures, recorded) if recorded else []
     absent = not_measured(figures, recorded, only) if recorded else []
@@ -320,8 +304,6 @@ def bench(
                 errors.print(f"{name}: not measured: {reason}", soft_wrap=True)
         if recorded:
             _print_changes(since, recorded.commit, len(figures), absent)
-    if page:
-        page.write(measured_on, figures, skipped)
     if only and skipped:
         raise RunError("; ".join(f"only = {name!r}: not measured: {reason}" for name, reason in skipped.items()))
     if any(change.slower > 0.0 for change in since):
@@ -329,16 +311,17 @@ def bench(
 
 
 def _print_figures(figures: list[Figure]) -> None:
-    """Print one paragraph per figure: the table of all figures, as in the documentation, is wider than a terminal."""
-    from hsv.bench.page import cells
+    """Print one paragraph per figure: a table of all figures is wider than a terminal."""
+    from hsv.bench.figure import readable
 
     for figure in figures:
-        what, against, ours, theirs, ratio, spread, promise = cells(figure)
-        compared = f" against {theirs} of {against}: ratio {ratio}" if theirs else ""
-        say(Text(folded(what), "bold"))
-        say(folded(f"{ours}{compared}{f' ({spread})' if spread else ''}", 4, first=4))
-        if promise:
-            say(Text(folded(promise, 4, first=4), "bold red" if "WORSE" in promise else ""))
+        ours, theirs = (readable(sorted(times)[len(times) // 2]) for times in (figure.ours, figure.theirs))
+        low, high = figure.spread
+        say(Text(folded(figure.what), "bold"))
+        text = f"{ours} against {theirs} of {figure.against}: ratio {figure.ratio:.3g} ({low:.3g} to {high:.3g})"
+        say(folded(text, 4, first=4))
+        promise = "; ".join(filter(None, (figure.verdict, figure.note)))
+        say(Text(folded(promise, 4, first=4), "bold red" if "WORSE" in promise else ""))
 
 
 def _print_changes(since: list[Change], commit: str, measured: int, absent: list[str]) -> None:
@@ -351,7 +334,7 @@ def _print_changes(since: list[Change], commit: str, measured: int, absent: list
             say(Text(folded(text, 4, first=4), style))
     same = sum(not change.slower for change in since)
     alone = measured - len(since)
-    others = f"; {alone} not in that run, or of other hardware" if alone else ""
+    others = f"; {alone} not in that run" if alone else ""
     say(folded(f"as before: {same} of {measured}{others}", 4, first=4))
     if absent:
         say(folded(f"recorded there, not measured here: {', '.join(absent)}", 4, first=4))
