@@ -335,7 +335,7 @@ def test_damage_outside_of_the_messages_is_named(written: Written) -> None:
         "an attachment's content": (data.index(b"duration = '4 s'"), b"f", attached, (0, 1)),
         "an attachment's length": (length, b"\xff" * 8, attached, (0, 1)),
         "a chunk's length": (chunk + 9 + 28 + 4 + len("zstd"), b"\xff" * 8, chunk, (None, 0)),
-        "the kind of a chunk": (chunk, b"\x86", None, (0, 0)),
+        "the kind of a chunk": (chunk, b"\x86", None, (None, 0)),
         "the beginning": (0, b"nothing", 0, (0, 0)),
     }
     for what, (position, wrong, offset, (messages, attachments)) in places.items():

@@ -150,8 +150,10 @@ class Structure:
                 self._place(path, np.dtype(field.format))
             elif field.count == "one" and field.is_text:
                 self._place(path, np.dtype(f"S{self._length(path, message)}"))
-            elif field.count == "one":
+            elif field.count == "one" and field.is_message:
                 self._walk(store, field.type, message, path + ".")
+            elif field.count == "one":  # a text of wide characters
+                self.complete = False
             else:
                 at = self.size
                 count = field.length if field.count == "array" else self._length(path, message)

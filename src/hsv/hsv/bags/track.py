@@ -10,7 +10,7 @@ from typing import Any
 from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
-from hsv.bags.columns import Columns, NoCommonLayoutError, columns_at_once, columns_one_by_one
+from hsv.bags.columns import Columns, columns_at_once, columns_one_by_one
 from hsv.bags.description import TOPIC_OF
 from hsv.bags.messages import MessageError
 from hsv.base.errors import RecordingError, SignalError
@@ -70,11 +70,8 @@ class Track:
             RecordingError: A message does not fit its definition.
         """
         types, where = self.types.fielddefs, f"{self.source}: topic {self.topic}"
-        if self.data:
-            try:
-                return columns_at_once(types, self.type, self.data, where)
-            except NoCommonLayoutError:
-                pass
+        if self.data and (columns := columns_at_once(types, self.type, self.data, where)) is not None:
+            return columns
         return columns_one_by_one(types, self.type, [message for _, message in self.decode()], where)
 
     def decode(self) -> Iterator[tuple[int, Any]]:
