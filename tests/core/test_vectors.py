@@ -228,7 +228,10 @@ def actuators(z: Golden) -> None:
     rows = [*zip(z["actuator.order"].tolist(), z["actuator.arguments"].tolist(), strict=True)]
     maps = [actuator_map(order, *row[:3]) if order else (0.0,) * 4 for order, row in rows]
     z.check("actuator.map", maps)
-    steps = [actuator_step(order, own, *row[3:], row[2]) for (order, row), own in zip(rows, maps, strict=True)]
+    steps = [
+        actuator_step(order, own, row[3:5], row[5], row[6:], row[2])
+        for (order, row), own in zip(rows, maps, strict=True)
+    ]
     z.check("actuator.step", steps)
 
 
@@ -260,8 +263,8 @@ def faults(z: Golden) -> None:
                 share = min(max(late - j, 0.0), 1.0)
                 for given, begin, length in ((before, float(j), share), (command, j + share, 1.0 - share)):
                     if length > 0.0:
-                        own = equipment[i % 4], state, rows, k, begin, given, alpha[k]
-                        move_effectors(*own, effector, length)
+                        own = equipment[i % 4], (state, effector), rows, k, begin, given, alpha[k]
+                        move_effectors(*own, length)
                         lines.append([acting, *effector, *state.ravel()])
             before = command
         results.append(np.array(lines))

@@ -27,12 +27,16 @@ FUEL = "actuator.fuel_equivalence_ratio"
 INF = math.inf
 
 
-def respond(order, frequency, damping, commands, h, start=0.0, low=-INF, high=INF, rate=INF, acceleration=INF):
-    """Return positions and rates after each of the commands, and what the vehicle is given before."""
-    F = actuator_map(order, frequency, damping, h)
+def respond(actuator, commands, h, start=0.0, low=-INF, high=INF, rate=INF, acceleration=INF):
+    """Return positions and rates after each command, and the mean positions on the way there.
+
+    ``actuator``: order, natural frequency (rad/s) and damping ratio.
+    """
+    order, limits = actuator[0], (low, high, rate, acceleration)
+    F = actuator_map(*actuator, h)
     rows, p, v = [], start, 0.0
     for command in commands:
-        p, v, held = actuator_step(order, F, p, v, command, low, high, rate, acceleration, h)
+        p, v, held = actuator_step(order, F, (p, v), command, limits, h)
         rows.append((p, v, held))
     return np.array(rows).T
 
@@ -57,32 +61,32 @@ def test_map_of_second_order_is_the_matrix_exponential(frequency, damping, h):
 def test_step_response_of_second_order(frequency, damping):
     h = 0.005
     time = h * np.arange(1, 200)
-    position, rate, _ = respond(2, frequency, damping, np.ones(199), h)
+    position, rate, _ = respond((2, frequency, damping), np.ones(199), h)
     damped = frequency * math.sqrt(1.0 - damping**2)
     phase = math.acos(damping)
     decay = np.exp(-damping * frequency * time)
     assert_allclose(position, 1.0 - decay * np.sin(damped * time + phase) / math.sin(phase), atol=1e-12)
     assert_allclose(rate, frequency / math.sin(phase) * decay * np.sin(damped * time), atol=1e-10 * frequency)
     # The textbook's overshoot, and the largest rate of a unit step at a damping of 0.7.
-    assert respond(2, frequency, damping, np.ones(20000), 1e-4)[0].max() == pytest.approx(
+    assert respond((2, frequency, damping), np.ones(20000), 1e-4)[0].max() == pytest.approx(
         1.0 + math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2)), abs=1e-5
     )
     if damping == 0.7:
-        assert respond(2, frequency, damping, np.ones(20000), 1e-4)[1].max() == pytest.approx(
+        assert respond((2, frequency, damping), np.ones(20000), 1e-4)[1].max() == pytest.approx(
             0.46 * frequency, rel=5e-3
         )
 
 
 def test_step_response_of_first_order():
     time = 0.005 * np.arange(1, 100)
-    position, _, _ = respond(1, 20.0, 1.0, np.ones(99), 0.005)
+    position, _, _ = respond((1, 20.0, 1.0), np.ones(99), 0.005)
     assert_allclose(position, 1.0 - np.exp(-20.0 * time), atol=1e-13)
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])
 def test_large_step_moves_at_the_rate_limit(order):
     h, limit = 0.005, 0.5
-    position, rate, _ = respond(order, 150.0, 0.7, np.full(40, 1.0), h, rate=limit)
+    position, rate, _ = respond((order, 150.0, 0.7), np.full(40, 1.0), h, rate=limit)
     moving = slice(8, 36)
     assert_allclose(np.diff(position)[moving], limit * h, rtol=1e-12)
     assert_allclose(rate[moving], limit, rtol=1e-12)
@@ -91,7 +95,7 @@ def test_large_step_moves_at_the_rate_limit(order):
 
 def test_rate_changes_within_the_acceleration_limit():
     h, limit = 0.005, 3.0
-    position, rate, _ = respond(2, 50.0, 0.7, np.full(400, 0.1), h, acceleration=limit)
+    position, rate, _ = respond((2, 50.0, 0.7), np.full(400, 0.1), h, acceleration=limit)
     changes = np.abs(np.diff(rate, prepend=0.0))
     assert changes.max() == pytest.approx(limit * h) and changes[0] == pytest.approx(limit * h)
     assert position[-1] == pytest.approx(0.1, abs=1e-3)
@@ -101,7 +105,7 @@ def test_rate_changes_within_the_acceleration_limit():
 def test_stops_hold_and_are_left_at_once(order):
     h = 0.005
     commands = np.concatenate((np.full(200, 2.0), np.full(200, -2.0)))
-    position, rate, _ = respond(order, 50.0, 0.7, commands, h, low=-0.3, high=0.5)
+    position, rate, _ = respond((order, 50.0, 0.7), commands, h, low=-0.3, high=0.5)
     assert position.max() == pytest.approx(0.5) and position.min() == pytest.approx(-0.3)
     assert position.max() <= 0.5 and position.min() >= -0.3
     assert rate[199] == pytest.approx(0.0, abs=1e-6)
@@ -110,7 +114,7 @@ def test_stops_hold_and_are_left_at_once(order):
 
 def test_position_beyond_a_stop_that_moved_returns_at_the_rate():
     h, limit = 0.005, 0.4
-    position, _, _ = respond(2, 50.0, 0.7, np.full(200, 1.0), h, start=0.5, high=0.3, rate=limit)
+    position, _, _ = respond((2, 50.0, 0.7), np.full(200, 1.0), h, start=0.5, high=0.3, rate=limit)
     assert position.max() < 0.5
     assert np.diff(position).min() >= -limit * h * (1.0 + 1e-12)
     assert position[-1] == pytest.approx(0.3, abs=1e-3)
@@ -120,7 +124,7 @@ def test_position_beyond_a_stop_that_moved_returns_at_the_rate():
 @given(st.sampled_from([0, 1, 2]), st.floats(-0.5, 0.5), st.floats(1.0, 400.0), st.floats(0.05, 1.0))
 def test_equilibrium_stays_to_the_bit(order, where, frequency, damping):
     position, rate, held = respond(
-        order, frequency, damping, np.full(20, where), 0.005, where, -0.6, 0.6, rate=2.0, acceleration=50.0
+        (order, frequency, damping), np.full(20, where), 0.005, where, -0.6, 0.6, rate=2.0, acceleration=50.0
     )
     assert_array_equal(position, where)
     assert_array_equal(rate, 0.0)
@@ -130,13 +134,13 @@ def test_equilibrium_stays_to_the_bit(order, where, frequency, damping):
 def test_ideal_actuator_is_where_its_command_is():
     commands = np.array([0.3, -0.1, 0.25])
     for low, high in ((-INF, INF), (0.0, 0.2)):
-        position, _, held = respond(0, INF, 1.0, commands, 0.005, start=0.1, low=low, high=high)
+        position, _, held = respond((0, INF, 1.0), commands, 0.005, start=0.1, low=low, high=high)
         assert_array_equal(position, np.clip(commands, low, high))
         assert_array_equal(held, position)
 
 
 def test_vehicle_is_given_the_middle_of_the_way():
-    position, _, held = respond(2, 50.0, 0.7, np.ones(9), 0.005)
+    position, _, held = respond((2, 50.0, 0.7), np.ones(9), 0.005)
     assert_allclose(held, 0.5 * (np.concatenate(([0.0], position[:-1])) + position))
 
 

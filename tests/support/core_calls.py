@@ -52,16 +52,16 @@ def engine_faults(rows: FaultRows, step: int, seed: int, alpha: float, mach: flo
 
 def move_effectors(
     data: Any,
-    state: np.ndarray,
+    moved: tuple[np.ndarray, np.ndarray],
     rows: FaultRows,
     step: int,
     substep: float,
     command: np.ndarray,
     alpha: float,
-    effector: np.ndarray,
     length: float = 1.0,
 ) -> None:
-    """Move actuators, ``state`` (2, 2), and ``effector`` (2) over ``length`` substeps, in place."""
+    """Move actuators (2, 2) and effectors (2) over ``length`` substeps, in place."""
+    state, effector = moved
     lib.hsv_move_effectors(
         pointer("hsv_actuators", data),
         doubles(state),
@@ -78,18 +78,16 @@ def move_effectors(
 def actuator_step(
     order: int,
     map: Sequence[float],
-    position: float,
-    rate: float,
+    state: Sequence[float],
     command: float,
-    minimum: float,
-    maximum: float,
-    rate_limit: float,
-    acceleration_limit: float,
+    limits: Sequence[float],
     h: float,
 ) -> np.ndarray:
-    """Return position, rate and mean position (3) ``h`` (s) later."""
-    limits = command, minimum, maximum, rate_limit, acceleration_limit, h
-    return written(lib.hsv_actuator_step, 3, order, np.array(map), np.array([position, rate]), *limits)
+    """Return position, rate and mean position (3) ``h`` (s) after a ``state`` (position, rate).
+
+    ``limits``: smallest and largest position, rate limit, acceleration limit.
+    """
+    return written(lib.hsv_actuator_step, 3, order, np.array(map), np.array(state), command, *limits, h)
 
 
 def measure(sensors: Any, memory: np.ndarray, rows: FaultRows, step: int, seed: int, x: np.ndarray) -> np.ndarray:

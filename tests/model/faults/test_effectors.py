@@ -41,7 +41,7 @@ def flown(faults, commands=WAVE, actuator=None, seed=0):
     for k, command in enumerate(commands):
         begin_faults(rows, k, seed)
         for j in range(SUBSTEPS):
-            move_effectors(data, state, rows, k, j, np.array([0.4, command]), ALPHA, effector)
+            move_effectors(data, (state, effector), rows, k, j, np.array([0.4, command]), ALPHA)
             deflections.append(effector[1])
             states.append(state[1].copy())
     return np.array(deflections), np.array(states)
@@ -82,7 +82,7 @@ def test_amplitude_of_an_oscillation_stays_over_a_long_flight():
     effector, state, found = TRIM.copy(), actuators_at_rest(TRIM), []
     for k in range(4_900_000, 4_900_100):
         begin_faults(rows, k, 0)
-        move_effectors(data, state, rows, k, 0, TRIM, ALPHA, effector)
+        move_effectors(data, (state, effector), rows, k, 0, TRIM, ALPHA)
         found.append(effector[1] - TRIM[1])
     time = (np.arange(4_900_000, 4_900_100) * T + 0.5 * H) % (1.0 / 1.4)
     assert_allclose(found, 0.03 * np.sin(2.0 * np.pi * 1.4 * time), atol=1e-8)
