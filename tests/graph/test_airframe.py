@@ -29,6 +29,7 @@ def messages(path: Path) -> list[dict[str, str]]:
     return [json.loads(line) for line in lines if line.startswith("{") and line.endswith("\n")]
 
 
+@pytest.mark.long
 def test_markers_follow_the_state_of_a_flight_that_is_not_changed(processes: Processes) -> None:
     scenario = short_scenario(processes.folder, duration=4, fault=1)
     node = processes.start("ros2", "run", "hsv_bringup", "airframe", "--ros-args", "-p", "rate:=5.0")

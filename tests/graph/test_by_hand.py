@@ -95,13 +95,13 @@ def test_a_flight_by_hand_is_told_and_can_be_repeated(processes: Processes) -> N
     [
         (("fault", "list"), 1, "hsv fault: error: no run in ROS_DOMAIN_ID="),
         long(("topic",), 1, "hsv topic: error: no node of the graph in ROS_DOMAIN_ID="),
-        (
+        long(
             ("set", "tua", "0.8"),
             2,
             "hsv set: error: name = 'tua': expected a parameter that may change in flight, feedback.tau",
         ),
         long(("set", "tau", "0.8 m"), 2, "feedback.tau = '0.8 m': wrong unit"),
-        (("topic", "--every", "0"), 2, "--every"),
+        long(("topic", "--every", "0"), 2, "--every"),
         long(("topic", "bad name"), 2, "hsv topic: error: name = 'bad name': expected the name of a topic"),
         (("topic", "/hsv//state"), 2, "(topic name must not contain repeated '/')"),
         long(("topic", "hsv/9x"), 2, "(topic name token must not start with a number)"),
@@ -116,7 +116,7 @@ def test_commands_refuse_in_one_line(processes: Processes, words: tuple[str, ...
 
 @pytest.mark.parametrize(
     ("number", "after"),
-    [(signal.SIGINT, 0.2), (signal.SIGTERM, 2.0), long(signal.SIGINT, 2.0), long(signal.SIGTERM, 0.2)],
+    [long(signal.SIGINT, 0.2), (signal.SIGTERM, 2.0), long(signal.SIGINT, 2.0), long(signal.SIGTERM, 0.2)],
 )
 def test_a_command_is_interrupted_in_one_line(processes: Processes, number: int, after: float) -> None:
     # However early it comes: on a fast machine 2 s is in the middle of the waiting, on a slow one in the imports.
@@ -185,7 +185,7 @@ def test_who_does_not_answer_is_given_up_by_name(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize(
     ("package", "executable", "arguments", "words"),
     [
-        ("hsv_plant", "plant", ["-p", "duration:=10"], ["duration = 10", "expected double"]),
+        long("hsv_plant", "plant", ["-p", "duration:=10"], ["duration = 10", "expected double"]),
         (
             "hsv_plant",
             "plant",
@@ -198,13 +198,13 @@ def test_who_does_not_answer_is_given_up_by_name(monkeypatch: pytest.MonkeyPatch
             ["-p", "vehicle.coupling:=strong"],
             ["vehicle.coupling = 'strong'", "paper_like, derived"],
         ),
-        (
+        long(
             "hsv_plant",
             "fault_injector",
             ["-p", "fault.types:=[bias, bias]", "-p", "fault.channels:=[elevator_deflection]"],
             ["fault."],
         ),
-        ("hsv_ctrl", "tube_mpc", ["-p", "feedback.gain:=[1.0, 2.0]"], ["feedback.gain", "2 values, expected 18"]),
+        long("hsv_ctrl", "tube_mpc", ["-p", "feedback.gain:=[1.0, 2.0]"], ["feedback.gain", "2 values, expected 18"]),
         long("hsv_ctrl", "tube_mpc", ["-p", "input.minimum:=[.nan, 0.0]"], ["input.minimum[0] = nan"]),
         (
             "hsv_ctrl",
@@ -215,7 +215,9 @@ def test_who_does_not_answer_is_given_up_by_name(monkeypatch: pytest.MonkeyPatch
         long(
             "hsv_ctrl", "notch_filter", ["-p", "notch.zero_frequency:=[15.0, 20.0]"], ["notch.zero_damping", "1 values"]
         ),
-        ("hsv_ctrl", "nominal_trajectory", ["-p", "reference.velocities:=[1.0]"], ["reference.velocities[0] = 1.0"]),
+        long(
+            "hsv_ctrl", "nominal_trajectory", ["-p", "reference.velocities:=[1.0]"], ["reference.velocities[0] = 1.0"]
+        ),
         long("hsv_ctrl", "nominal_trajectory", ["--params-file", "missing.yaml"], ["missing.yaml"]),
         long("hsv_bringup", "recorder", ["-p", "bag.attachments:=[nowhere.txt]"], ["bag.attachments = 'nowhere.txt'"]),
     ],

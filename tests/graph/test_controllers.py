@@ -98,6 +98,7 @@ def test_the_lmi_in_flight_depends_on_the_flight_alone(processes: Processes) -> 
     assert np.all(indices[:100] < 255) and np.all(indices[100:] == 255)
 
 
+@pytest.mark.long
 def test_a_vehicle_outside_the_certified_set_is_told(processes: Processes) -> None:
     scenario = short_scenario(processes.folder, duration=1, fault=0.5, coupling="derived")
     bag = _flown(processes, scenario, "uncertified", "--composed")

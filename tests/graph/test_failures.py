@@ -36,7 +36,7 @@ def _start_and_fly(processes: Processes, bag: Path, *words: str) -> subprocess.P
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(node.name, marks=() if node.name in ("plant", "tube_mpc") else pytest.mark.long)
+        pytest.param(node.name, marks=() if node.name == "tube_mpc" else pytest.mark.long)
         for node in graph()
         if node is not RECORDER
     ],
@@ -59,6 +59,7 @@ def test_a_killed_node_ends_the_run_by_name(processes: Processes, name: str) -> 
     assert not any(Path(f"/proc/{pid}").exists() for pid in nodes.values())
 
 
+@pytest.mark.long
 def test_a_full_disk_loses_the_flight_by_the_recorders_name(processes: Processes) -> None:
     # Bytecode of what is imported after the disk is full would be cut, too.
     processes.environment["PYTHONDONTWRITEBYTECODE"] = "1"
@@ -93,6 +94,7 @@ def test_interrupt_ends_all_and_closes_the_bag(processes: Processes, number: int
     assert not any(Path(f"/proc/{pid}").exists() for pid in nodes.values()) and not list(temporary.iterdir())
 
 
+@pytest.mark.long
 def test_a_run_that_is_interrupted_before_its_first_step_leaves_no_bag(processes: Processes) -> None:
     bag = processes.folder / "waiting"
     run = processes.start("hsv", "run", "case1", "--external", "--composed", "--bag", bag)
@@ -117,6 +119,7 @@ def _refuse_to_disturb(processes: Processes, bag: Path) -> None:
     assert not (processes.folder / "other").exists()
 
 
+@pytest.mark.long
 def test_nodes_do_not_outlive_a_killed_launcher(processes: Processes) -> None:
     run = _start_and_fly(processes, processes.folder / "orphaned")
     nodes = children(run.pid)
@@ -125,7 +128,8 @@ def test_nodes_do_not_outlive_a_killed_launcher(processes: Processes) -> None:
     wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in nodes.values()), nodes.values())
 
 
-@pytest.mark.parametrize("name", ["notch_filter", long("plant")])
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["notch_filter", "plant"])
 def test_a_hung_node_is_named_and_ends_the_run(processes: Processes, name: str) -> None:
     bag = processes.folder / "hung"
     # Longer than it takes to call a process hung: that is said before.
@@ -153,6 +157,7 @@ def test_a_node_that_hangs_at_its_start_is_named_and_ends_the_run(processes: Pro
     assert "tube_mpc hangs: no progress for 6." in output
 
 
+@pytest.mark.long
 def test_a_run_that_stands_still_as_a_whole_goes_on(processes: Processes) -> None:
     """As on a machine so busy that nothing of it gets to run, or one that sleeps."""
     bag = processes.folder / "slept"

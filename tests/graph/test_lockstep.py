@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from node_processes import Processes, short_scenario
+from waiting import exit_code_of
 
 from hsv.bags.description import TOPICS
 from hsv.bags.flight import flight_data, input_columns, state_columns
@@ -78,25 +77,22 @@ def test_graph_equals_in_process_bit_for_bit(
     assert all(len(bag.messages(topic)) == 251 for topic in TOPICS)
 
 
-def test_two_runs_are_bit_identical_whatever_the_load(shared_processes: Processes, case1: Bag) -> None:
-    scenario = short_scenario(shared_processes.folder)
-    with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as load:
-        try:
-            second = _fly(shared_processes, scenario, "second")
-        finally:
-            load.kill()
-    for topic in TOPICS:
-        assert case1.messages(topic) == second.messages(topic), topic
-
-
-def test_composed_equals_separate_processes_in_every_byte(shared_processes: Processes, case1: Bag) -> None:
-    composed = _fly(shared_processes, short_scenario(shared_processes.folder), "composed", "--composed")
-    compared = shared_processes.run("hsv", "diff", case1.path, composed.path)
+def test_composed_and_started_paused_equals_separate_processes_in_every_byte(
+    shared_processes: Processes, case1: Bag
+) -> None:
+    path = shared_processes.folder / "composed"
+    words = (short_scenario(shared_processes.folder), "--composed", "--paused", "--no-report", "--bag", path)
+    run = shared_processes.start("hsv", "run", *words)
+    released = shared_processes.run("hsv", "set", "paused", "false")
+    assert "from step 1 on" in released.stdout, released.stdout
+    assert exit_code_of(run) == 0
+    compared = shared_processes.run("hsv", "diff", case1.path, path)
     assert compared.returncode == 0, compared.stdout
     # No "except the padding": of that, too, every byte is the same.
     assert f"{251 * len(TOPICS)} messages: identical\n" in compared.stdout
 
 
+@pytest.mark.long
 def test_a_diverging_flight_ends_cleanly_and_says_so(shared_processes: Processes) -> None:
     scenario = short_scenario(shared_processes.folder, duration=30, fault=29, coupling="derived", notch=False)
     words = ["--composed", "--no-report", "--bag", shared_processes.folder / "lost"]
@@ -109,6 +105,7 @@ def test_a_diverging_flight_ends_cleanly_and_says_so(shared_processes: Processes
     assert len({len(bag.messages(topic)) for topic in TOPICS}) == 1
 
 
+@pytest.mark.long
 def test_a_slow_pace_is_not_taken_for_a_hang(shared_processes: Processes) -> None:
     scenario = short_scenario(shared_processes.folder, duration=0.1, fault=0.05)
     words = ("--composed", "--no-report", "--step-timeout", "0.5", "--real-time-factor", "0.01")
@@ -117,17 +114,7 @@ def test_a_slow_pace_is_not_taken_for_a_hang(shared_processes: Processes) -> Non
     assert done.returncode == 0, done.stdout
 
 
-def test_a_run_can_start_paused(shared_processes: Processes) -> None:
-    scenario = short_scenario(shared_processes.folder)
-    run = shared_processes.start(
-        "hsv", "run", scenario, "--composed", "--paused", "--no-report", "--bag", shared_processes.folder / "paused"
-    )
-    released = shared_processes.run("hsv", "set", "paused", "false")
-    assert "from step 1 on" in released.stdout, released.stdout
-    assert run.wait() == 0
-    assert len(Bag(shared_processes.folder / "paused").messages("/hsv/state")) == 251
-
-
+@pytest.mark.long
 def test_pacing_keeps_to_the_wall_clock(shared_processes: Processes) -> None:
     import json
 

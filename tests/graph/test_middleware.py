@@ -62,6 +62,7 @@ def test_fast_dds_takes_our_settings_without_a_word(ros_environment, tmp_path):
     assert said_by_fast_dds(ros_environment, tmp_path) == ""
 
 
+@pytest.mark.long
 @pytest.mark.graph
 @pytest.mark.parametrize("tag", ["initialAnnouncements", "nackSupressionDuration"])
 def test_fast_dds_would_name_a_setting_that_it_does_not_know(ros_environment, tmp_path, tag):

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from flown_bags import flown_bag
 from injected_fault import last_line
 from marking import long
 from node_processes import Processes
@@ -81,13 +80,9 @@ def test_a_class_and_a_function_in_c_fly_as_in_process(processes: Processes, pla
         bag = flown(processes, path, f"flown{''.join(words)}", *words)
         assert f"{flight_fingerprint(bag)}" == fingerprint
         assert "tube" not in " ".join(bag.topics) and bag.custom_data["controller"] == place
-    for words in ((), ("--rerun",), ("--over-dds", "--node", "controller")):
+    for words in (("--rerun",), ("--over-dds", "--node", "controller")):
         replayed = processes.run("hsv", "replay", bag.folder, "--trust", *words)
         assert replayed.returncode == 0 and "identical in every byte" in replayed.stdout, replayed.stdout
-    # Beside the Tube-MPC controller on one page.
-    tube = flown_bag(processes.folder / "tube", duration=11.0, fault=5.0)
-    reported = processes.run("hsv", "report", bag.folder, tube, "--out", processes.folder / "page.html")
-    assert reported.returncode == 0, reported.stdout
 
 
 def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes: Processes) -> None:
@@ -115,7 +110,7 @@ def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes: P
 @pytest.mark.parametrize(
     ("how", "words"),
     [
-        ("killed", "; no answer from /regulator\n"),
+        long("killed", "; no answer from /regulator\n"),
         long("hung", "; no answer from /regulator\n"),
         long(
             "wrong_step",
@@ -140,7 +135,7 @@ def test_a_node_that_goes_wrong_is_named_and_the_bag_is_whole(processes: Process
     ("more", "words"),
     [
         ('controller = "node:hsv_example_node"', "expected node:package/executable, or node: alone"),
-        ('controller = "node:nowhere/regulator"', "no executable regulator of package nowhere"),
+        long('controller = "node:nowhere/regulator"', "no executable regulator of package nowhere"),
         long('controller = "hsv_lqr:Nothing"', "cannot be loaded, AttributeError"),
         long("[regulator]\ngain = 1.0", "regulator: unknown table, expected none: a node brings its own parameters"),
     ],
@@ -151,6 +146,7 @@ def test_what_cannot_fly_is_refused_in_a_line(processes: Processes, more: str, w
     assert not (processes.folder / "bag").exists()
 
 
+@pytest.mark.long
 def test_two_controllers_end_the_run(processes: Processes) -> None:
     # Paced, so that the second joins before the flight is over, however long its start takes.
     path = scenario(processes.folder, "node", 'controller = "node:"', duration=200.0)
@@ -164,11 +160,13 @@ def test_two_controllers_end_the_run(processes: Processes) -> None:
     assert "/one" in said or "/two" in said
 
 
+@pytest.mark.long
 def test_a_node_does_not_fly_in_process(processes: Processes) -> None:
     done = processes.run("hsv", "simulate", scenario(processes.folder, "node"))
     assert done.returncode == 2 and "a node of its own, expected hsv run" in last_line(done), done.stdout
 
 
+@pytest.mark.long
 def test_the_node_of_classes_flies_no_other(processes: Processes) -> None:
     done = processes.run("ros2", "run", "hsv_ctrl", "controller")
     assert done.returncode == 2 and "the node tube_mpc flies it" in last_line(done), done.stdout

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from changed_bags import Messages, changed_bag
 from flown_bags import flown_bag
+from marking import long
 from node_processes import Processes
 from ros_domain import own_domain
 from waiting import wait_until
@@ -57,7 +58,7 @@ def test_a_step_at_the_end_is_refused(bag: Path) -> None:
             rclpy.shutdown()
 
 
-@pytest.mark.parametrize("delay", ["inf", "nan", "-1"])
+@pytest.mark.parametrize("delay", ["nan", long("inf"), long("-1")])
 def test_a_delay_that_never_ends_is_refused(processes: Processes, bag: Path, delay: str) -> None:
     done = processes.run("hsv", "play", bag, "--delay", delay, "--topic", "/hsv/state")
     assert done.returncode == 2
@@ -77,6 +78,7 @@ def test_a_message_type_that_is_not_installed_is_named(processes: Processes, bag
     assert "topic /other: message type other_msgs/msg/Other is not installed" in done.stdout.splitlines()[-1]
 
 
+@pytest.mark.long
 def test_topics_of_a_graph_that_is_there_are_not_played(processes: Processes, bag: Path) -> None:
     domain = int(processes.environment["ROS_DOMAIN_ID"])
     held = claim_topic(domain, "/hsv/state")
@@ -89,6 +91,7 @@ def test_topics_of_a_graph_that_is_there_are_not_played(processes: Processes, ba
     assert processes.run("hsv", "play", bag, "--rate", "100").returncode == 0
 
 
+@pytest.mark.long
 def test_a_plant_that_waits_does_not_fly_on_what_is_played(processes: Processes, bag: Path) -> None:
     log = processes.folder / "plant.log"
     with log.open("w") as output:

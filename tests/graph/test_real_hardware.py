@@ -8,6 +8,7 @@ import signal
 import numpy as np
 import pytest
 from injected_fault import last_line
+from marking import long
 from node_processes import Processes, fly_until
 from real_hardware import ELEVATOR, scenario_file
 from waiting import output_of
@@ -26,7 +27,8 @@ pytestmark = pytest.mark.graph
 
 
 @pytest.mark.parametrize(
-    ("name", "words"), [("everything", ()), ("everything estimated", ()), ("everything estimated", ("--composed",))]
+    ("name", "words"),
+    [long("everything", ()), ("everything estimated", ()), long("everything estimated", ("--composed",))],
 )
 def test_graph_equals_in_process_bit_for_bit(shared_processes: Processes, name: str, words: tuple[str, ...]) -> None:
     scenario = scenario_file(shared_processes.folder, name)

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 from bag_readers import READERS, Messages, assert_equal, ours
+from marking import long
 from node_processes import Processes, short_scenario
 from waiting import exit_code_of
 
@@ -43,13 +44,14 @@ def test_replay_in_process_is_identical_in_every_byte(bag: Path) -> None:
     assert len(results) == 10 and all(result.identical for result in results)
 
 
-@pytest.mark.parametrize("words", [["--node", "plant"], ["--node", "tube_mpc"], ["--rerun"]], ids=" ".join)
+@pytest.mark.parametrize("words", [long(["--node", "plant"]), long(["--node", "tube_mpc"]), ["--rerun"]], ids=" ".join)
 def test_replay_over_dds_is_identical_in_every_byte(shared_processes: Processes, bag: Path, words: list[str]) -> None:
     done = shared_processes.run("hsv", "replay", bag, "--over-dds", *words)
     assert done.returncode == 0, done.stdout
     assert done.stdout.count("identical in every byte") == (5 if "--rerun" in words else 1), done.stdout
 
 
+@pytest.mark.long
 def test_a_node_that_does_not_start_is_named(shared_processes: Processes, bag: Path) -> None:
     wrong = shared_processes.folder / "wrong.yaml"
     values = read_parameters(find_design("baseline")) | {"design.certificate": "absent.json"}
@@ -155,6 +157,7 @@ def test_player_steps_and_plays_the_recorded_bytes(shared_processes: Processes, 
     assert exit_code_of(player) == 0
 
 
+@pytest.mark.long
 def test_player_keeps_the_pace(shared_processes: Processes, bag: Path) -> None:
     import time
 
@@ -164,6 +167,7 @@ def test_player_keeps_the_pace(shared_processes: Processes, bag: Path) -> None:
     assert time.monotonic() - begun >= 3.0
 
 
+@pytest.mark.long
 def test_bad_words_of_the_player_are_one_line(shared_processes: Processes, bag: Path) -> None:
     for words, said in (
         ([shared_processes.folder / "nowhere"], "does not exist"),

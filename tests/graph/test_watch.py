@@ -19,6 +19,7 @@ from hsv.flight.scenario import load_scenario
 pytestmark = pytest.mark.graph
 
 
+@pytest.mark.long
 def test_a_flight_is_watched_to_its_end_and_its_bits_are_the_same(tmp_path: Path) -> None:
     scenario = short_scenario(tmp_path, duration=16, fault=1)
     bag = tmp_path / "bag"

@@ -31,7 +31,7 @@ COMPOSED = ("--composed",)
             *("value", APART, "plant"),
             "/hsv/actuator: active[0]: fault.parameter_values: 0 values, expected one a name, 1",
         ),
-        ("estimate", APART, "tube_mpc", "/hsv/filtered_state: estimate: 1 numbers, expected 9, or none"),
+        long("estimate", APART, "tube_mpc", "/hsv/filtered_state: estimate: 1 numbers, expected 9, or none"),
         long("estimate", COMPOSED, "tube_mpc", "/hsv/filtered_state: estimate: 1 numbers, expected 9, or none"),
         long(
             *("states", APART, "tube_mpc"),
