@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import hsv
-from hsv.base.errors import ScenarioError
+from hsv.base.errors import CampaignError, ScenarioError, TrimError
+from hsv.base.units import UnitSystem
 from hsv.control.design import digest
 from hsv.flight.assembly import design_parameters
 from hsv.flight.fingerprint import as_published
@@ -38,6 +39,50 @@ def test_flights_are_compared_and_swept():
     assert 0.0 < deviation["whole"] < deviation["lost"]
     assert "altitude_settling_time" not in table  # six seconds are too short to settle
     assert len(hsv.plot({"whole": flights[1.0], "lost": flights[0.7]}).axes) == 8
+
+
+def test_a_flight_is_a_table_with_units():
+    flight = hsv.fly(hsv.load("case1", SHORT))
+    frame = flight.to_frame()
+    np.testing.assert_array_equal(frame["command.elevator_deflection"], flight.history.command[:, 1])
+    np.testing.assert_array_equal(frame.index, flight.time)
+    units = frame.attrs["units"]
+    assert units.keys() == {"time", *frame.columns} and units["deviation.pitch_rate"] == "rad/s"
+    assert "\n" not in repr(flight) and flight.fingerprint in repr(flight)
+
+
+def test_a_campaign_is_a_table_with_a_row_per_flight():
+    table = hsv.montecarlo("case1", 3, seed=5, factors={"fault[0].start": ("90 s", "110 s")}, workers=1)
+    assert len(table) == 3 and table["fingerprint"].nunique() == 3
+    assert table["sample_fault[0].start"].between(90.0, 110.0).all()
+    assert table.attrs["units"]["sample_fault[0].start"] == "s"
+    with pytest.raises(CampaignError, match=r"samples = 0: expected 1"):
+        hsv.montecarlo("case1", 0)
+
+
+def test_a_trim_point_has_names_and_units():
+    point = hsv.trim("85500 ft", 2407.92)
+    assert point.quantities["altitude"] == (pytest.approx(26060.4), "m")
+    assert hsv.trim(26060.4, "7900 ft/s").quantities == point.quantities
+    with pytest.raises(TrimError, match=r"altitude = '200 ft', velocity = '10 ft/s': no equilibrium"):
+        hsv.trim("200 ft", "10 ft/s")
+
+
+@pytest.mark.parametrize("model", ["CM", "DM", "ECM"])
+def test_a_linear_model_describes_itself_and_is_one_of_python_control(model, tmp_path):
+    found = hsv.linearise(model=model)
+    system = found.to_control()
+    assert system.state_labels == list(found.states) and system.input_labels == list(found.inputs)
+    assert np.sort_complex(system.poles()) == pytest.approx(np.sort_complex(np.linalg.eigvals(found.A)), abs=1e-9)
+    assert found.D.shape == found.B.shape and len(found.operating_state) == len(found.A)
+    assert (found.vehicle, found.model) == ("parker", model)
+    paper = found.in_units(UnitSystem.paper)
+    assert paper.states["velocity"] == "ft/s"
+    assert paper.operating_state[:2] == pytest.approx([85000.0, 7702.0808])
+    found.save(tmp_path / "model.npz")
+    with np.load(tmp_path / "model.npz") as data:
+        np.testing.assert_array_equal(data["A"], found.A)
+        assert data["state_units"].tolist() == list(found.states.values())
 
 
 @pytest.mark.parametrize(

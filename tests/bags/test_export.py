@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import csv
+import shutil
+import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from pyarrow import parquet
+from scipy.io import loadmat
 
 from hsv.bags.export import Format, export
 from hsv.bags.reader import Bag
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import RecordingError
+from hsv.control.linear_model import linearise
 
 STATE, TUBE, FAULTS = "/hsv/state", "/hsv/tube_status", "/hsv/actuator"
 
@@ -74,6 +78,45 @@ def test_npz(bag: Bag, tmp_path: Path) -> None:
         )
         assert data["hsv_actuator.active"][0] == "[]"
         assert "no topic /clock" in str(data["incomplete"])
+
+
+def test_mat(bag: Bag, tmp_path: Path) -> None:
+    (file,) = export(bag, [STATE, FAULTS], Format.mat, tmp_path / "out.mat")
+    data = loadmat(file, simplify_cells=True)
+    np.testing.assert_array_equal(data["hsv_state"]["elastic_rate_1"], bag.columns(STATE)["elastic_rate_1"])
+    assert data["hsv_state"]["units"]["elastic_rate_1"] == "kg^0.5 m/s"
+    assert data["hsv_actuator"]["active"][0] == "[]" and "no topic /clock" in data["incomplete"]
+
+
+@pytest.mark.parametrize("form", [*Format])
+def test_the_first_column_is_the_simulated_time_in_seconds(bag: Bag, tmp_path: Path, form: Format) -> None:
+    target = tmp_path / f"out.{form}"
+    file = export(bag, [STATE], form, target)[0]
+    first = {
+        Format.csv: lambda: [float(row["time [s]"]) for row in csv.DictReader(file.open())],
+        Format.parquet: lambda: parquet.read_table(file)["time [s]"].to_pylist(),
+        Format.npz: lambda: np.load(file)["hsv_state.time [s]"],
+        Format.mat: lambda: loadmat(file, simplify_cells=True)["hsv_state"]["time"],
+    }[form]()
+    np.testing.assert_allclose(first, np.arange(20) * 0.02, rtol=1e-12)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not shutil.which("octave-cli"), reason="needs Octave: apt-get install octave")
+def test_octave_reads_a_bag_and_a_linear_model(bag: Bag, tmp_path: Path) -> None:
+    export(bag, [STATE], Format.mat, tmp_path / "bag.mat")
+    model = linearise(model="ECM")
+    model.save(tmp_path / "model.mat")
+    program = r"""
+        bag = load("bag.mat"); model = load("model.mat");
+        printf("%s %.17g %s\n", bag.hsv_state.units.altitude, bag.hsv_state.time(end), model.states{5});
+        printf("%.17g\n", [model.A(2, 3), model.B(5, 2), size(model.C), model.operating_input'])"""
+    command = ["octave-cli", "--quiet", "--no-init-file", "--eval", program]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    first, *numbers = done.stdout.splitlines()
+    assert first == "m 0.38 filtered_pitch_rate"
+    expected = [model.A[1, 2], model.B[4, 1], 11.0, 11.0, *model.operating_input]
+    assert [float(number) for number in numbers] == expected
 
 
 def test_refuses(bag: Bag, tmp_path: Path) -> None:

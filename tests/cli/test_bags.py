@@ -68,6 +68,10 @@ def test_diff(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
     report = hsv("diff", str(bag), str(other), "--json").json
     assert report["first_difference"]["step"] == 300
     assert report["largest_difference"]["/hsv/state"]["pitch_angle"] > 0.0
+    assert report["units"]["/hsv/state"]["pitch_angle"] == "rad"
+    assert report["units"].keys() == report["largest_difference"].keys()
+    [row] = [line.split() for line in done.out.splitlines() if line.split()[1:2] == ["pitch_angle"]]
+    assert row[0] == "/hsv/state" and row[-1] == "rad"
 
 
 def test_info_tells_what_happened(hsv: Hsv, bag: Path) -> None:

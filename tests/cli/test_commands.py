@@ -18,6 +18,8 @@ from hsv.control.design import find_design
 from hsv.flight.metrics import METRICS
 from hsv.flight.scenario import scenario_text
 
+REFERENCE = Path(__file__).parents[2] / "bags" / "reference" / "case1"
+
 PRINT_NO_NUMBERS = {"include", "play", "fault", "montecarlo"}
 VISIBLE = [name for name, command in COMMANDS.items() if command.panel]
 PUBLISHED_POINT = ("--altitude", "85000 ft", "--velocity", "7702.0808 ft/s")
@@ -162,6 +164,16 @@ def test_linearise_in_paper_units_has_the_same_poles(hsv):
     assert paper["B_paper"][1][0] == pytest.approx(si["B_si"][1][0] / 0.3048, rel=1e-9)
 
 
+def test_a_linear_model_in_json_describes_itself(hsv, tmp_path):
+    values = hsv("linearise", "--model", "ECM", "--units", "paper", "--out", "model.json", "--json").json
+    assert json.loads((tmp_path / "model.json").read_text()) == values
+    assert values["states"][4] == "filtered_pitch_rate" and values["state_units"][:2] == ["ft", "ft/s"]
+    assert np.array(values["C_paper"]).shape == (11, 11) and np.array(values["D_paper"]).shape == (11, 2)
+    assert values["operating_point"]["velocity_ft_per_s"] == pytest.approx(7702.0808)
+    assert (values["vehicle"], values["coupling"], values["model"]) == ("parker", "paper_like", "ECM")
+    assert values["outputs"] == values["states"] and values["input_units"] == ["1", "deg"]
+
+
 def test_linearise_decoupled_has_the_structural_modes(hsv):
     values = hsv("linearise", "--model", "DM", "--json").json
     frequencies = [round(p["natural_frequency_rad_per_s"], 6) for p in values["poles"]]
@@ -272,7 +284,12 @@ def test_json_has_no_numbers_that_json_lacks(hsv, tmp_path, capsys):
             "vehicle 'absent.toml': cannot be read (No such file or directory)",
         ),
         (("list", "vehicles", "absent"), "vehicle 'absent': expected one of parker, stiffened or the path of a TOML"),
-        (("linearise", "--model", "XM"), "model = 'XM': expected one of CM, DM"),
+        (("linearise", "--model", "ecm"), "model = 'ecm': expected one of CM, DM, ECM (did you mean 'ECM'?)"),
+        (
+            ("linearise", "--model", "ECM", "--reading", "print"),
+            "reading = 'print': expected one of physical, printed (d",
+        ),
+        (("linearise", "--out", "model.txt"), "out = 'model.txt': expected a file that ends in .mat, .npz or .json"),
         (("simulate", "case9"), "scenario 'case9': expected a path or one of case1, case1_active"),
         (("simulate", "case1", "--units", "feet"), "Invalid value for '--units': 'feet' is not one of 'metric', 'si'"),
         (("simulate", "absent.toml"), "scenario 'absent.toml': cannot be read (No such file or directory)"),
@@ -289,6 +306,25 @@ def test_bad_input_is_one_line_with_code_2_and_nothing_written(hsv, tmp_path, wo
     assert ran.out == ""
     assert ran.error.startswith(message)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (("list", "scenario"), "scenarios"),
+        (("list", "Faults"), "faults"),
+        (("trim", "--units", "metrc"), "metric"),
+        (("montecarlo", "case1", "--sampling", "sobl"), "sobol"),
+        (("export", ".", "--format", "mta"), "mat"),
+        (("linearise", "--model", "ecm"), "ECM"),
+        (("bench", "--only", "mcpa"), "mcap"),
+        (("replay", str(REFERENCE), "--node", "tube"), "tube_mpc"),
+    ],
+)
+def test_a_word_that_is_nearly_right_is_answered_with_the_right_one(hsv, words, hint):
+    ran = hsv(*words)
+    assert (ran.code, ran.out) == (2, "")
+    assert f"(did you mean '{hint}'?)" in ran.error
 
 
 @pytest.mark.parametrize("command", ["simulate", "run"])

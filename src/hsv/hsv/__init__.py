@@ -8,12 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from hsv.api import Flight as Flight
+    from hsv.api import LinearModel as LinearModel
     from hsv.api import Scenario as Scenario
+    from hsv.api import Trim as Trim
     from hsv.api import compare as compare
     from hsv.api import fly as fly
+    from hsv.api import linearise as linearise
     from hsv.api import load as load
+    from hsv.api import montecarlo as montecarlo
     from hsv.api import plot as plot
     from hsv.api import sweep as sweep
+    from hsv.api import trim as trim
 
     __version__: str
 
@@ -21,7 +26,20 @@ if TYPE_CHECKING:
 # Read once, when numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-__all__ = ["Flight", "Scenario", "compare", "fly", "load", "plot", "sweep"]
+__all__ = [
+    "Flight",
+    "LinearModel",
+    "Scenario",
+    "Trim",
+    "compare",
+    "fly",
+    "linearise",
+    "load",
+    "montecarlo",
+    "plot",
+    "sweep",
+    "trim",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -13,20 +13,39 @@ Everything here is a name of the package itself::
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from hsv.base.units import UnitSystem, unit_system
+from hsv.control.linear_model import LinearModel, linearise
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly as fly_components
 from hsv.flight.flight import Flight
 from hsv.flight.metrics import METRICS
 from hsv.flight.scenario import Scenario
 from hsv.flight.scenario import load_scenario as load
+from hsv.model.trim import Trim, trim_at
+from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
-__all__ = ["Flight", "Scenario", "compare", "fly", "load", "plot", "sweep"]
+__all__ = [
+    "Flight",
+    "LinearModel",
+    "Scenario",
+    "Trim",
+    "compare",
+    "fly",
+    "linearise",
+    "load",
+    "montecarlo",
+    "plot",
+    "sweep",
+    "trim",
+]
 
 
 def fly(scenario: Scenario | str) -> Flight:
@@ -64,6 +83,74 @@ def compare(flights: Mapping[str, Flight]) -> dict[str, dict[str, float]]:
     measured = {label: flight.metrics for label, flight in flights.items()}
     rows = {name: {label: m[name] for label, m in measured.items() if name in m} for name in METRICS}
     return {name: row for name, row in rows.items() if row}
+
+
+def montecarlo(
+    scenario: str,
+    samples: int = 1000,
+    *,
+    seed: int = 1,
+    method: str = "uniform",
+    scale: float = 1.0,
+    factors: Mapping[str, tuple[object, object]] | None = None,
+    workers: int = 0,
+) -> DataFrame:
+    """Return the flights of a campaign as a table: a row per flight with its sample, end, metrics and fingerprint.
+
+    The units (SI) of its columns are in ``attrs["units"]``. A script that uses several workers must call this under
+    ``if __name__ == "__main__"``.
+
+    Args:
+        scenario: Name of a shipped scenario, or path.
+        samples: Number of flights; not used for corners.
+        seed: Determines all samples.
+        method: ``uniform``, ``latin_hypercube``, ``sobol`` or ``corners`` (all combinations of extreme values).
+        scale: Factor on the bounds of the uncertain parameters; 0 leaves them alone.
+        factors: Least and largest value, as a file has them, by field of the scenario.
+        workers: Processes; 0: one per processor, 1: this process.
+
+    Raises:
+        CampaignError, ScenarioError, DesignError: Names the setting that is wrong.
+    """
+    from hsv.flight.campaign.campaign import plan
+    from hsv.flight.campaign.executors import make_executor
+    from hsv.flight.campaign.run import run_campaign
+    from hsv.flight.campaign.store import ResultStore
+    from hsv.flight.campaign.summary import Results
+
+    campaign = plan(scenario, method=method, samples=samples, seed=seed, scale=scale, factors=factors)
+    with TemporaryDirectory() as folder, make_executor(workers) as executor:
+        path = Path(folder, "campaign.parquet")
+        run_campaign(campaign, ResultStore(path, campaign), executor)
+        return Results(path).frame()
+
+
+def trim(
+    altitude: float | str,
+    velocity: float | str,
+    climb_rate: float | str = 0.0,
+    acceleration: float | str = 0.0,
+    *,
+    vehicle: str = "",
+    coupling: str = "",
+) -> Trim:
+    """Return the equilibrium at a condition of numbers (SI) or of texts with units, such as ``"85500 ft"``.
+
+    Its ``quantities`` are state and input by name, with their units.
+
+    Args:
+        altitude: m, or a text with its unit.
+        velocity: m/s, or a text with its unit.
+        climb_rate: m/s, or a text with its unit.
+        acceleration: m/s^2, or a text with its unit.
+        vehicle: Name or path; empty: the paper's.
+        coupling: Set of inertial coupling, or a multiple of the derived one; empty: the vehicle's own.
+
+    Raises:
+        QuantityError, TrimError, VehicleError: Names the argument that is wrong, or says that nothing balances there.
+    """
+    parameters = load_vehicle(vehicle or DEFAULT_VEHICLE).coupled(coupling)
+    return trim_at(parameters, altitude, velocity, climb_rate, acceleration)
 
 
 def plot(flights: Flight | Mapping[str, Flight], *, units: str = UnitSystem.metric) -> Figure:

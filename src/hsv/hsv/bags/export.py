@@ -1,4 +1,4 @@
-"""Writing the topics of a bag as tables: CSV, Parquet or npz, with field names and units in the header."""
+"""Writing the topics of a bag as tables: CSV, Parquet, npz or mat, with the names and units of fields."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hsv.bags.bag_warnings import bag_warnings
 from hsv.bags.reader import Bag
-from hsv.bags.units import Units, units_of
+from hsv.bags.units import Units
 from hsv.base.errors import RecordingError, reason
 
 INCOMPLETE = "incomplete"
@@ -27,6 +27,12 @@ class Format(StrEnum):
     csv = "csv"
     parquet = "parquet"
     npz = "npz"
+    mat = "mat"
+
+    @property
+    def single(self) -> bool:
+        """Whether all topics are written to one file."""
+        return self in (Format.npz, Format.mat)
 
 
 def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[Path]:
@@ -34,30 +40,35 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
 
     CSV and Parquet: a folder ``target`` with a file per topic, ``/hsv/state`` as ``hsv_state.csv``; a column a number,
     ``filter_state[0] [kg^0.5 m/s]``, texts and lists of messages as they stand or as JSON. npz: one file with an array
-    per field, ``hsv_state.elastic_rate_1 [kg^0.5 m/s]``.
+    per field, ``hsv_state.elastic_rate_1 [kg^0.5 m/s]``. mat: one file with a structure per topic, ``hsv_state``, with
+    a field ``elastic_rate_1`` and its unit in ``hsv_state.units.elastic_rate_1``. The first column of each is the
+    simulated ``time [s]``.
 
     Raises:
         RecordingError: A topic is missing, or the target exists or cannot be written.
     """
     if target.exists():
         raise RecordingError(
-            f"out = {str(target)!r}: exists already, expected a new {'file' if form == 'npz' else 'folder'}"
+            f"out = {str(target)!r}: exists already, expected a new {'file' if form.single else 'folder'}"
         )
-    npz = form is Format.npz
     topics = [bag.name_of(topic) for topic in topics]
     lacking = "; ".join(bag_warnings(bag))
-    contents: dict[str, Any] = (
-        _arrays(bag, topics) if npz else {topic: table(bag.columns(topic), _units(bag, topic)) for topic in topics}
-    )
+    make = {Format.npz: _arrays, Format.mat: _structures}.get(form, _tables)
+    contents = make(bag, topics)
     try:
-        (target.parent if npz else target).mkdir(parents=True, exist_ok=npz)
+        (target.parent if form.single else target).mkdir(parents=True, exist_ok=form.single)
     except OSError as error:
         raise _refused(target, error) from error
     try:
-        if npz:
+        if form.single:
+            said: dict[str, Any] = {INCOMPLETE: np.array(lacking)} if lacking else {}
             with target.open("wb") as stream:
-                said: dict[str, Any] = {INCOMPLETE: np.array(lacking)} if lacking else {}
-                np.savez_compressed(stream, **contents, **said)
+                if form is Format.mat:
+                    from scipy.io import savemat
+
+                    savemat(stream, contents | said, long_field_names=True, do_compression=True, oned_as="column")
+                else:
+                    np.savez_compressed(stream, **contents, **said)
             return [target]
         write = _write_csv if form is Format.csv else _write_parquet
         written = [write(target / f"{_file_stem(topic)}.{form}", table) for topic, table in contents.items()]
@@ -78,23 +89,45 @@ def _refused(target: Path, error: OSError) -> RecordingError:
     return RecordingError(f"out = {str(target)!r}: cannot be written: {reason(error)}")
 
 
+def _tables(bag: Bag, topics: Iterable[str]) -> dict[str, Any]:
+    return {topic: table(*_columns(bag, topic)) for topic in topics}
+
+
 def _arrays(bag: Bag, topics: Iterable[str]) -> dict[str, Any]:
-    return {f"{_file_stem(topic)}.{name}": array for topic in topics for name, array in _fields(bag, topic).items()}
+    return {
+        f"{_file_stem(topic)}.{_headed(name, unit)}": array
+        for topic in topics
+        for name, (array, unit) in _fields(bag, topic).items()
+    }
+
+
+def _structures(bag: Bag, topics: Iterable[str]) -> dict[str, Any]:
+    structures: dict[str, Any] = {}
+    for topic in topics:
+        fields = {name.replace(".", "_"): field for name, field in _fields(bag, topic).items()}
+        values = {
+            name: array.astype(object) if array.dtype.kind == "U" else array for name, (array, _) in fields.items()
+        }
+        structures[_file_stem(topic)] = values | {"units": {name: unit for name, (_, unit) in fields.items()}}
+    return structures
 
 
 def _file_stem(topic: str) -> str:
     return topic.strip("/").replace("/", "_")
 
 
-def _fields(bag: Bag, topic: str) -> dict[str, NDArray[Any]]:
-    """Return one array per field, units in the names; what has no common length as JSON."""
-    units = _units(bag, topic)
+def _columns(bag: Bag, topic: str) -> tuple[dict[str, NDArray[Any]], dict[str, Units]]:
+    """Return the fields of a topic and their units, the simulated time (s) before all others."""
+    return {"time": bag.times(topic) * 1e-9} | bag.columns(topic), {"time": Units(("s",))} | bag.units(topic)
+
+
+def _fields(bag: Bag, topic: str) -> dict[str, tuple[NDArray[Any], str]]:
+    """Return one array per field with its units; what has no common length as JSON."""
+    columns, units = _columns(bag, topic)
     fields = {}
-    for name, column in bag.columns(topic).items():
-        named = [units[name].of(i) for i in range(column.shape[1] if column.ndim > 1 else 1)]
-        named = named[:1] if len(set(named)) == 1 else named
+    for name, column in columns.items():
         array = column if column.dtype != object else np.array([_text(value) for value in column], np.str_)
-        fields[_headed(name, ", ".join(named) if any(named) else "")] = array
+        fields[name] = array, units[name].together(column.shape[1] if column.ndim > 1 else 1)
     return fields
 
 
@@ -117,10 +150,6 @@ def table(columns: Mapping[str, NDArray[Any]], units: Mapping[str, Units]) -> di
         else:
             table[_headed(name, units[name].of())] = column
     return table
-
-
-def _units(bag: Bag, topic: str) -> dict[str, Units]:
-    return units_of(bag.definition(topic), bag.types.fielddefs, bag.topics[topic].type)
 
 
 def _headed(name: str, unit: str) -> str:

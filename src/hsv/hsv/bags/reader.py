@@ -33,6 +33,7 @@ from hsv.bags.scan import MESSAGE_HEADER, Damage, Scan, content
 from hsv.bags.topic import Qos
 from hsv.bags.track import Track
 from hsv.bags.typestore import message_types
+from hsv.bags.units import Units, units_of
 from hsv.base.errors import RecordingError
 
 _OURS = "/hsv/"
@@ -180,6 +181,10 @@ class Bag:
         if name not in self._columns:
             self._columns[name] = self.track(topic).columns()
         return self._columns[name]
+
+    def units(self, topic: str) -> dict[str, Units]:
+        """Return the units of the fields of a topic, by field path as in :meth:`columns`."""
+        return units_of(self.definition(topic), self.types.fielddefs, self.topics[self.name_of(topic)].type)
 
     def decode(self, topic: str) -> Iterator[tuple[int, Any]]:
         """Yield time in nanoseconds and message of a topic, deserialized one by one.

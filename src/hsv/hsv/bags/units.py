@@ -39,6 +39,11 @@ class Units:
             unit = ""
         return "" if unit == "-" else unit
 
+    def together(self, size: int) -> str:
+        """Return the units of ``size`` elements with commas between, or the one that all share."""
+        named = [self.of(index) for index in range(size)]
+        return ", ".join(named[:1] if len(set(named)) == 1 else named)
+
 
 def units_of(definition: str, types: Typesdict, message_type: str) -> dict[str, Units]:
     """Return the units of every field of a type, by field path as in :mod:`hsv.bags.columns`.

@@ -74,9 +74,10 @@ class ParameterError(HsvError, ValueError):
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return a hint for the message about an unknown ``name``: the nearest known one, or an empty text."""
-    names = list(known)
-    near = difflib.get_close_matches(name, names, 1) or [other for other in names if name and other.startswith(name)]
-    return f" (did you mean {near[0]!r}?)" if near else ""
+    names = {str(other).lower(): str(other) for other in known}
+    written = name.lower()
+    near = difflib.get_close_matches(written, names, 1) or [n for n in names if written and n.startswith(written)]
+    return f" (did you mean {names[near[0]]!r}?)" if near else ""
 
 
 def reason(error: OSError) -> str:

@@ -168,6 +168,14 @@ def diff(
         raise RecordingError(f"{bags[1].path}: no step topic that {bags[0].path} has, too")
     compared = [compare(bags[0].track(topic), bags[1].track(topic), tolerance=tolerance) for topic in topics]
     earliest = min((c.first for c in compared if c.first), key=lambda d: d.time_ns, default=None)
+    units = {
+        c.topic: {
+            name: bags[0].units(c.topic)[name].together(math.prod(bags[0].columns(c.topic)[name].shape[1:]))
+            for name in c.largest
+        }
+        for c in compared
+        if c.largest
+    }
     if json:
         found = _difference(earliest, "first", "second")
         print_json(
@@ -177,18 +185,21 @@ def diff(
                 "in_one_only": {bag.name_of(topic): str(bag.path) for topic, bag in alone.items()},
                 "first_difference": found and earliest and {"topic": earliest.topic, **found},
                 "largest_difference": {c.topic: c.largest for c in compared if c.largest},
+                "units": units,
                 "messages": {c.topic: [c.expected_count, c.actual_count] for c in compared},
                 "messages_of_the_same_step": {c.topic: c.common_count for c in compared},
             }
         )
     else:
         say(*(f"{bag.name_of(topic)} is in {bag.path} only" for topic, bag in alone.items()))
-        _print_comparison(compared, earliest)
+        _print_comparison(compared, earliest, units)
     print_bag_warnings(*bags)
     raise typer.Exit(1 if earliest or alone else 0)
 
 
-def _print_comparison(compared: list[Comparison], earliest: Difference | None) -> None:
+def _print_comparison(
+    compared: list[Comparison], earliest: Difference | None, units: dict[str, dict[str, str]]
+) -> None:
     count = sum(c.actual_count for c in compared)
     common = sum(c.common_count for c in compared)
     if earliest is None:
@@ -200,16 +211,19 @@ def _print_comparison(compared: list[Comparison], earliest: Difference | None) -
         if common < max(sum(c.expected_count for c in compared), count):
             equal = "" if any(c.largest for c in compared) else ", and they are equal"
             say(f"{common} messages of the same steps are compared{equal}")
-    table = new_table("topic", "field", "largest difference", right=["largest difference"])
+    table = new_table("topic", "field", "largest difference")
     for comparison in compared:
         for name, value in comparison.largest.items():
-            table.add_row(comparison.topic, name, "no number" if math.isnan(value) else significant(value))
+            unit = units[comparison.topic][name]
+            number = f"{significant(value)} {'(mixed units)' if ',' in unit else unit}".rstrip()
+            table.add_row(comparison.topic, name, "no number" if math.isnan(value) else number)
     if table.row_count:
         console.print(table)
 
 
 def export(
     bag: BagArgument,
+    form: Annotated[str, Option("--format", help="csv, parquet, npz, or mat for MATLAB and Octave.")] = "",
     csv: Annotated[bool, Option("--csv", help="A folder of CSV files, one per topic.")] = False,
     parquet: Annotated[bool, Option("--parquet", help="A folder of Parquet files, one per topic.")] = False,
     npz: Annotated[bool, Option("--npz", help="One .npz file.")] = False,
@@ -221,17 +235,23 @@ def export(
     out: Annotated[Path | None, Option(help="What to write; default: in the bag's folder.")] = None,
     json: JsonOption = False,
 ) -> None:
-    """Write the topics of a bag as tables with field names and units (SI) in the header, or add a 3-D scene to the bag.
+    """Write the topics of a bag as tables with field names and units (SI), or add a 3-D scene to the bag.
 
-    Example: hsv export bags/case1_20260101T000000Z --csv --topic /hsv/state
+    A mat file is for MATLAB and Octave: a structure per topic, with the units in its field "units".
+
+    Example: hsv export bags/case1_20260101T000000Z --format mat --topic /hsv/state
     """
     from hsv.bags import export as tables
     from hsv.bags.description import TOPICS
     from hsv.bags.reader import Bag
 
-    chosen = [form for form, given in zip(tables.Format, (csv, parquet, npz), strict=True) if given]
+    formats = [*tables.Format]
+    if form and form not in formats:
+        raise ParameterError(f"format = {form!r}: expected one of {', '.join(formats)}{did_you_mean(form, formats)}")
+    flags = {"csv": csv, "parquet": parquet, "npz": npz, form: bool(form)}
+    chosen = [tables.Format(name) for name, given in flags.items() if given]
     if len(chosen) + scene != 1:
-        raise ParameterError("format: expected one of --csv, --parquet, --npz and --scene")
+        raise ParameterError("format: expected one of --csv, --parquet, --npz and --scene, or --format mat")
     opened = Bag(bag)
     if scene:
         from hsv.bags.scene import scene_path, write_scene
@@ -250,7 +270,7 @@ def export(
             raise ParameterError("exaggeration: expected with --scene, tables hold what was recorded")
         # Tables lie in the bag's folder, so that bags/* remains a list of bags.
         home = opened.folder.absolute()
-        out = out or home / (f"{home.name}.npz" if npz else str(chosen[0]))
+        out = out or home / (f"{home.name}.{chosen[0]}" if chosen[0].single else chosen[0])
         written = tables.export(opened, topic or [name for name in TOPICS if name in opened.roles], chosen[0], out)
     print_written(written, json)
     print_bag_warnings(opened)

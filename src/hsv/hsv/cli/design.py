@@ -11,11 +11,13 @@ from rich.text import Text
 from typer import Argument, Option
 
 from hsv.base.errors import DesignError, ParameterError, QuantityError
-from hsv.base.units import UnitSystem, in_system, in_words, significant
+from hsv.base.files import json_text
+from hsv.base.units import UnitSystem, in_words, significant
 from hsv.cli.options import DesignArgument, ForceOption, JsonOption, ScenarioArgument, UnitsOption
 from hsv.cli.output import (
     check_folder,
     check_new,
+    check_target,
     console,
     folded,
     json_system,
@@ -29,6 +31,7 @@ from hsv.cli.output import (
     say,
     stages,
     to_json,
+    unit_key,
     writing,
 )
 
@@ -40,17 +43,13 @@ if TYPE_CHECKING:
 
     from hsv.control.checks import Check
     from hsv.control.design import ControlDesign
+    from hsv.control.linear_model import LinearModel
     from hsv.design.compare import Row
     from hsv.design.inputs import DesignInputs
-    from hsv.model.dynamics import VehicleParameters
     from hsv.model.lpv.linearisation import Mode
-    from hsv.model.trim import Trim
 
 ALTITUDE, VELOCITY = "85000 ft", "7702.0808 ft/s"
 """Flight condition at which the literature publishes a trim: the default of trim and linearise."""
-
-AT_REST = ("0 m/s", "0 m/s^2")
-"""Climb rate and acceleration of level, steady flight."""
 
 AltitudeOption = Annotated[str, Option(help="Altitude with unit, e.g. '85500 ft'.")]
 VelocityOption = Annotated[str, Option(help="Velocity with unit, e.g. '7900 ft/s'.")]
@@ -59,8 +58,6 @@ CouplingOption = Annotated[
 ]
 VehicleOption = Annotated[str, Option(help="Vehicle, by name or path of a TOML file; default: the paper's.")]
 
-READINGS = ("physical", "printed")
-FILTER_UNITS = ("rad", "rad s")
 UNIT_SYSTEMS = {
     UnitSystem.metric: "SI with degrees",
     UnitSystem.si: "SI",
@@ -78,29 +75,11 @@ HALF_WIDTHS = {
 """Columns of a table of invariant sets, with SI units: half-widths of the rigid states, and of the feedback on them."""
 
 
-def _trim_at(
-    vehicle: VehicleParameters,
-    altitude: str,
-    velocity: str,
-    climb_rate: str = AT_REST[0],
-    acceleration: str = AT_REST[1],
-) -> Trim:
-    """Return the equilibrium at a condition with units; an error repeats the condition as it was written."""
-    from hsv.base.units import parse_quantity
-    from hsv.model.trim import trim
-
-    units = {"altitude": "m", "velocity": "m/s", "climb_rate": "m/s", "acceleration": "m/s^2"}
-    written = dict(zip(units, (altitude, velocity, climb_rate, acceleration), strict=True))
-    condition = {name: parse_quantity(text, units[name], name) for name, text in written.items()}
-    shown = [name for name in units if condition[name] or name in ("altitude", "velocity")]
-    return trim(vehicle, **condition, where=", ".join(f"{name} = {written[name]!r}" for name in shown))
-
-
 def trim(
     altitude: AltitudeOption = ALTITUDE,
     velocity: VelocityOption = VELOCITY,
-    climb_rate: Annotated[str, Option(help="Climb rate with unit, e.g. '10 ft/s'.")] = AT_REST[0],
-    acceleration: Annotated[str, Option(help="Acceleration with unit, e.g. '4 ft/s^2'.")] = AT_REST[1],
+    climb_rate: Annotated[str, Option(help="Climb rate with unit, e.g. '10 ft/s'.")] = "0 m/s",
+    acceleration: Annotated[str, Option(help="Acceleration with unit, e.g. '4 ft/s^2'.")] = "0 m/s^2",
     vehicle: VehicleOption = "",
     coupling: CouplingOption = "",
     units: UnitsOption = UnitSystem.metric,
@@ -111,17 +90,16 @@ def trim(
     Example: hsv trim --altitude "85500 ft" --velocity "7900 ft/s" --units paper
     """
     from hsv.model.dynamics import forces
-    from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
+    from hsv.model.trim import trim_at
     from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
 
     parameters = load_vehicle(vehicle or DEFAULT_VEHICLE).coupled(coupling)
-    result = _trim_at(parameters, altitude, velocity, climb_rate, acceleration)
-    names = (*STATE_NAMES, *INPUT_NAMES, "lift", "drag", "thrust", "pitching_moment", "dynamic_pressure")
-    values = (*result.state.tolist(), *result.input.tolist(), *forces(result.state, result.input, parameters))
-    si = (*STATE_UNITS, *INPUT_UNITS, "N", "N", "N", "N m", "Pa")
-    quantities = dict(zip(names, zip(values, si, strict=True), strict=True))
+    found = trim_at(parameters, altitude, velocity, climb_rate, acceleration)
+    units_of_forces = {"lift": "N", "drag": "N", "thrust": "N", "pitching_moment": "N m", "dynamic_pressure": "Pa"}
+    acting = zip(units_of_forces.items(), forces(found.state, found.input, parameters), strict=True)
+    quantities = found.quantities | {name: (value, unit) for (name, unit), value in acting}
     if json:
-        print_json(to_json(quantities, units) | {"largest_residual_si": result.residual})
+        print_json(to_json(quantities, units) | {"largest_residual_si": found.residual})
     else:
         print_table("Trim", quantities, units, digits=5)
 
@@ -133,63 +111,64 @@ def linearise(
     coupling: CouplingOption = "",
     model: Annotated[str, Option(help="Model: coupled (CM), decoupled (DM), with notch filter (ECM).")] = "CM",
     reading: Annotated[str, Option(help="Pitch rate in eq. 40 (ECM): physical (q) or printed (q').")] = "",
+    out: Annotated[Path | None, Option(help="Also write the model to this .mat, .npz or .json file.")] = None,
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Compute the Jacobians A, B and the poles at a trim point (paper eq. 6 to eq. 9; for the ECM eq. 40 to eq. 43).
+    """Compute the linear model and its poles at a trim point (paper eq. 6 to eq. 9; for the ECM eq. 40 to eq. 43).
 
-    Example: hsv linearise --coupling derived --model ECM
+    Files and JSON have A, B, C and D, the names and units of states, inputs and outputs, and the operating point.
+
+    Example: hsv linearise --coupling derived --model ECM --out model.mat
     """
-    import numpy as np
+    from hsv.control.linear_model import READINGS, linearise
 
-    from hsv.control.notch_filter import continuous, default_sections, series
-    from hsv.model.dynamics import MODELS, jacobian
-    from hsv.model.lpv.linearisation import Filter, extended_jacobian, extended_state, modes
-    from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
-    from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
+    if out:
+        check_target(out, "out", ".mat", ".npz", ".json")
 
-    if model not in (*MODELS, "ECM"):
-        raise QuantityError(f"model = {model!r}: expected one of {', '.join((*MODELS, 'ECM'))}")
-    if reading and model != "ECM":
-        raise QuantityError(f"reading = {reading!r}: expected with model ECM only")
-    reading = reading or READINGS[0]
-    if reading not in READINGS:
-        raise QuantityError(f"reading = {reading!r}: expected one of {', '.join(READINGS)}")
-    parameters = load_vehicle(vehicle or DEFAULT_VEHICLE).coupled(coupling)
-    if model == "DM":
-        parameters = parameters.decoupled()
-    point = _trim_at(parameters, altitude, velocity)
-    names: tuple[str, ...] = STATE_NAMES
-    state_units: tuple[str, ...] = STATE_UNITS
-    other_poles: list[Mode] = []
-    if model == "ECM":
-        notch = Filter(*series(continuous(default_sections())))
-        state = extended_state(point.state, notch)
-        made = {name: extended_jacobian(state, point.input, parameters, notch, name == "printed") for name in READINGS}
-        A, B = made[reading]
-        other_poles = modes(next(made[name][0] for name in READINGS if name != reading))
-        names = tuple("filtered_pitch_rate" if name == "pitch_rate" else name for name in STATE_NAMES)
-        names += tuple(f"filter_{i + 1}" for i in range(len(notch.B)))
-        state_units += FILTER_UNITS * (len(notch.B) // 2)
-    else:
-        A, B = jacobian(point.state, point.input, parameters)
-    poles = modes(A)
-    if json:
+    def linearised(reading: str) -> LinearModel:
+        return linearise(altitude, velocity, vehicle=vehicle, coupling=coupling, model=model, reading=reading)
+
+    found = linearised(reading)
+    other = next((name for name in READINGS if found.reading not in ("", name)), None)
+    poles, other_poles = found.poles, linearised(other).poles if other else []
+    shown = found.in_units(units)
+    if json or out:
         units = json_system(units)
-    state, inputs = (np.array([in_system(1.0, unit, units)[0] for unit in row]) for row in (state_units, INPUT_UNITS))
-    A = A * state[:, None] / state
-    B = B * state[:, None] / inputs
+        shown = found.in_units(units)
+        described = _described(shown, units) | {"poles": list(map(_pole, poles))}
+        if other:
+            described["poles_of_the_other_reading"] = list(map(_pole, other_poles))
+    if out:
+        with writing(out, "out"):
+            if out.suffix == ".json":
+                out.write_text(json_text(described, indent=2) + "\n", encoding="utf-8")
+            else:
+                shown.save(out)
     if json:
-        found = {"states": names, "inputs": INPUT_NAMES, f"A_{units}": A.tolist(), f"B_{units}": B.tolist()}
-        others = {"poles_of_the_other_reading": list(map(_pole, other_poles))} if other_poles else {}
-        print_json({**found, "poles": list(map(_pole, poles)), **others})
+        print_json(described)
         return
-    for name, matrix, columns in (("A", A, names), ("B", B, INPUT_NAMES)):
+    for name, matrix, columns in (("A", shown.A, shown.states), ("B", shown.B, shown.inputs)):
         cells = [[significant(entry) for entry in row] for row in matrix.tolist()]
-        print_matrix(f"{name} ({UNIT_SYSTEMS[units]})", names, columns, cells)
+        print_matrix(f"{name} ({UNIT_SYSTEMS[units]})", list(shown.states), list(columns), cells)
     console.print(_pole_table("Poles", poles))
-    if other_poles:
+    if other:
         console.print(_pole_table("Poles for the other reading of eq. 40", other_poles))
+    if out:
+        say(f"written {out}")
+
+
+def _described(model: LinearModel, units: UnitSystem) -> dict[str, Any]:
+    """Return a linear model as JSON: its numbers are in ``units``, which the names of the matrices say."""
+    values = {name: value.tolist() if hasattr(value, "tolist") else value for name, value in model.as_dict().items()}
+    matrices = {f"{name}_{units}": values.pop(name) for name in "ABCD"}
+    points = (("state", model.states), ("input", model.inputs))
+    at = {
+        f"{name}{'_' * bool(unit_key(unit))}{unit_key(unit)}": value
+        for kind, signals in points
+        for (name, unit), value in zip(signals.items(), values.pop(f"operating_{kind}"), strict=True)
+    }
+    return values | matrices | {"operating_point": at}
 
 
 def _damping(mode: Mode) -> float | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import builtins
 import inspect
 import os
+import re
 import sys
 import traceback
 from collections.abc import Callable, Mapping
@@ -38,12 +39,14 @@ EXIT_CODES = {
 
 EXTRAS = {
     "clarabel": "design",
+    "control": "notebook",
     "cvxpy": "design",
     "distributed": "campaign",
     "foxglove": "live",
     "jinja2": "report",
     "markupsafe": "report",
     "matplotlib": "report",
+    "pandas": "notebook",
     "pyarrow": "campaign",
     "websockets": "live",
 }
@@ -186,6 +189,8 @@ def run(prog: str, commands: Mapping[str, Command], description: str, moved: Map
 def _usage(error: Any, prog: str) -> str:
     # For a choice, typer also prints the type of its own exception.
     message = error.format_message().replace(": Value error, ", ": ")
+    if choice := re.search(r"'([^']*)' is not one of (.*)\.$", message):
+        message += did_you_mean(choice[1], re.findall(r"'([^']*)'", choice[2]))
     return f"{message} (see {error.ctx.command_path if error.ctx else prog} --help)"
 
 

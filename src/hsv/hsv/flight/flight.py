@@ -14,9 +14,11 @@ from hsv.flight.history import History
 from hsv.flight.metrics import FlightData, flight_metrics
 from hsv.model.dynamics import in_model_range
 from hsv.model.plant import FlightStatus
-from hsv.model.signals import NEVER
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES, NEVER, STATE_NAMES, STATE_UNITS
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from hsv.flight.closed_loop import Components
 
 
@@ -71,6 +73,29 @@ class Flight:
     def __repr__(self) -> str:
         steps = len(self.history.flown) - 1
         return f"<Flight of {steps * self.period:g} s, {steps} steps, {self.status.name.lower()}, {self.fingerprint}>"
+
+    def to_frame(self) -> DataFrame:
+        """Return all signals as a table over time (s), a column a number: ``state.altitude``, ``command.elevator_...``.
+
+        The units (SI) of the columns are in ``attrs["units"]``.
+        """
+        from pandas import DataFrame, Index
+
+        names = {
+            N_STATES: dict(zip(STATE_NAMES, STATE_UNITS, strict=True)),
+            N_INPUTS: dict(zip(INPUT_NAMES, INPUT_UNITS, strict=True)),
+        }
+        reference = {"reference": self.reference, "reference_input": self.reference_input}
+        columns, units = {}, {}
+        for signal, values in (self.history.columns() | reference).items():
+            if values.ndim == 1:
+                columns[signal], units[signal] = values, "rad/s" if signal == "filtered_pitch_rate" else "1"
+                continue
+            for column, (name, unit) in zip(values.T, names[values.shape[1]].items(), strict=True):
+                columns[f"{signal}.{name}"], units[f"{signal}.{name}"] = column, unit
+        frame = DataFrame(columns, index=Index(self.time, name="time"))
+        frame.attrs["units"] = {"time": "s", **units}
+        return frame
 
     def data(self) -> FlightData:
         """Return the data from which metrics are computed."""

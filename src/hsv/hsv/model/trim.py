@@ -9,10 +9,11 @@ import numpy as np
 
 from hsv.base.errors import ParameterError, QuantityError, TrimError
 from hsv.base.parameters import Parameter, validate
+from hsv.base.units import parse_quantity
 from hsv.core import doubles, lib
 from hsv.core.arithmetic import arcsine
 from hsv.model.dynamics import MODELS, VehicleParameters, derivative, vehicle_struct
-from hsv.model.signals import INPUT_NAMES, N_INPUTS, N_STATES
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES, STATE_NAMES, STATE_UNITS
 from hsv.model.vehicle import COUPLING_PARAMETER, Vehicle
 
 CONVERGED = 1e-9
@@ -32,6 +33,13 @@ class Trim:
     state: np.ndarray
     input: np.ndarray
     residual: float
+
+    @property
+    def quantities(self) -> dict[str, tuple[float, str]]:
+        """State and input by name, each with its SI unit."""
+        values = (*self.state.tolist(), *self.input.tolist())
+        units = (*STATE_UNITS, *INPUT_UNITS)
+        return dict(zip((*STATE_NAMES, *INPUT_NAMES), zip(values, units, strict=True), strict=True))
 
 
 def balance(
@@ -93,6 +101,29 @@ def trim(
     rates = derivative(x, u, vehicle)
     rates[:2] -= climb_rate, acceleration
     return Trim(x, u, float(np.max(np.abs(rates))))
+
+
+def trim_at(
+    vehicle: VehicleParameters,
+    altitude: float | str,
+    velocity: float | str,
+    climb_rate: float | str = 0.0,
+    acceleration: float | str = 0.0,
+) -> Trim:
+    """Return the equilibrium at a condition of numbers (SI) or of texts with units, as :func:`trim`.
+
+    Raises:
+        QuantityError: A text cannot be read.
+        TrimError: As :func:`trim`; it repeats the condition as it was given.
+    """
+    units = {"altitude": "m", "velocity": "m/s", "climb_rate": "m/s", "acceleration": "m/s^2"}
+    given = dict(zip(units, (altitude, velocity, climb_rate, acceleration), strict=True))
+    condition = {
+        name: parse_quantity(value, units[name], name) if isinstance(value, str) else float(value)
+        for name, value in given.items()
+    }
+    shown = [name for name in units if condition[name] or name in ("altitude", "velocity")]
+    return trim(vehicle, **condition, where=", ".join(f"{name} = {given[name]!r}" for name in shown))
 
 
 def check_equilibrium(where: str, size: float, u: np.ndarray, vehicle: VehicleParameters) -> None:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -20,6 +20,9 @@ from hsv.flight.campaign.sample_runner import SampleRunner
 from hsv.flight.campaign.store import read_result
 from hsv.flight.campaign.table import OUTCOMES
 from hsv.flight.trust import require_trust
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 CONFIDENCE = 0.95
 
@@ -95,6 +98,13 @@ class Results:
     def column(self, name: str) -> np.ndarray:
         """Return a column (flights); numbers that a flight does not define are not a number."""
         return np.asarray(self._column(name).to_numpy())
+
+    def frame(self) -> DataFrame:
+        """Return the whole file as a table: a row per flight, the units (SI) of its columns in ``attrs["units"]``."""
+        table = self._read()
+        frame = table.to_pandas()
+        frame.attrs["units"] = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
+        return frame
 
     @property
     def crashed(self) -> np.ndarray:
