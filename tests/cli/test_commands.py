@@ -317,7 +317,7 @@ def test_bad_input_is_one_line_with_code_2_and_nothing_written(hsv, tmp_path, wo
         (("montecarlo", "case1", "--sampling", "sobl"), "sobol"),
         (("export", ".", "--format", "mta"), "mat"),
         (("linearise", "--model", "ecm"), "ECM"),
-        (("bench", "--only", "mcpa"), "mcap"),
+        (("bench", "--only", "graf"), "graph"),
         (("replay", str(REFERENCE), "--node", "tube"), "tube_mpc"),
     ],
 )
