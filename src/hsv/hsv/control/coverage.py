@@ -1,9 +1,9 @@
-"""Everything in a flight that its certificate does not cover: vehicle, hardware, air, law, faults.
+"""List the properties of a flight that its certificate does not cover: vehicle, hardware, air, law and faults.
 
-A certificate holds for a vehicle with its uncertainty, for the actuators that the design knows, ideal sensors and
-links, still air of the model's density, and a loss of elevator effectiveness down to that of the design's inputs. What
-else a flight declares may be survived, and may even be certified with (``hsv certify``), but this certificate does not
-say so.
+A certificate holds for a vehicle with its uncertainty, the actuators of the design, ideal sensors and links, still air
+of the model's density, and a loss of elevator effectiveness down to the value in the inputs of the design. A flight
+outside these limits can succeed, and ``hsv certify`` may extend the certificate to it, but this certificate makes no
+statement about it.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ HARDWARE_PARAMETERS = (
     *_LINK_PARAMETERS,
     ESTIMATOR_ENABLED,
 )
-"""The hardware that a flight declares."""
+"""Parameters of the hardware of a flight: actuators, air, sensors, links and estimator."""
 
 _LAW = "tube_mpc"
-"""The only controller that has a certificate."""
+"""Name of the only controller that has a certificate."""
 
 _SENSOR_DATA = {"random_walk": "walk", "lag": "lag_decay"}
-"""Fields of sensors that their compiled data has in another form."""
+"""Sensor fields that the sensor data store in another form: field to name in the data."""
 
 _SENSOR_TIMES = ("drift_time",)
-"""Fields that are nothing by themselves."""
+"""Sensor fields that have no effect on their own."""
 
 _LINK_DETAILS = ("burst", "checksum")
 """Parameters of links that have no effect without a loss or a corruption."""
@@ -56,7 +56,7 @@ _SHAPING = ("shear_altitude", "length", "length_forward", "length_up", "lengths"
 
 
 def uncovered_hardware(values: Mapping[str, Any], design: ControlDesign) -> list[str]:
-    """Return what of the hardware in flat parameters, estimator included, the certificate of ``design`` has not.
+    """Return a message for each hardware parameter, or estimator, that the certificate of ``design`` does not cover.
 
     Raises:
         ParameterError: A wrong value, named.
@@ -69,7 +69,7 @@ def uncovered_hardware(values: Mapping[str, Any], design: ControlDesign) -> list
 
 
 def uncovered_vehicle(values: Mapping[str, Any], design: ControlDesign) -> list[str]:
-    """Return what of the vehicle and of the law in flat parameters the certificate of ``design`` has not.
+    """Return a message for each property of vehicle and law that the certificate of ``design`` does not cover.
 
     Raises:
         ParameterError: A wrong value, named.
@@ -98,11 +98,11 @@ def uncovered_vehicle(values: Mapping[str, Any], design: ControlDesign) -> list[
 
 
 def uncovered_faults(faults: Iterable[tuple[str, str, Mapping[str, float]]], effectiveness: float | None) -> list[str]:
-    """Return which of the faults are not a loss of elevator effectiveness that the certificate covers.
+    """Return a message for each fault that the certificate does not cover.
 
     Args:
-        faults: Channel, type and parameters (SI) of each.
-        effectiveness: The least that is certified; ``None``: not known.
+        faults: Channel, type and parameters (SI) of each fault.
+        effectiveness: Smallest certified elevator effectiveness, or ``None`` if it is not known.
     """
     found = []
     for channel, kind, parameters in dict.fromkeys((c, k, tuple(p.items())) for c, k, p in faults):
@@ -116,10 +116,10 @@ def uncovered_faults(faults: Iterable[tuple[str, str, Mapping[str, float]]], eff
         else:
             continue
         known = {parameter.name: parameter for parameter in fault_parameters(channel, kind)}
-        said = ", ".join(
+        shown = ", ".join(
             f"{name} {known[name].written(channel, value, UnitSystem.paper)}" for name, value in parameters
         )
-        found.append(f"fault: {kind} of {channel}{f' ({said})' if said else ''}; the certificate is for {why}")
+        found.append(f"fault: {kind} of {channel}{f' ({shown})' if shown else ''}; the certificate is for {why}")
     return found
 
 
@@ -129,17 +129,17 @@ def uncovered(
     certificate: Mapping[str, Any] | None,
     faults: Iterable[tuple[str, str, Mapping[str, float]]],
 ) -> list[str]:
-    """Return what of a flight no certificate covers, an entry a thing; empty where all of it is covered.
+    """Return a message for each property of a flight that the certificate does not cover; empty if all are covered.
 
     Args:
         values: Flat parameters of the flight.
-        design: Its design.
+        design: Design of the flight.
         certificate: Certificate of the design, if available.
-        faults: Channel, type and parameters (SI) of each.
+        faults: Channel, type and parameters (SI) of each fault.
 
     Raises:
         ParameterError: A wrong value, named.
-        DesignError: The certificate does not say which loss of effectiveness it covers.
+        DesignError: The certificate does not state which loss of effectiveness it covers.
     """
     controller = str(validate(CONTROLLER_PARAMETERS, values)["controller"])
     if controller != _LAW or design is None or design.tube is None:
@@ -166,7 +166,7 @@ def _effectiveness(certificate: Mapping[str, Any]) -> float:
 
 
 def commanded(design: ControlDesign) -> np.ndarray:
-    """Return the largest magnitude (2) of a command: that of a certified plan plus the feedback in the tube."""
+    """Return the largest magnitude (2) of a command: certified plan plus feedback in the tube."""
     bounds = design.plan_bounds
     if bounds is None:
         return np.maximum(np.abs(design.input_minimum), np.abs(design.input_maximum))
@@ -180,7 +180,7 @@ def _actuators(v: Mapping[str, Any], design: ControlDesign) -> Iterator[str]:
     for i, channel in enumerate(INPUT_NAMES):
         where = f"actuator.{channel}"
         flown, certified = v[f"{where}.set"], known.get(channel, IDEAL)
-        # The stops of the vehicle, which the tightened inputs avoid, hold as well as those of the actuator.
+        # A stop is judged below: it matters only if it is narrower than the largest command.
         own = [
             _quantity(p, v[p.name][0])
             for p in ACTUATOR_PARAMETERS
@@ -190,8 +190,8 @@ def _actuators(v: Mapping[str, Any], design: ControlDesign) -> Iterator[str]:
             and v[p.name]
         ]
         if flown != certified or own:
-            said = ", ".join([flown, *own]) if own else flown
-            yield f"{where}: {said}; the certificate is for {'an ideal one' if certified == IDEAL else certified}"
+            shown = ", ".join([flown, *own]) if own else flown
+            yield f"{where}: {shown}; the certificate is for {'an ideal one' if certified == IDEAL else certified}"
         given = v[f"{where}.stop"]
         stop = given[0] if given else ACTUATOR_SETS[flown].stop if flown != IDEAL else np.inf
         reach = commanded(design)[i]
@@ -205,19 +205,19 @@ def _sensors(v: Mapping[str, Any], period: float) -> Iterator[str]:
     chosen = v["sensors.set"]
     of = f" (set {chosen})" if chosen != IDEAL else ""
     for i, (channel, unit) in enumerate(zip(STATE_NAMES, STATE_UNITS, strict=True)):
-        said = []
+        errors = []
         for field in FIELDS:
             if field.name in _SENSOR_TIMES:
                 continue
             value = float(getattr(data, _SENSOR_DATA.get(field.name, field.name))[i])
             if value != field.standard:
                 name = field.name.replace("_", " ")
-                # Lag and random walk are kept as what they are over a period.
-                said.append(name if field.name in _SENSOR_DATA else f"{name} {_written(value, field.unit, unit)}")
+                # The data hold lag and random walk per period, so that their value is not in the unit of the field.
+                errors.append(name if field.name in _SENSOR_DATA else f"{name} {_written(value, field.unit, unit)}")
         if data.inertial_angle_of_attack and channel == "angle_of_attack" and data.on[i]:
-            said.append("the error of the pitch angle")
-        if said:
-            yield f"sensors.{channel}: {', '.join(said)}{of}; the certificate is for an ideal one"
+            errors.append("the error of the pitch angle")
+        if errors:
+            yield f"sensors.{channel}: {', '.join(errors)}{of}; the certificate is for an ideal one"
 
 
 def _links(v: Mapping[str, Any]) -> Iterator[str]:
@@ -242,7 +242,7 @@ def _air(v: Mapping[str, Any], period: float) -> Iterator[str]:
 
 
 def _quantity(parameter: Parameter, value: float) -> str:
-    """Return name and value of an actuator's parameter, the value of one of the air."""
+    """Return the text of a value: with the parameter's name for an actuator, without it for the air."""
     name = parameter.name.rpartition(".")[2]
     if name == "natural_frequency":
         return f"natural frequency {value:g} rad/s"

@@ -1,4 +1,4 @@
-"""Notch filter on the pitch-rate channel (paper eq. 38, eq. 39), discretised by the prewarped bilinear rule."""
+"""Notch filter of the pitch rate (paper eq. 38, eq. 39), discretised by the bilinear rule with prewarping."""
 
 from __future__ import annotations
 
@@ -25,13 +25,16 @@ DESIGN_NOTCH_PARAMETERS = (
     Parameter("notch.pole_frequency", [15.0], "natural frequency of the poles", "rad/s", 0.1, 1e3),
     Parameter("notch.pole_damping", [0.5], "damping ratio of the poles: larger is wider", "", 1e-3, 10.0),
 )
-"""The filter that a design is made for."""
+"""Parameters of the notch filter for which a design is made."""
 
 FLOWN_NOTCH_PARAMETERS = tuple(
     Parameter(p.name.replace("notch.", "notch.flown."), [], f"flown instead of {p.name}", p.unit, p.minimum, p.maximum)
     for p in DESIGN_NOTCH_PARAMETERS[1:]
 )
-"""Notch filter of a flight that replaces the design's; empty: the design's. The invariant set does not hold for it."""
+"""Parameters of a notch filter that replaces the design's in one flight; the invariant set does not hold for it.
+
+An empty list keeps the value of the design.
+"""
 
 NOTCH_PARAMETERS = (
     *DESIGN_NOTCH_PARAMETERS,
@@ -42,7 +45,7 @@ NOTCH_PARAMETERS = (
 
 @dataclass(frozen=True)
 class NotchSection:
-    """One second-order section (paper eq. 38); frequencies in rad/s, damping ratios dimensionless."""
+    """A second-order section of the notch filter (paper eq. 38); frequencies in rad/s, damping ratios dimensionless."""
 
     zero_frequency: float
     zero_damping: float
@@ -50,7 +53,7 @@ class NotchSection:
     pole_damping: float
 
     def state_space(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """Return A (2, 2), B (2), C (2), D of the continuous filter (paper eq. 39), controller canonical form."""
+        """Return A (2, 2), B (2), C (2), D of the continuous section in controller canonical form (paper eq. 39)."""
         w_z, e_z, w_p, e_p = self.zero_frequency, self.zero_damping, self.pole_frequency, self.pole_damping
         ratio = w_p / w_z
         gain = ratio * ratio
@@ -61,13 +64,13 @@ class NotchSection:
 
 
 def default_sections() -> tuple[NotchSection, ...]:
-    """Return the filter that the parameters describe when none is given."""
+    """Return the sections of the default parameters."""
     return flown_sections({})
 
 
 @dataclass(frozen=True, eq=False)
 class NotchData(Data):
-    """Sections in series: A (n, 2, 2), B, C (n, 2), D (n), and G (n, 2), the equilibrium for an input of one."""
+    """Sections in series: A (n, 2, 2), B (n, 2), C (n, 2), D (n), and the equilibrium G (n, 2) for unit input."""
 
     KIND = "hsv_notch"
 
@@ -79,7 +82,7 @@ class NotchData(Data):
 
 
 def discretise(sections: Sequence[NotchSection], period: float) -> NotchData:
-    """Return the sections discretised at ``period`` (s), each prewarped at its centre, so that the notch stays there.
+    """Return the sections discretised at ``period`` (s), each prewarped to keep its centre frequency.
 
     Raises:
         ParameterError: A centre frequency at or above the Nyquist frequency.
@@ -94,38 +97,43 @@ def discretise(sections: Sequence[NotchSection], period: float) -> NotchData:
                 f"expected less than the Nyquist frequency {math.pi / period:.6g} rad/s"
             )
         A, _, C, D = section.state_space()
-        # Bilinear rule s = (1 / half) (z - 1) / (z + 1), half the step that maps the centre frequency onto itself.
+        # Bilinear rule s = (1 / half) (z - 1) / (z + 1); this value of half maps the centre frequency onto itself.
         half = tangent(angle) / section.zero_frequency
         identity = np.eye(2)
-        inverse = solve(identity - half * A, identity)  # of I - half A; I + half A is twice the identity less that
-        data.A[i] = 2.0 * inverse - identity
-        data.B[i] = 2.0 * half * inverse[:, 0]  # B of the section is (1, 0)
+        inverse = solve(identity - half * A, identity)
+        data.A[i] = 2.0 * inverse - identity  # inverse (I + half A), since I + half A = 2 I - (I - half A)
+        data.B[i] = 2.0 * half * inverse[:, 0]  # the section has B = (1, 0)
         data.C[i] = C[0] * inverse[0] + C[1] * inverse[1]
         data.D[i] = D + half * data.C[i, 0]
-        data.G[i] = _rest_of(A)
+        data.G[i] = _equilibrium(A)
     return data
 
 
 def continuous(sections: Sequence[NotchSection]) -> NotchData:
-    """Return the sections as they are in continuous time (paper eq. 39)."""
+    """Return the sections in continuous time (paper eq. 39)."""
     n = len(sections)
     data = NotchData(np.zeros((n, 2, 2)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n), np.zeros((n, 2)))
     for i, section in enumerate(sections):
         data.A[i], data.B[i], data.C[i], data.D[i] = section.state_space()
-        data.G[i] = _rest_of(data.A[i])
+        data.G[i] = _equilibrium(data.A[i])
     return data
 
 
-def _rest_of(A: np.ndarray) -> np.ndarray:
-    """Return the equilibrium (2) for an input of one, of the continuous section ``A`` (2, 2) and of the discrete one.
+def _equilibrium(A: np.ndarray) -> np.ndarray:
+    """Return the equilibrium (2) for unit input of a continuous section with ``A`` (2, 2).
 
-    The bilinear rule leaves it where it is.
+    The bilinear rule does not change it.
     """
     return np.array([0.0, -1.0 / A[0, 1]])
 
 
 def notch_response(sections: Sequence[NotchSection], frequencies: np.ndarray) -> np.ndarray:
-    """Return H(j omega) (f) of continuous sections in series (paper eq. 37, eq. 38), ``frequencies`` in rad/s."""
+    """Return the response H(j omega) (f) of continuous sections in series (paper eq. 37, eq. 38).
+
+    Args:
+        sections: Sections of the filter.
+        frequencies: (f) rad/s.
+    """
     total = np.ones(len(frequencies), complex)
     for n in sections:
         zero, pole = 1j * frequencies / n.zero_frequency, 1j * frequencies / n.pole_frequency
@@ -136,13 +144,13 @@ def notch_response(sections: Sequence[NotchSection], frequencies: np.ndarray) ->
 def with_notch(
     A: np.ndarray, B: np.ndarray, gain: np.ndarray, notch: NotchData
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the open sampled loop of a vehicle whose feedback uses the filtered pitch rate.
+    """Return the open loop of vehicle and notch filter, in discrete time, and the gain of its state.
 
     Args:
-        A: (..., n, n) state matrices, discrete time, the pitch rate among the states.
-        B: (..., n, m) input matrices.
-        gain: (m, n) of u = gain x with the filtered pitch rate in x.
-        notch: The discrete filter, of s states.
+        A: (..., n, n) state matrices of the vehicle, discrete time, with the pitch rate among the states.
+        B: (..., n, m) input matrices of the vehicle.
+        gain: (m, n) gain of u = gain x, where x contains the filtered pitch rate.
+        notch: Discrete filter with s states.
 
     Returns:
         A (..., n + s, n + s), B (..., n + s, m) and gain (m, n + s) of vehicle and filter.
@@ -158,7 +166,7 @@ def with_notch(
 
 
 def series(data: NotchData) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return A (2 n, 2 n), B (2 n), C (2 n), D of all n sections in series, states in the order of flight."""
+    """Return A (2 n, 2 n), B (2 n), C (2 n), D of all n sections in series, with the states in section order."""
     size = 2 * len(data.D)
     A, B, C, D = np.zeros((size, size)), np.zeros(size), np.zeros(size), 1.0
     for i in range(len(data.D)):
@@ -173,7 +181,7 @@ def series(data: NotchData) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
 
 
 def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
-    """Return the sections of the filter in flight: those of the flight if given, else those of the design.
+    """Return the sections of the filter in flight: the values of the flight where given, else those of the design.
 
     Raises:
         ParameterError: A wrong value, or arrays of different lengths.
@@ -182,42 +190,44 @@ def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
     pairs = zip(DESIGN_NOTCH_PARAMETERS[1:], FLOWN_NOTCH_PARAMETERS, strict=True)
     chosen = [flown if v[flown.name] else designed for designed, flown in pairs]
     columns = [v[parameter.name] for parameter in chosen]
-    # What is left as designed is right: blame what the flight has otherwise.
-    model = next((p for p in chosen if p in DESIGN_NOTCH_PARAMETERS), chosen[0])
-    n = len(v[model.name])
+    # The values of the design have the right length: an error names a value of the flight.
+    standard = next((p for p in chosen if p in DESIGN_NOTCH_PARAMETERS), chosen[0])
+    n = len(v[standard.name])
     for parameter, column in zip(chosen, columns, strict=True):
         if len(column) != n or not 1 <= n <= MAX_SECTIONS:
             raise ParameterError(
                 f"parameter {parameter.name}: {len(column)} values, "
-                f"expected as many as {model.name}, {n} (1 to {MAX_SECTIONS})"
+                f"expected as many as {standard.name}, {n} (1 to {MAX_SECTIONS})"
             )
     return tuple(NotchSection(*row) for row in zip(*columns, strict=True))
 
 
 class NotchResult(NamedTuple):
-    """``filtered_pitch_rate`` (rad/s) and the filter states (2 n) before the update of this step."""
+    """Result of a step: ``filtered_pitch_rate`` (rad/s) and the ``filter_state`` (2 n) before the step."""
 
     filtered_pitch_rate: float
     filter_state: np.ndarray
 
 
 class NotchFilter:
-    """Sections in series on the pitch rate, unfiltered if there are none; an estimator may precede them."""
+    """Notch filter of the pitch rate: sections in series, optionally behind a state estimator.
+
+    Without sections the pitch rate passes unchanged.
+    """
 
     PARAMETERS = (*NOTCH_PARAMETERS, *Estimator.PARAMETERS)
 
     def __init__(self, sections: Sequence[NotchSection], period: float, estimator: Estimator | None = None) -> None:
         self.sections = tuple(sections)
         self.estimator = estimator
-        """Estimator that computes the state, whose pitch rate is filtered, from a measurement; None: the measurement is
-        used."""
+        """Estimator whose pitch rate is filtered; None: the measured pitch rate is filtered."""
         self.data = discretise(sections, period)
         self._state = np.zeros(2 * len(sections))
         self._started = False
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
-        """Build from the parameters of :data:`NOTCH_PARAMETERS` and, where there is one, those of the estimator.
+        """Build the filter from :data:`NOTCH_PARAMETERS` and, if the estimator is enabled, its parameters.
 
         Raises:
             ParameterError: A wrong value, or arrays of different lengths.
@@ -230,11 +240,11 @@ class NotchFilter:
         return cls(sections if v["notch.enabled"] else [], period, estimator)
 
     def reset(self) -> None:
-        """Forget the past: the next step starts at rest for its own input."""
+        """Reset the filter: the next step starts from the equilibrium for its input."""
         self._started = False
 
     def step(self, pitch_rate: float) -> NotchResult:
-        """Filter the next ``pitch_rate`` (rad/s)."""
+        """Filter the next value of ``pitch_rate`` (rad/s)."""
         if not self._started:
             lib.hsv_notch_rest(self.data.pointer, pitch_rate, doubles(self._state))
             self._started = True

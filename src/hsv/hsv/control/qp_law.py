@@ -1,8 +1,8 @@
-"""A quadratic programme as the nominal law: u_n = K x_n + c over a horizon, every step, where the tube is certified.
+"""The nominal law u_n = K x_n + c, where c over the horizon solves a quadratic programme in every step.
 
-Inputs stay in U minus F Z and in the range of the certified plans, the nominal pitch acceleration in theirs: the
-disturbance set was measured along those plans. With the inputs of U minus F Z alone the plan disturbs several times as
-much as that set holds (filtering the pitch rate that it asks for, most of all).
+The programme keeps the inputs in U minus F Z and in the range of the certified plans, and the nominal pitch
+acceleration in the range of those plans, because the disturbance set was measured along them. A plan bounded by
+U minus F Z alone causes disturbances several times as large as the set, mainly through the filtered pitch rate.
 """
 
 from __future__ import annotations
@@ -18,36 +18,38 @@ from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.model.signals import N_RIGID, PITCH_RATE
 
 BLOCKS = 30
-"""Blocks of the horizon, c constant in each."""
+"""Number of blocks of the horizon; c is constant in each block."""
 
 BLOCK_TIME = 0.5
 """Length of a block, s."""
 
 CHECKED_NEAR, CHECKED_FAR = (0.0, 0.24, 0.48, 0.72, 0.96), (0.0, 0.48)
-"""Positions in a block at which bounds are imposed, as fractions of it; imposed at its ends only, inputs overshoot."""
+"""Positions in a block at which bounds are imposed, as fractions of it; with bounds at its ends alone inputs overshoot.
+"""
 
 NEAR_BLOCKS = 10
-"""Blocks that count as near, where inputs move fast; the pitch acceleration is bounded in these."""
+"""Number of near blocks, in which the inputs move fast; the pitch acceleration is bounded in these blocks only."""
 
 _ITERATIONS = 60
 """Iteration limit of the solver; about 10 are needed."""
 
 
 class QpLaw:
-    """Horizon 15 s, prediction by the model at the reference, K of its Riccati equation.
+    """Nominal law by quadratic programming: horizon 15 s, model and Riccati gain K at the final reference.
 
-    About that K the infinite-horizon cost is x' P x plus the sum of c' (R + B' P B) c: the Hessian does not depend on
-    the state, and c = 0 is the answer wherever it keeps the bounds. The solver starts cold each time, so that the input
-    depends on x_n alone. Where it fails, the plan before goes on, shifted; where there is none, the family flies.
+    With this K the infinite-horizon cost is x' P x plus the sum of c' (R + B' P B) c. The Hessian is therefore
+    constant, and c = 0 is optimal wherever it satisfies the bounds. The solver starts cold in every step, so that the
+    input depends on x_n alone. If the solver fails, the law continues the previous plan; if there is no plan or it has
+    run out, the family of nominal gains takes over.
     """
 
     in_core = False
 
     def __init__(self, design: ControlDesign, data: NominalData, reference: ReferenceTrajectory) -> None:
-        """Prepare the programme for the design's plan bounds, less the reference inputs of the whole flight.
+        """Prepare the programme: its bounds are the plan bounds of the design minus the reference inputs of the flight.
 
         Raises:
-            DesignError: The design carries none, or the reference input does not lie inside.
+            DesignError: The design has no plan bounds, or the reference inputs lie outside them.
         """
         bounds = design.plan_bounds
         if bounds is None:
@@ -71,7 +73,7 @@ class QpLaw:
         K = -np.linalg.solve(weight, B.T @ P @ A)
         self.gain = np.zeros(data.gains.shape[1:])
         self.gain[:, :N_RIGID] = K
-        # Inputs and c in units of their scales, the pitch acceleration in units of its range.
+        # Rows of inputs and c are scaled by the input scales, rows of the pitch acceleration by its range.
         low, high = bounds.pitch_acceleration
         size = np.append(self._scale, high - low)
         rate = np.append(A[PITCH_RATE] - np.eye(N_RIGID)[PITCH_RATE], B[PITCH_RATE]) / design.period
@@ -86,12 +88,12 @@ class QpLaw:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the plan."""
+        """Discard the current plan."""
         self._plan: np.ndarray | None = None
         self._age = 0
 
     def step(self, deviation: np.ndarray) -> LawResult:
-        """Return the nominal input for x_n (9)."""
+        """Return the nominal input for the nominal deviation x_n (9)."""
         status = NominalStatus.OK
         plan = self._solve(deviation[:N_RIGID])
         if plan is not None:
@@ -108,14 +110,14 @@ class QpLaw:
         return LawResult(np.clip(planned, self._lower, self._upper), self.gain, NOT_IN_FAMILY, status)
 
     def _solve(self, state: np.ndarray) -> np.ndarray | None:
-        """Return the optimal c (blocks, 2), ``None`` where the solver fails."""
+        """Return the optimal c (blocks, 2), or ``None`` if the solver fails."""
         inputs = self._state_map @ state
         lower, upper = self._bounds[0] - inputs, self._bounds[1] - inputs
         if np.all(lower <= 0.0) and np.all(upper >= 0.0):
             return np.zeros((BLOCKS, len(self._scale)))
         if not np.all(np.isfinite(inputs)):
             return None
-        # Updating a solver would leave traces of the problems before in the last bits of the answer.
+        # A new solver for each problem: an updated one would give results whose last bits depend on earlier problems.
         solver = piqp.DenseSolver()
         solver.settings.max_iter = _ITERATIONS
         solver.setup(self._hessian, np.zeros(len(self._hessian)), None, None, self._input_map, lower, upper)
@@ -127,9 +129,18 @@ class QpLaw:
 def _predicted(
     closed: np.ndarray, B: np.ndarray, K: np.ndarray, rate: np.ndarray, block: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what maps x_n and all c to both inputs and to ``rate`` [x; u] where bounds are imposed, block after block.
+    """Return the matrices that map x_n and all c to the bounded quantities, at each position where bounds are imposed.
 
-    The third array tells which of these rows are bounded: the rate in near blocks only.
+    Args:
+        closed: (n, n) closed loop A + B K.
+        B: (n, m) input matrix.
+        K: (m, n) gain.
+        rate: (n + m) row that gives the pitch acceleration from [x; u].
+        block: Steps per block.
+
+    Returns:
+        State map (rows, n), map of c (rows, m blocks), and a mask (rows) of the bounded rows: at each position both
+        inputs, and in near blocks the pitch acceleration.
     """
     n, m = B.shape
     power, forced = [np.eye(n)], [np.zeros((n, m))]

@@ -1,20 +1,22 @@
-"""The reference of a flight: piecewise-linear commands and, at each of their points, the equilibrium that flies them.
+"""The reference of a flight: piecewise-linear commands of altitude and velocity, with the trim at every step.
 
-The reference of a ramp is the climbing, accelerating trim of the nominal decoupled vehicle. It moves, and it does so
-under the vehicle's own dynamics: phi_T(x_r(k), u_r(k)), the nominal vehicle over one period, is x_r(k+1) but for
+On a ramp the reference state x_r is the climbing, accelerating trim of the nominal decoupled vehicle. Such a reference
+moves with the dynamics of the vehicle: with phi_T, the flow of the nominal vehicle over one period, the next reference
+state is phi_T(x_r(k), u_r(k)) except for the defect
 
-    d_r(k) = phi_T(x_r(k), u_r(k)) - x_r(k+1),
+    d_r(k) = phi_T(x_r(k), u_r(k)) - x_r(k+1).
 
-the defect: the jump of a step or of a ramp's corner, and on a ramp the little by which a sequence of trims is not yet a
-flight. The nominal system is driven by it, x_n(k+1) = A(p) x_n + B(p) u_n + d_r(k). To drive it by x_r(k) - x_r(k+1)
-would take the climb itself, some 6 cm a period, for a disturbance: that is right for a static trim alone, which stays
-where it is, phi_T(x_r) = x_r. Where the reference is constant the defect is exactly zero.
+The defect contains the jump at a step or at a corner of a ramp. On a ramp it is small: the difference between a
+sequence of trims and a solution of the equations of motion. Where the reference is constant it is exactly zero. The
+defect drives the nominal system, x_n(k+1) = A(p) x_n + B(p) u_n + d_r(k). With x_r(k) - x_r(k+1) in its place the
+climb itself, about 6 cm per period, would be a disturbance; that form is right for static trims only, for which
+phi_T(x_r) = x_r.
 
-Corners may be blended: the piecewise-linear commands averaged over time by a triangle of half-width w. Within w of a
-corner, where the rate changes by s, that adds s (w - |t|)^3 / (6 w^2), t the time from it. The rate is then
-continuous, and so is its own rate, at most s / w; the next is at most s / w^2: the reference is limited in jerk. There
-the flight path turns, and x_r is the trim of a steady pull-up: q_r = h'' / (V cos gamma), the rate of the flight-path
-angle. In trims that do not turn, q_r = 0, all of the turn would be left to d_r.
+Corners can be blended: the piecewise-linear commands are averaged over time by a triangle of half-width w. Within w of
+a corner at which the rate changes by s, this adds s (w - |t|)^3 / (6 w^2), with t the time from the corner. The rate
+and the acceleration are then continuous; the acceleration is at most s / w and the jerk at most s / w^2. The flight
+path turns there, and x_r is the trim of a steady pull-up with q_r = h'' / (V cos gamma), the rate of the flight-path
+angle. With trims at q_r = 0 the defect would have to contain the whole turn.
 """
 
 from __future__ import annotations
@@ -52,14 +54,14 @@ REFERENCE_PARAMETERS = (
 )
 
 COLUMNS = ("times", "altitudes", "velocities", "blends")
-"""Names of what a corner has, in the plural: of parameters, after ``reference.``, and of the fields of a message."""
+"""Names of the columns of a list of corners: parameters after ``reference.``, and fields of the message."""
 
 SUBSTEPS = 2
-"""Runge-Kutta steps per period in phi_T, the default of the plant."""
+"""Runge-Kutta steps per period in phi_T; the plant has the same default."""
 
 
 class Corner(NamedTuple):
-    """A point of the commands: time (s), altitude (m), velocity (m/s), half the time in which the rate changes (s)."""
+    """A corner of the commands: time (s), altitude (m), velocity (m/s) and half-width (s) of its blend."""
 
     time: float
     altitude: float
@@ -69,9 +71,9 @@ class Corner(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ReferenceData(Data):
-    """x_r (r, 9), u_r (r, 2), d_r (r, 9) as the core takes them; row 0 is that of step ``first``.
+    """Reference x_r (r, 9), u_r (r, 2) and defect d_r (r, 9) for the core; row 0 belongs to step ``first``.
 
-    The reference stands still before the first row and after the last.
+    The reference is constant before the first row and after the last.
     """
 
     KIND = "hsv_reference"
@@ -81,12 +83,15 @@ class ReferenceData(Data):
     defect: np.ndarray
 
     def rows(self, chosen: np.ndarray | slice) -> ReferenceData:
-        """Return the chosen rows, the first of which is that of step 0."""
+        """Return the chosen rows as a reference that begins at step 0."""
         return ReferenceData(0, self.state[chosen], self.input[chosen], self.defect[chosen])
 
 
 class ReferenceTrajectory:
-    """x_r(k), u_r(k) and the defect d_r(k) of every step k, computed once; constant parts are stored once."""
+    """The reference x_r(k), u_r(k) and its defect d_r(k) for every step k, computed once.
+
+    Constant parts before the first and after the last corner take one row each.
+    """
 
     def __init__(
         self,
@@ -98,16 +103,16 @@ class ReferenceTrajectory:
         trim: str = "climbing",
         blend: float | Sequence[float] = 0.0,
     ) -> None:
-        """Trim the nominal decoupled vehicle at all points of the commands.
+        """Trim the nominal decoupled vehicle at every step of the commands.
 
         Args:
-            times: (b) in s, not decreasing; of two equal times the later value holds from there on.
-            altitudes: (b) in m.
-            velocities: (b) in m/s.
+            times: (b) times of the corners, s, not decreasing; two equal times define a step to the later value.
+            altitudes: (b) m.
+            velocities: (b) m/s.
             period: Control period, s.
             rigid: Parameters of the nominal decoupled vehicle.
-            trim: One of :data:`TRIMS`; ``"static"`` takes climb rate and acceleration of a ramp for zero.
-            blend: Half the time in which the rate changes at a corner, s; one for all corners or one each (b).
+            trim: One of :data:`TRIMS`; ``"static"`` sets climb rate and acceleration on a ramp to zero.
+            blend: Half-width of the blend, s; one value for all corners, or one for each (b).
 
         Raises:
             ParameterError: Arrays of different lengths, times that decrease, or commands that cannot be blended.
@@ -123,7 +128,7 @@ class ReferenceTrajectory:
         bend = np.zeros(len(steps))
         if np.any(half):
             _blend(instants, commands, steps, half, command, slope, bend)
-        # What a static trim does not know of.
+        # A static trim has neither climb rate nor acceleration nor turn.
         rate, bend = (slope / period, bend / (period * period)) if trim == "climbing" else (0.0 * slope, 0.0 * bend)
         rows = len(steps)
         self.data = ReferenceData(
@@ -131,7 +136,7 @@ class ReferenceTrajectory:
         )
         self._along = self.data.rows(slice(0))
         self.corners = tuple(map(Corner, *(map(float, column) for column in (times, altitudes, velocities, blends))))
-        """The commands, one corner after the other."""
+        """The corners of the commands in order of time."""
         size, inputs = np.full(rows, np.inf), self.data.input
         lib.hsv_reference_rows(
             vehicle_struct(rigid).pointer,
@@ -153,7 +158,15 @@ class ReferenceTrajectory:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object], period: float) -> Self:
-        """Build from :data:`REFERENCE_PARAMETERS` and the vehicle's for a control ``period`` (s); errors as above."""
+        """Build the reference from :data:`REFERENCE_PARAMETERS` and the parameters of the vehicle.
+
+        Args:
+            values: Flat parameters.
+            period: Control period (s).
+
+        Raises:
+            ParameterError, TrimError: As for the constructor.
+        """
         v = validate(REFERENCE_PARAMETERS, values)
         vehicle = Vehicle.from_parameters(values)
         vehicle.check_envelope(REFERENCE_PARAMETERS, v)
@@ -163,20 +176,20 @@ class ReferenceTrajectory:
 
     @property
     def columns(self) -> dict[str, list[float]]:
-        """Times (s), altitudes (m), velocities (m/s) and blends (s) of the corners, as :data:`REFERENCE_PARAMETERS`."""
+        """Corners by column, see :data:`COLUMNS`: times (s), altitudes (m), velocities (m/s) and blends (s)."""
         columns = zip(*self.corners, strict=True)
         return {name: list(column) for name, column in zip(COLUMNS, columns, strict=True)}
 
     def row(self, step: int) -> int:
-        """Return the row of :attr:`data` that holds ``step``."""
+        """Return the row of :attr:`data` for ``step``."""
         return min(max(step - self.data.first, 0), len(self.data.state) - 1)
 
     def rows(self, steps: int) -> np.ndarray:
-        """Return the rows of the first ``steps`` steps."""
+        """Return the rows of :attr:`data` (steps) for the first ``steps`` steps."""
         return np.clip(np.arange(steps) - self.data.first, 0, len(self.data.state) - 1)
 
     def along(self, steps: int) -> ReferenceData:
-        """Return the rows of the first ``steps`` steps, one each; they are shared by all who ask."""
+        """Return the reference with one row for each of the first ``steps`` steps, cached; do not change it."""
         along = self._along
         if len(along.state) != steps:
             rows = self.rows(steps)
@@ -204,10 +217,10 @@ def _commands(times: Sequence[float], altitudes: Sequence[float], velocities: Se
 
 
 def _blends(times: Sequence[float], blend: float | Sequence[float]) -> np.ndarray:
-    """Return the blend of each corner (b), s.
+    """Return the half-width of the blend of each corner (b), s.
 
     Raises:
-        ParameterError: Blends of another length, of a step, or one that would begin before the flight.
+        ParameterError: A wrong number of blends, a blend at a step, or a blend that begins before the flight.
     """
     if isinstance(blend, Sequence) and len(blend) != len(times):
         raise ParameterError(
@@ -235,9 +248,16 @@ def _blend(
     slope: np.ndarray,
     bend: np.ndarray,
 ) -> None:
-    """Average ``command`` (r, 2) and ``slope`` (r, 2) about every corner; ``half`` (b) its triangle's width, steps.
+    """Blend the commands at every corner, in place.
 
-    To ``bend`` (r), add the change of the first slope per step.
+    Args:
+        instants: (b) times of the corners, steps.
+        commands: (b, 2) altitude (m) and velocity (m/s) at the corners.
+        steps: (r) steps of the rows.
+        half: (b) half-width of the blend, steps.
+        command: (r, 2) commands, changed in place.
+        slope: (r, 2) change of the commands per step, changed in place.
+        bend: (r) change of the climb rate, m per step squared, added to in place.
     """
     before = np.zeros(commands.shape[1])
     for index in range(len(instants)):
@@ -248,27 +268,27 @@ def _blend(
         before = after
         if width == 0.0:
             continue
-        gone = steps - instants[index]
-        left = np.maximum(width - np.abs(gone), 0.0)[:, None]
+        since = steps - instants[index]
+        left = np.maximum(width - np.abs(since), 0.0)[:, None]
         command += change * (left * left * left / (6.0 * width * width))
-        slope += np.where(gone[:, None] < 0.0, change, -change) * (left * left / (2.0 * width * width))
+        slope += np.where(since[:, None] < 0.0, change, -change) * (left * left / (2.0 * width * width))
         bend += change[0] * (left[:, 0] / (width * width))
 
 
 def _in_steps(times: np.ndarray, period: float) -> np.ndarray:
-    """Return ``times`` (s) as step numbers; those that are whole but for the rounding of the division are whole."""
+    """Return ``times`` (s) in steps; values that differ from an integer by rounding only become that integer."""
     steps = times / period
-    whole = np.round(steps)
-    return np.where(np.abs(steps - whole) < 1e-9 * np.maximum(1.0, whole), whole, steps)
+    nearest = np.round(steps)
+    return np.where(np.abs(steps - nearest) < 1e-9 * np.maximum(1.0, nearest), nearest, steps)
 
 
 def _evaluate(instants: np.ndarray, commands: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the commands (r, 2) at whole ``steps`` (r) and their change per step there, from the right."""
+    """Return the commands (r, 2) at the integer ``steps`` (r), and their change per step (r, 2) from there on."""
     piece = np.searchsorted(instants, steps, side="right") - 1
     start, stop = np.clip(piece, 0, None), np.clip(piece + 1, None, len(instants) - 1)
     length = instants[stop] - instants[start]
     inside = (piece >= 0) & (length > 0.0)
     slope = np.zeros((len(steps), commands.shape[1]))
     slope[inside] = (commands[stop] - commands[start])[inside] / length[inside, None]
-    gone = np.where(inside, steps - instants[start], 0.0)
-    return commands[start] + slope * gone[:, None], slope
+    since = np.where(inside, steps - instants[start], 0.0)
+    return commands[start] + slope * since[:, None], slope

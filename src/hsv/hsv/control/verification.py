@@ -1,10 +1,10 @@
-"""Independent evidence for a design: everything that its certificate states, recomputed with numpy from its two files.
+"""Independent verification of a design: recompute every statement of its certificate with numpy.
 
-Nothing here comes from the code that computes designs. The design file brings the numbers that fly: vertices A_i, B_i,
-gains F and K. The certificate brings what is stated about them. Vertices are recomputed from the parameters of the
-vehicle and every inequality from its matrices; :mod:`hsv.flight.verification` repeats the flights. The parts follow the
-paper: model (10)-(12), gain F (24), gains K (31)-(35), error system (22), (23), invariant set (25)-(28), tightened
-inputs (30), adjustable factor (47)-(54).
+This module shares no code with the design computation. It reads the numbers in flight (vertices A_i, B_i, gains F and
+K) from the design file, and the statements about them from the certificate. It recomputes the vertices from the
+parameters of the vehicle, and every inequality from its matrices; :mod:`hsv.flight.verification` repeats the flights.
+The parts follow the paper: model (10)-(12), gain F (24), gains K (31)-(35), error system (22), (23), invariant set
+(25)-(28), tightened inputs (30), adjustable factor (47)-(54).
 
 Every inequality is a bound on a singular value. With Q = L L', a matrix M maps the ellipsoid x' Q^-1 x <= 1 into itself
 if and only if the largest singular value of L^-1 M L is at most 1; see :func:`image`.
@@ -79,20 +79,20 @@ STEERING = (
     "inputs.model.tensor_product.tolerance",
     "inputs.tightening",
 )
-"""Inputs that only steer the search for a design: its results are judged independently of them."""
+"""Inputs that only steer the search for a design; the checks of the result do not depend on them."""
 
 _POINTS = 46
-"""Altitudes, and velocities, at which the model is compared with the vehicle, between its samples."""
+"""Number of altitudes, and of velocities, at which the model is compared with the vehicle; they lie off the samples."""
 
 _FREQUENCIES = np.logspace(-2.0, 2.0, 200)
-"""rad/s, those of the paper's figure 2."""
+"""Frequencies of the Bode plots, rad/s, as in figure 2 of the paper."""
 
 _LONGEST = 10_000
-"""Steps of the longest sequence of a counter-example."""
+"""Maximum length of a counter-example, steps."""
 
 _STATUS = ("optimal", "optimal_inaccurate")
 _KEPT_OFF = 0.05
-"""Share of the range of the certified plans by which another plan stays below their top."""
+"""Distance of the plan bounds from the top of the certified plans, as a share of their range."""
 
 
 # --- algebra ---------------------------------------------------------------------------------------------------------
@@ -101,14 +101,14 @@ _KEPT_OFF = 0.05
 def image(Q: np.ndarray, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
     """Return the largest singular value (...) of L^-1 [M L, columns] with Q = L L'.
 
-    At most 1: M x + columns d stays in {x: x' Q^-1 x <= 1} for all x there and d with x' Q^-1 x + d' d <= 1.
+    If it is at most 1, then M x + columns d lies in {x: x' Q^-1 x <= 1} for all x, d with x' Q^-1 x + d' d <= 1.
     """
     L = np.linalg.cholesky(Q)
     return np.asarray(np.linalg.norm(np.linalg.solve(L, np.concatenate((M @ L, *columns), axis=-1)), 2, axis=(-2, -1)))
 
 
 def level(Q: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return x' Q^-1 x of rows x (..., n)."""
+    """Return the level x' Q^-1 x (...) of each row of ``x`` (..., n)."""
     return np.asarray(np.sum(np.linalg.solve(np.linalg.cholesky(Q), x.T) ** 2, axis=0))
 
 
@@ -118,13 +118,13 @@ def radii(M: np.ndarray) -> np.ndarray:
 
 
 def inverse(Q: np.ndarray) -> np.ndarray:
-    """Return Q^-1, symmetric."""
+    """Return the inverse of ``Q`` (n, n), made exactly symmetric."""
     P = np.linalg.inv(Q)
     return np.asarray(0.5 * (P + P.T))
 
 
 def quotient(M: np.ndarray, N: np.ndarray) -> np.ndarray:
-    """Return the gain (2, 9) M N^-1, N scaled to a unit diagonal first; nothing acts on the flexible states."""
+    """Return the gain M N^-1 (2, 9), computed with N scaled to unit diagonal; columns of flexible states are zero."""
     scale = np.sqrt(np.diag(N))
     gain = np.zeros((len(M), N_STATES))
     gain[:, :N_RIGID] = np.linalg.solve(N / np.outer(scale, scale), (M / scale).T).T / scale
@@ -132,7 +132,7 @@ def quotient(M: np.ndarray, N: np.ndarray) -> np.ndarray:
 
 
 def sizes(table: Mapping[str, float], names: Sequence[str]) -> np.ndarray:
-    """Return the numbers of a table of the inputs in the order of ``names``."""
+    """Return the values of ``table`` in the order of ``names``."""
     return np.array([table[name] for name in names])
 
 
@@ -141,7 +141,7 @@ def sizes(table: Mapping[str, float], names: Sequence[str]) -> np.ndarray:
 
 def statement_checks(subject: Subject) -> Checks:
     """Compare names, units and digests; no other check relies on a digest."""
-    from pydantic import TypeAdapter  # writes numbers as the design does; a node does without
+    from pydantic import TypeAdapter  # formats numbers as the design does; imported here to keep nodes light
 
     design, inputs = subject.design, subject.certificate["inputs"]
     yield equal(subject, "name", design.name)
@@ -155,7 +155,7 @@ def statement_checks(subject: Subject) -> Checks:
 
 
 def input_checks(subject: Subject) -> Checks:
-    """Compare the values that a design copies from its inputs, and check its weights."""
+    """Compare the values that the design copies from its inputs, and check its scheduling weights."""
     design, inputs = subject.design, subject.certificate["inputs"]
     yield recomputed(subject, "inputs.model.period", design.period, "copied")
     for i, section in enumerate(design.notch):
@@ -177,7 +177,7 @@ def input_checks(subject: Subject) -> Checks:
 
 
 def solver_checks(subject: Subject) -> Checks:
-    """Check the status of every solver; the other checks judge the matrices that it returned."""
+    """Check the status of every solver; other checks judge the matrices that the solvers returned."""
     for field in leaves(subject.certificate):
         if field.endswith("solver.status"):
             found = subject.stated(field)
@@ -188,7 +188,11 @@ def solver_checks(subject: Subject) -> Checks:
 
 
 class Model(NamedTuple):
-    """The model recomputed: ``whole`` with the filter's states if they belong to it, ``polytope`` of nine states."""
+    """The recomputed polytopic model.
+
+    ``whole`` includes the states of the notch filter if the design's model has them; ``polytope`` has the nine states
+    of the vehicle. ``exact`` returns discrete A and B at an altitude (m) and a velocity (m/s).
+    """
 
     whole: Polytope
     polytope: Polytope
@@ -199,12 +203,12 @@ class Model(NamedTuple):
 
 
 def notch_in_series(design: ControlDesign) -> Filter:
-    """Return A_s, B_s, C_s, D_s of the notch filter (38) in continuous time (39)."""
+    """Return the notch filter (38) of ``design`` in continuous time (39)."""
     return Filter(*series(continuous(design.notch)))
 
 
 def recomputed_model(subject: Subject) -> Model:
-    """Return the polytopic model of the vehicle (10)-(12), or of the vehicle with its notch filter (45); seconds."""
+    """Recompute the polytopic model of the vehicle (10)-(12), or of vehicle and notch filter (45), in a few seconds."""
     from hsv.model.lpv.linearisation import grid_polytope, sample
     from hsv.model.lpv.tensor_product import tensor_product
 
@@ -232,7 +236,7 @@ def recomputed_model(subject: Subject) -> Model:
         whole, samples, values = found.polytope, [found.altitude_samples, found.velocity_samples], found.singular_values
     polytope = whole
     if extended:
-        # x' = T x: with the true pitch rate in the state, no state of the filter acts on the vehicle.
+        # x' = T x replaces the filtered pitch rate by the true one, so that the filter does not act on the vehicle.
         T = from_true_rate(notch)
         A, B = np.linalg.solve(T, whole.A @ T), np.linalg.solve(T, whole.B)
         vehicle_only = slice(N_STATES)
@@ -245,7 +249,7 @@ def recomputed_model(subject: Subject) -> Model:
 
 
 def model_checks(subject: Subject) -> Checks:
-    """Compare vertices, weights and accuracy with those recomputed from the parameters of the vehicle."""
+    """Compare vertices, weights and accuracy of the model with values recomputed from the vehicle parameters."""
     from hsv.model.lpv.accuracy import model_accuracy, off_grid
 
     design, model, inputs = subject.design, recomputed_model(subject), subject.certificate["inputs"]["model"]
@@ -276,7 +280,7 @@ def model_checks(subject: Subject) -> Checks:
 
 
 def feedback_checks(subject: Subject) -> Checks:
-    """(24): e' N^-1 e decreases at every vertex under F = M N^-1."""
+    """Check (24): e' N^-1 e decreases at every vertex under F = M N^-1."""
     design, F = subject.design, subject.design.feedback_gain
     A, B = design.polytope.A, design.polytope.B
     M, N = np.array(subject.stated("feedback.M")), np.array(subject.stated("feedback.N"))
@@ -300,7 +304,7 @@ def feedback_checks(subject: Subject) -> Checks:
 
 @dataclass(frozen=True)
 class NominalWeights:
-    """The problem (31)-(35): vertices, weights psi and sigma of the cost, bounds (2) of |u_n|."""
+    """Data of problem (31)-(35): vertices A (r, 5, 5), B (r, 5, 2), cost weights psi, sigma, bound (2) of |u_n|."""
 
     A: np.ndarray
     B: np.ndarray
@@ -310,7 +314,7 @@ class NominalWeights:
 
     @classmethod
     def of(cls, subject: Subject) -> NominalWeights:
-        """Return the weights of the inputs; costs are in seconds, so that they do not depend on the period."""
+        """Return the problem of a certificate; its costs are integrals over time (s), independent of the period."""
         polytope, inputs = subject.design.polytope, subject.certificate["inputs"]["nominal"]
         scales = sizes(inputs["state_scale"], STATE_NAMES[:N_RIGID]), sizes(inputs["input_scale"], INPUT_NAMES)
         psi, sigma = (subject.design.period * np.diag(scale**-2.0) for scale in scales)
@@ -319,7 +323,7 @@ class NominalWeights:
         return cls(polytope.A[:, :N_RIGID, :N_RIGID], polytope.B[:, :N_RIGID], psi, sigma, bound)
 
     def cost(self, K: np.ndarray, Q: np.ndarray) -> float:
-        """(31): the least gamma with gamma (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K at every vertex."""
+        """Return the least gamma of (31) with gamma (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K at every vertex."""
         L = np.linalg.cholesky(Q)
         M = np.linalg.solve(L, (self.A + self.B @ K) @ L)
         decrease = np.eye(len(Q)) - np.swapaxes(M, 1, 2) @ M
@@ -329,7 +333,7 @@ class NominalWeights:
         return float(np.linalg.eigvals(np.linalg.solve(decrease, stage)).real.max())
 
     def decrease(self, K: np.ndarray, Q: np.ndarray, gamma: float) -> np.ndarray:
-        """(34): its smallest eigenvalue (r) for the cost ``gamma``, scaled to a unit diagonal."""
+        """Return the smallest eigenvalue (r) of (34) at each vertex for the cost ``gamma``, scaled to unit diagonal."""
         L = np.linalg.cholesky(Q)
         M = np.linalg.solve(L, (self.A + self.B @ K) @ L)
         stage = np.vstack((np.sqrt(self.psi) @ L, np.sqrt(self.sigma) @ K @ L)) / np.sqrt(gamma)
@@ -338,7 +342,7 @@ class NominalWeights:
 
 
 def nominal_checks(subject: Subject) -> Checks:
-    """(31)-(35): every K = Y Q^-1 with its ellipsoid, and the nesting of the ellipsoids."""
+    """Check (31)-(35): every gain K = Y Q^-1 with its ellipsoid, and the nesting of the ellipsoids."""
     design, inputs = subject.design, subject.certificate["inputs"]["nominal"]
     weights, stated = NominalWeights.of(subject), subject.certificate["nominal"]
     scales = sizes(inputs["state_scale"], STATE_NAMES[:N_RIGID]), sizes(inputs["input_scale"], INPUT_NAMES)
@@ -365,7 +369,7 @@ def nominal_checks(subject: Subject) -> Checks:
         yield required(at_most(f"spectral radius of A + BK, gain {i}", radius, 1.0 - 1e-6))
     yield equal(subject, "nominal.0.nesting_residual", None)
     for i, (outer, inner) in enumerate(pairwise([np.array(one["Q"]) for one in stated]), start=1):
-        # The inner ellipsoid in coordinates where the outer one is the unit ball.
+        # In coordinates in which the outer ellipsoid is the unit ball.
         room = 1.0 - float(image(outer, np.zeros_like(outer), np.linalg.cholesky(inner))) ** 2
         yield recomputed(subject, f"nominal.{i}.nesting_residual", room, "eigenvalues")
         yield above(f"ellipsoid {i} inside the one before", room, 0.0)
@@ -381,7 +385,7 @@ def nominal_checks(subject: Subject) -> Checks:
 
 
 def step(subject: Subject) -> np.ndarray:
-    """Return x_n(0) (5): the trim at the start of the design's step less the trim at its target."""
+    """Return x_n(0) (5) of the design's step: its start trim minus its target trim."""
     inputs, vehicle = subject.certificate["inputs"]["nominal"], subject.vehicle.decoupled
     start, target = (trim(vehicle, inputs[at]["altitude"], inputs[at]["velocity"]).state for at in ("start", "target"))
     return np.asarray((start - target)[:N_RIGID])
@@ -410,16 +414,16 @@ def _gain_checks(subject: Subject, field: str, weights: NominalWeights, K: np.nd
 
 
 def symmetric(name: str, Q: np.ndarray) -> Check:
-    """Return the check that ``Q`` (..., n, n) equals its transpose: bounds and inequality are of the same matrix."""
-    crooked = float(np.abs(Q - np.swapaxes(Q, -1, -2)).max(initial=0.0))
-    return required(at_most(f"{name}, difference from its transpose", crooked, 0.0))
+    """Return the check that ``Q`` (..., n, n) is symmetric; the other checks may read either triangle of it."""
+    asymmetry = float(np.abs(Q - np.swapaxes(Q, -1, -2)).max(initial=0.0))
+    return required(at_most(f"{name}, difference from its transpose", asymmetry, 0.0))
 
 
 # --- error system, (22), (23) ----------------------------------------------------------------------------------------
 
 
 def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
-    """Return the effect (5, 3) on the rigid states of unit accelerations held over a period, at mid-envelope."""
+    """Return the effect (5, 3) of unit accelerations, held over a period (s), on the rigid states at mid-envelope."""
     A, _ = linearise(vehicle.decoupled, *vehicle.centre)
     unit = np.zeros((N_RIGID, 3))
     unit[ACCELERATED, [0, 1, 2]] = 1.0
@@ -427,7 +431,10 @@ def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
 
 
 class ErrorSystem(NamedTuple):
-    """e(k+1) = A_i e(k) + G_i d(k), feedback F e + F_d d; e: rigid states, notch filter, actuators of the design."""
+    """The error system e(k+1) = A_i e(k) + G_i d(k) with the feedback F e + F_d d.
+
+    The error e contains rigid states, notch filter and the actuators of the design; ``names`` are its names.
+    """
 
     A: np.ndarray
     G: np.ndarray
@@ -437,16 +444,16 @@ class ErrorSystem(NamedTuple):
 
 
 def error_system(design: ControlDesign, vehicle: Vehicle, tau: np.ndarray, effectiveness: float = 1.0) -> ErrorSystem:
-    """Return (22), (23) for the feedback tau F, with notch filter and actuators in the state.
+    """Return the error system (22), (23) for the feedback tau F, with notch filter and actuators in the state.
 
-    The feedback sees the filtered pitch rate, q_f = C_s s + D_s q; actuators are driven by the feedback, and act on the
-    vehicle by their mean position over a period, C_a a + D_a u.
+    The feedback uses the filtered pitch rate q_f = C_s s + D_s q. It drives the actuators, which act on the vehicle by
+    their mean position over a period, C_a a + D_a u.
 
     Args:
         design: Vertices, F, notch filter and actuators.
         vehicle: Vehicle of the design.
         tau: (5) factors of the feedback.
-        effectiveness: Share of the elevator that is left.
+        effectiveness: Effectiveness of the elevator, from 0 to 1.
     """
     period, polytope = design.period, design.polytope
     A_s, B_s, C_s, D_s = series(discretise(design.notch, period))
@@ -473,7 +480,7 @@ def error_system(design: ControlDesign, vehicle: Vehicle, tau: np.ndarray, effec
 
 
 def factors(design: ControlDesign) -> list[np.ndarray]:
-    """Return the factors (5 each) between which all certified ones lie: the least one and 1.
+    """Return the extreme factors tau (5 each) of the feedback: the smallest certified one and 1.
 
     A set that is invariant under both is invariant under any variation of the factor between them.
     """
@@ -485,13 +492,14 @@ def factors(design: ControlDesign) -> list[np.ndarray]:
 
 
 class Tube:
-    """A tube that a certificate states under ``field``, for the closed loops of a design.
+    """A tube stated under ``field`` of a certificate, with the closed loops of the design.
 
-    ``c`` (n) and ``Q`` (n, n): the ellipsoid (e - c)' Q^-1 (e - c) <= 1; ``middle`` and ``half`` (7) of W.
+    The ellipsoid is (e - c)' Q^-1 (e - c) <= 1 with ``c`` (n) and ``Q`` (n, n); the disturbance set W is the box with
+    mid-point ``middle`` (7) and half-widths ``half`` (7).
     """
 
     def __init__(self, subject: Subject, design: ControlDesign, field: str) -> None:
-        """Read the set and its disturbances, and make the error system."""
+        """Read set and disturbances from the certificate, and compute the error systems at the extreme factors."""
         self.field, self.design = field, design
         systems = [error_system(design, subject.vehicle, tau) for tau in factors(design)]
         self.system = systems[0]
@@ -509,13 +517,13 @@ class Tube:
 
     @property
     def columns(self) -> np.ndarray:
-        """(r, n, 8): effect of W at half its width on e - c, and the drift of c under its mid-points."""
+        """Effect (r, n, 8) on e - c of each channel of W at half its width, then the drift of c under its mid-point."""
         drift = self.A @ self.c + self.G @ self.middle - self.c
         return np.concatenate((self.G * self.half, drift[:, :, None]), axis=2)
 
     @property
     def half_width(self) -> np.ndarray:
-        """(28): half-widths (n) of the set."""
+        """Half-widths (n) of the set (28)."""
         return self._narrowed(np.sqrt(np.diag(self.Q)), slice(N_RIGID))
 
     @property
@@ -527,14 +535,14 @@ class Tube:
     def _narrowed(self, bounds: np.ndarray, rows: slice) -> np.ndarray:
         if self.star is None:
             return bounds
-        # Each row is at most the sum over the channels of its reach in the ellipsoid of the channel.
+        # A row of the output is bounded by the sum over all channels of its half-range in the channel's ellipsoid.
         star = np.sqrt(np.einsum("ki,kjil,kl->kj", self.rows, self.star.Q, self.rows)).sum(axis=1)[rows]
         return np.append(np.minimum(bounds[: len(star)], star), bounds[len(star) :])
 
     def residuals(self) -> np.ndarray:
-        """(27): above zero, c + Q is invariant at a vertex (r), by the S-procedure.
+        """Return the residuals (r) of (27) by the S-procedure; the set is invariant at vertices with a positive one.
 
-        Errors in the set have lam v' Q^-1 v <= lam, disturbances sum_j l_j d_j^2 <= sum_j l_j <= 1 - lam.
+        Errors in the set satisfy lam v' Q^-1 v <= lam, disturbances sum_j l_j d_j^2 <= sum_j l_j <= 1 - lam.
         """
         if self.l.min() <= 0.0 or self.l.sum(axis=1).max() > (1.0 - self.lam) * (1.0 + 1e-12):
             raise DesignError("multipliers: expected all above zero and sums of at most 1 - contraction")
@@ -542,7 +550,11 @@ class Tube:
         return 1.0 - image(self.Q, self.A / np.sqrt(self.lam), scaled) ** 2
 
     def tightened(self, lag: Sequence[Sequence[float]] = ((0.0, 0.0), (0.0, 0.0))) -> np.ndarray:
-        """(30), (53): bounds (lower and upper, 2 inputs) of u_n + u_r, U less the range of the feedback."""
+        """Return the bounds (2, 2) of u_n + u_r by (30), (53): U minus the range of the feedback; rows lower, upper.
+
+        Args:
+            lag: Minimum and maximum (2 each) of the feedback to the lag of the plan behind the actuators.
+        """
         middle = self.system.F @ self.c + self.system.F_d @ self.middle
         half = self.feedback + np.abs(self.system.F_d) @ self.half
         lower, upper = self.design.input_minimum - middle + half, self.design.input_maximum - middle - half
@@ -550,15 +562,16 @@ class Tube:
 
 
 class StarNorms(NamedTuple):
-    """Ellipsoids ``Q`` (7, 8, n, n) of each output row and channel, with ``contraction`` (7, 8)."""
+    """Star norms: an ellipsoid ``Q`` (7, 8, n, n) and its ``contraction`` (7, 8) for each output row and channel."""
 
     Q: np.ndarray
     contraction: np.ndarray
 
     def residuals(self, tube: Tube) -> np.ndarray:
-        """Above zero (7, acting channels), v(k+1) = A_i v + g_i d with |d| <= 1 stays in v' Q^-1 v <= 1.
+        """Return the residuals (7, acting channels): where positive, the ellipsoid of row and channel is invariant.
 
-        Q - A_i Q A_i' / lam - g_i g_i' / (1 - lam) >= 0 (Abedor, Nagpal and Poolla 1996), Q scaled to the identity.
+        The ellipsoid v' Q^-1 v <= 1 is invariant under v(k+1) = A_i v + g_i d with |d| <= 1 if
+        Q - A_i Q A_i' / lam - g_i g_i' / (1 - lam) >= 0 (Abedor, Nagpal and Poolla 1996); Q is scaled to the identity.
         """
         if not (self.contraction.min() > 0.0 and self.contraction.max() < 1.0):
             raise DesignError("star_norms.contraction: expected between 0 and 1")
@@ -575,9 +588,10 @@ class StarNorms(NamedTuple):
         )
 
     def start(self, tube: Tube) -> float:
-        """Return the largest level of terms, one a channel, whose sum is -c, where a flight starts (e = 0).
+        """Return the largest level of the start of a flight, e = 0, in the ellipsoids.
 
-        A term is the steady response of the mean vertex to the mid-point of its channel; the last one takes the rest.
+        The start lies at -c, which is split into one term per channel: the steady response of the mean vertex to the
+        mid-point of the channel. The last term takes the remainder.
         """
         acting, mean = np.flatnonzero(tube.columns.any(axis=(0, 1))), tube.A.mean(axis=0)
         terms = np.linalg.solve(mean - np.eye(len(mean)), tube.G.mean(axis=0) * tube.middle).T
@@ -587,7 +601,7 @@ class StarNorms(NamedTuple):
 
 
 def set_checks(subject: Subject) -> Checks:
-    """Recompute invariance, half-widths, W and tightened inputs of the tube that flies."""
+    """Recompute invariance, half-widths, W and tightened inputs of the tube used in flight."""
     design = subject.design
     tube = Tube(subject, design, "tube")
     yield Check("tube parameters", str(design.tube is not None), "True", design.tube is not None)
@@ -628,13 +642,13 @@ def set_checks(subject: Subject) -> Checks:
 
 
 def lag_feedback(subject: Subject) -> Sequence[Sequence[float]]:
-    """Return the least and the largest feedback (2 each) to the lag of the plan behind actuators, as stated."""
+    """Return the stated minimum and maximum (2 each) of the feedback to the lag of the plan behind the actuators."""
     lag = subject.certificate["tube"]["tightening"].get("lag_feedback")
     return (lag["lower"], lag["upper"]) if lag else ((0.0, 0.0), (0.0, 0.0))
 
 
 def _tube_checks(subject: Subject, tube: Tube) -> Checks:
-    """Check set, disturbances and tightened inputs that are stated under the field of ``tube``."""
+    """Check the set, the disturbances and the tightened inputs stated under the field of ``tube``."""
     field = tube.field
     inside, inputs = f"{field}.invariant_set", subject.certificate["inputs"]["disturbance"]
     yield equal(subject, f"{inside}.kind", "ellipsoid")
@@ -668,7 +682,7 @@ def _tube_checks(subject: Subject, tube: Tube) -> Checks:
 
 
 def widened(bounds: np.ndarray, inflation: float) -> np.ndarray:
-    """(19): ``inflation`` times ``bounds`` on the side above zero, rounded up to six significant digits."""
+    """Return ``bounds`` inflated by (19), rounded up to six significant digits; negative bounds become zero."""
     bounds = inflation * np.maximum(bounds, 0.0)
     quantum = 10.0 ** (np.floor(np.log10(np.where(bounds > 0.0, bounds, 1.0))) - 5.0)
     return np.asarray(quantum * np.ceil(bounds / quantum * (1.0 - 1e-12)))
@@ -689,9 +703,9 @@ def _star_checks(subject: Subject, tube: Tube) -> Checks:
 
 
 def counter_example_checks(subject: Subject) -> Checks:
-    """Recompute how far the stated sequences of disturbances drive the error: no half-width can be below.
+    """Recompute the reach of the stated disturbance sequences, a lower bound of every half-width.
 
-    At a constant vertex i, row c of e(m) is at most sum_j |c A_i^j G_i| half over the last m steps, and
+    At a constant vertex i, the output c e(m) is at most sum_j |c A_i^j G_i| half over the last m steps, and
     disturbances with the signs of the terms attain it.
     """
     inside = "tube.invariant_set"
@@ -714,7 +728,7 @@ def counter_example_checks(subject: Subject) -> Checks:
 
 
 def factor_checks(subject: Subject) -> Checks:
-    """Recompute the evidence for changes of the factor in flight; a design without one has the factor 1 alone."""
+    """Check that the factor tau may change in flight; a design that is not adjustable has tau = 1 only."""
     design, stated = subject.design, subject.certificate.get("adjustable")
     filtered = stated is not None
     yield required(Check("nominal.filtered", str(design.filtered), str(filtered), design.filtered == filtered))
@@ -723,7 +737,7 @@ def factor_checks(subject: Subject) -> Checks:
     yield required(parameter(subject, "feedback.tau_minimum", design.tau_minimum, least, fields=fields))
     if stated is None:
         return
-    # e' N^-1 e decreases for every factor, with the whole elevator and with what the fault leaves of it.
+    # e' N^-1 e decreases for every factor, with full and with reduced elevator effectiveness.
     shares = 1.0, subject.stated("inputs.disturbance.elevator_effectiveness")
     loops = [error_system(design, subject.vehicle, tau, share).A for tau, share in product(factors(design), shares)]
     N = np.array(stated["lyapunov"]["N"])
@@ -740,7 +754,7 @@ def factor_checks(subject: Subject) -> Checks:
 
 
 def adjustable_checks(subject: Subject) -> Checks:
-    """Recompute Z at tau = 1, the relaxed bounds that follow from it, the single K' and the poles."""
+    """Recompute Z at tau = 1, the relaxed input bounds (52), the single gain K' and the poles."""
     design, stated = subject.design, subject.certificate.get("adjustable")
     if stated is None:
         return
@@ -756,7 +770,7 @@ def adjustable_checks(subject: Subject) -> Checks:
     yield from _tube_checks(subject, incomplete)
     scaled = np.append(tau, np.full(len(complete.c) - N_RIGID, tau[-1])) * complete.half_width
     yield recomputed(subject, "adjustable.scaled_half_width", scaled, "half-widths")
-    # (52): |u_n| may grow as U minus F' Z' is wider than U minus F Z, about the target's trim.
+    # (52): the bound of |u_n| grows with the room at the target trim, by the ratio of U minus F' Z' to U minus F Z.
     target = subject.stated("inputs.nominal.target")
     at_target = trim(subject.vehicle.decoupled, target["altitude"], target["velocity"]).input
     rooms = [np.minimum(at_target - t[0], t[1] - at_target) for t in (complete.tightened(), incomplete.tightened())]
@@ -774,7 +788,10 @@ def adjustable_checks(subject: Subject) -> Checks:
 
 
 def _full_state_checks(subject: Subject) -> Checks:
-    """The full-state F' of section 4.3 cancels the notch filter: rightmost poles of the coupled vehicle with it."""
+    """Check the rightmost poles of the coupled vehicle under the full-state F' of section 4.3 and the structured F.
+
+    The full-state F' cancels the notch filter.
+    """
     design, field, notch = subject.design, "adjustable.full_state", notch_in_series(subject.design)
     gain, whole = np.array(subject.stated(f"{field}.gain")), recomputed_model(subject).whole
     kept = [*range(N_RIGID), *range(N_STATES, N_STATES + len(notch.B))]
@@ -811,7 +828,7 @@ QUICK: dict[str, Part] = {
     "invariant set": set_checks,
     "adjustable factor": factor_checks,
 }
-"""Checks by part that need neither solvers nor models: fast enough for a node at its start."""
+"""Checks by part that need neither a solver nor the vehicle model; a node runs them when it starts."""
 
 RECOMPUTED: dict[str, Part] = {
     "statement": statement_checks,
@@ -824,17 +841,19 @@ RECOMPUTED: dict[str, Part] = {
 
 
 def preflight(design: ControlDesign, certificate: str = "") -> str:
-    """Return warnings about ``design`` before a flight, usually none.
+    """Check a design before a flight; return a warning, or an empty string.
 
-    A design that differs from the one that was certified may fly, people tune, as long as what its safety rests on
-    holds for it: gains stable at every vertex; one Lyapunov function for F with (24), one for every K with (34); the
-    invariant set that is watched in flight is the certified one, and invariant at every vertex under the gain that
-    flies. Each of these refuses. Everything else that no longer agrees with the certificate is a warning, and so is a
-    design without a certificate. That is the file ``certificate`` or, where none is named, the one beside the design's
-    own file.
+    A modified design may fly as long as the conditions for its safety hold: the gains are stable at every vertex; F
+    has a common Lyapunov function (24) and every K one by (34); the invariant set monitored in flight is the certified
+    set, and it is invariant at every vertex under the gain in flight. If one of these fails, the design is refused.
+    Any other difference from the certificate is a warning, and so is a missing certificate.
+
+    Args:
+        design: The design to check.
+        certificate: Path of the certificate; empty: the certificate next to the design file.
 
     Raises:
-        DesignError: Names the check that fails, or the certificate that cannot be read.
+        DesignError: A required check fails, or the certificate cannot be read.
     """
     path = find_certificate(design.name, certificate)
     if path is None:

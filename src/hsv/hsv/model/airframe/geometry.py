@@ -1,4 +1,7 @@
-"""Geometry of the airframe in its own axes: x forward and z up from the centre of gravity, in metres, unbent."""
+"""Geometry of the unbent airframe in body axes: x forward and z up from the centre of gravity, in metres.
+
+A station is an x coordinate.
+"""
 
 from __future__ import annotations
 
@@ -15,14 +18,14 @@ from hsv.base.units import parse_quantity
 from hsv.model.vehicle import load_vehicle
 
 EIGENVALUE = 1.8751040687119611
-"""The least positive root of 1 + cos(b) cosh(b)."""
+"""Smallest positive root of 1 + cos(b) cosh(b), for the first mode of a cantilever."""
 
 
 @dataclass(frozen=True)
 class Cantilever:
-    """A uniform Euler-Bernoulli beam and its first mode, normalised to the unit of modal mass.
+    """A uniform Euler-Bernoulli cantilever and its first mode, normalised to unit modal mass.
 
-    The deflection is w(s, t) = shape(s) * eta(t) with eta in kg^0.5 m, as the vehicle's states have it.
+    The deflection is w(s, t) = shape(s) * eta(t) with eta in kg^0.5 m, the unit of the vehicle's elastic states.
     """
 
     length: float
@@ -31,7 +34,7 @@ class Cantilever:
     """Mass per length in kg/m."""
 
     def shape(self, distance: np.ndarray | float, derivative: int = 0) -> np.ndarray:
-        """Return the mode (kg^-0.5) at a distance (m, any shape) from the clamp, or its derivative (kg^-0.5/m^n)."""
+        """Return the mode shape (kg^-0.5) at a distance (m, any shape) from the clamp, or its n-th derivative."""
         b = EIGENVALUE
         x = b * np.asarray(distance, float) / self.length
         ratio = (np.cosh(b) + np.cos(b)) / (np.sinh(b) + np.sin(b))
@@ -45,21 +48,21 @@ class Cantilever:
         return np.asarray(scale * (even - ratio * odd))
 
     def bending_stiffness(self, natural_frequency: float) -> float:
-        """Return EI (N m^2) of a beam whose first mode has this frequency (rad/s)."""
+        """Return the bending stiffness EI (N m^2) that gives the first mode this frequency (rad/s)."""
         return self.mass_per_length * (natural_frequency * (self.length / EIGENVALUE) ** 2) ** 2
 
 
 FORE_SEGMENTS = 5
-"""Rigid pieces of the fore body ahead of the inlet; one more reaches from there to the centre of gravity."""
+"""Rigid segments of the fore body ahead of the inlet; one more reaches from the inlet to the centre of gravity."""
 AFT_SEGMENTS = 4
-"""Rigid pieces of the aft body behind the nozzle; one more reaches from there to the centre of gravity."""
+"""Rigid segments of the aft body behind the nozzle; one more reaches from the nozzle to the centre of gravity."""
 
 Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class Airframe:
-    """Lengths in metres, angles in radians; ``airframe.toml`` explains each of them."""
+    """Dimensions of the airframe, in metres and radians; ``airframe.toml`` explains each of them."""
 
     fore_body: float
     aft_body: float
@@ -78,87 +81,87 @@ class Airframe:
     exaggeration: float
     largest_exaggeration: float
     thrust_arm: float
-    """Distance of the thrust line, the middle of the engine, below the centre of gravity."""
+    """Distance (m) of the thrust line, the middle of the engine, below the centre of gravity."""
     elevator_arm: float
-    """Distance of the elevator's lift behind the centre of gravity."""
+    """Distance (m) of the elevator's lift behind the centre of gravity."""
     elevator_chord: float
 
     @property
     def length(self) -> float:
-        """Nose to tail."""
+        """Length from nose to tail (m)."""
         return self.fore_body + self.aft_body
 
     @property
     def inlet(self) -> float:
-        """Station of the inlet, x."""
+        """Station of the inlet (m)."""
         return self.fore_body - self.inlet_ramp
 
     @property
     def nozzle(self) -> float:
-        """Station of the nozzle, x."""
+        """Station of the nozzle (m)."""
         return self.inlet - self.engine
 
     @property
     def engine_roof(self) -> float:
-        """Height of the body's lower surface above the engine, z."""
+        """Height z (m) of the body's lower surface above the engine."""
         return 0.5 * self.engine_height - self.thrust_arm
 
     @property
     def nose(self) -> Point:
-        """The nose, (x, z)."""
+        """Position (x, z) of the nose (m)."""
         return self.fore_body, self.engine_roof + self.inlet_ramp * math.tan(self.inlet_ramp_angle)
 
     @property
     def tail(self) -> Point:
-        """The tail, (x, z)."""
+        """Position (x, z) of the tail (m)."""
         return -self.aft_body, float(self.upper(-self.aft_body))
 
     @property
     def nozzle_ramp_angle(self) -> float:
-        """Angle between nozzle ramp and upper surface, which closes the body at the tail."""
+        """Angle (rad) between nozzle ramp and upper surface, at which they meet at the tail."""
         return math.atan2(self.tail[1] - self.engine_roof, self.nozzle_ramp) - self.upper_surface_angle
 
     def upper(self, x: float | np.ndarray) -> Any:
-        """Return the height of the upper surface at stations."""
+        """Return the height of the upper surface at a station ``x`` (m, any shape)."""
         return self.nose[1] + (self.fore_body - x) * math.tan(self.upper_surface_angle)
 
     def lower(self, x: float | np.ndarray) -> Any:
-        """Return the height of the lower surface at stations."""
+        """Return the height of the lower surface at a station ``x`` (m, any shape)."""
         corners = [self.tail, (self.nozzle, self.engine_roof), (self.inlet, self.engine_roof), self.nose]
         stations, heights = np.array(corners).T
         return np.interp(x, stations, heights)
 
     def half_width_at(self, x: float) -> float:
-        """Return half of the body's width at a station."""
+        """Return half the width of the body (m) at a station ``x`` (m)."""
         return float(np.interp(x, [self.inlet, self.fore_body], [self.half_width, self.nose_half_width]))
 
     @cached_property
     def elevator_hinge(self) -> Point:
-        """Axis of the elevator: its middle, half-way between upper and lower surface, (x, z)."""
+        """Position (x, z) of the elevator's axis (m): the middle of its chord, half-way between the surfaces."""
         x = -self.elevator_arm
         return x, 0.5 * float(self.upper(x) + self.lower(x))
 
     @cached_property
     def cantilevers(self) -> tuple[Cantilever, Cantilever]:
-        """Fore and aft body as beams."""
+        """Fore and aft body as cantilevers clamped at the centre of gravity."""
         return Cantilever(self.fore_body, self.mass_per_length), Cantilever(self.aft_body, self.mass_per_length)
 
     @cached_property
     def fore_stations(self) -> np.ndarray:
-        """Ends of the rigid pieces of the fore body, x from the centre of gravity to the nose."""
+        """Ends of the rigid segments of the fore body: stations (m) from the centre of gravity to the nose."""
         return np.array([0.0, *np.linspace(self.inlet, self.fore_body, FORE_SEGMENTS + 1)])
 
     @cached_property
     def aft_stations(self) -> np.ndarray:
-        """Ends of the rigid pieces of the aft body, x from the centre of gravity to the tail."""
+        """Ends of the rigid segments of the aft body: stations (m) from the centre of gravity to the tail."""
         return np.array([0.0, *np.linspace(self.nozzle, -self.aft_body, AFT_SEGMENTS + 1)])
 
     def mode(self, x: float) -> int:
-        """Return the mode that bends the body at a station: 0 ahead of the centre of gravity, 1 behind."""
+        """Return the index of the mode that bends the body at station ``x`` (m): 0 for the fore body, 1 for the aft."""
         return 0 if x >= 0.0 else 1
 
     def shape(self, x: float, derivative: int = 0) -> float:
-        """Return the upward deflection (kg^-0.5) at a station for one of that mode's coordinate, or its slope by x."""
+        """Return the mode shape (kg^-0.5, up positive) at station ``x`` (m), or a derivative by x (kg^-0.5/m^n)."""
         return (-1.0 if x < 0.0 and derivative % 2 else 1.0) * float(
             self.cantilevers[self.mode(x)].shape(abs(x), derivative)
         )
@@ -166,7 +169,7 @@ class Airframe:
 
 @cache
 def airframe() -> Airframe:
-    """Return the airframe that is drawn."""
+    """Return the airframe of the drawings, from ``airframe.toml`` and the vehicle's parameters."""
     tables = tomllib.loads(files("hsv.model.airframe").joinpath("airframe.toml").read_text(encoding="utf-8"))
     values = {name: value for table in tables.values() for name, value in table.items()}
     units = {name: "rad" if name.endswith("angle") else "m" for name in values} | {"mass_per_length": "kg/m"}
@@ -178,7 +181,7 @@ def airframe() -> Airframe:
     return Airframe(
         **lengths,
         thrust_arm=vehicle.thrust_moment_arm,
-        # Where the elevator's lift has the moment that the published table gives it.
+        # The lift of the elevator acts where it produces the published moment.
         elevator_arm=-vehicle.moment_elevator * vehicle.mean_aerodynamic_chord / vehicle.lift_elevator,
         elevator_chord=vehicle.mean_aerodynamic_chord,
     )

@@ -1,8 +1,8 @@
-"""Poses of the pieces of the bent airframe: a chain of rigid segments whose joints lie on the bent beams.
+"""Poses of the bent airframe: chains of rigid segments whose joints lie on the bent beams.
 
-Frames are those of ROS: x forward, y to the left, z up. ``vehicle_carried`` moves with the centre of gravity and stays
-level; ``airframe`` is turned by the pitch angle, ``flight_path`` by the path angle. A segment's frame lies in its end
-towards the centre of gravity, its x axis along it.
+Axes follow ROS: x forward, y to the left, z up. The frame ``vehicle_carried`` moves with the centre of gravity and
+stays level; ``airframe`` is rotated by the pitch angle, ``flight_path`` by the flight-path angle. The frame of a
+segment has its origin at the segment's inner end, towards the centre of gravity, and its x axis along the segment.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ FLIGHT_PATH = "flight_path"
 ENGINE = "engine"
 ELEVATOR = "elevator"
 FLAMES = ("flame_1", "flame_2", "flame_3")
-"""Pieces of the flame, one in the other: each slides out of the engine by one, two or three times the same length."""
+"""Frames of the three parts of the flame, which slide out of the engine by one, two and three times the same length."""
 
 STEEPEST = 0.9
-"""Sine of a segment's turn at most: a flight that diverges has coordinates for which there is no picture."""
+"""Largest sine of a segment's rotation: a diverging flight has elastic coordinates that no chain can show."""
 
 
 class Sample(NamedTuple):
-    """Quantities that are drawn at one time, SI: angles in rad, elastic coordinates in kg^0.5 m."""
+    """Quantities that determine the picture at one time, SI: angles in rad, elastic coordinates in kg^0.5 m."""
 
     angle_of_attack: float
     pitch_angle: float
@@ -41,7 +41,7 @@ class Sample(NamedTuple):
 
 @dataclass(frozen=True)
 class Transform:
-    """A frame in its parent's: origin (m) and turn about the lateral axis (rad), nose up positive."""
+    """A frame relative to its parent: origin x, z (m) and rotation about the lateral axis (rad, nose up positive)."""
 
     parent: str
     child: str
@@ -51,11 +51,11 @@ class Transform:
 
     @property
     def quaternion(self) -> tuple[float, float, float, float]:
-        """The turn as x, y, z, w."""
+        """Rotation as a quaternion (x, y, z, w)."""
         return 0.0, -math.sin(0.5 * self.pitch), 0.0, math.cos(0.5 * self.pitch)
 
     def after(self, outer: Transform) -> Transform:
-        """Return this frame in the parent of ``outer``, which is its own parent."""
+        """Return this frame in the parent of ``outer``; ``outer`` is the transform of this frame's parent."""
         cos, sin = math.cos(outer.pitch), math.sin(outer.pitch)
         return Transform(
             outer.parent,
@@ -67,11 +67,11 @@ class Transform:
 
 
 def transforms(sample: Sample, exaggeration: float | None = None) -> list[Transform]:
-    """Return every frame in its parent's, parents first.
+    """Return the transforms of all frames, parents first.
 
     Args:
-        sample: Finite numbers.
-        exaggeration: Factor on the bending; default: that of ``airframe.toml``.
+        sample: Finite values.
+        exaggeration: Factor on the bending; default: the value in ``airframe.toml``.
     """
     frame = airframe()
     scale = frame.exaggeration if exaggeration is None else exaggeration
@@ -82,11 +82,11 @@ def transforms(sample: Sample, exaggeration: float | None = None) -> list[Transf
     ]
     for mode, (name, stations) in enumerate(segments(frame).items()):
         found += _chain(frame, name, stations, elastic[mode])
-    # At the clamp of both beams.
+    # The engine is fixed to the clamp of both beams.
     found.append(Transform(BODY, ENGINE, frame.inlet, frame.engine_roof))
     hinge_x, hinge_z = frame.elevator_hinge
     name, origin = segment_at(frame, hinge_x)
-    # Positive: trailing edge down, which is nose up for the elevator itself.
+    # A positive deflection moves the trailing edge down, which turns the elevator itself nose up.
     found.append(Transform(name, ELEVATOR, hinge_x - origin, hinge_z, sample.elevator_deflection))
     share = min(max(sample.fuel_equivalence_ratio / frame.full_fuel_equivalence_ratio, 0.0), 1.0)
     found += [
@@ -96,7 +96,7 @@ def transforms(sample: Sample, exaggeration: float | None = None) -> list[Transf
 
 
 def composed(chain: Sequence[Transform], root: str = LEVEL) -> Mapping[str, Transform]:
-    """Return the frames below ``root``, each in it; parents come first in ``chain``."""
+    """Return the transforms of all frames below ``root`` relative to ``root``; ``chain`` lists parents first."""
     found = {root: Transform(root, root)}
     for transform in chain:
         if transform.parent in found:
@@ -105,12 +105,12 @@ def composed(chain: Sequence[Transform], root: str = LEVEL) -> Mapping[str, Tran
 
 
 def segments(frame: Airframe) -> dict[str, np.ndarray]:
-    """Return the ends of the segments, from the centre of gravity outward, by the stem of their names."""
+    """Return the stations of the segment ends, from the centre of gravity outward, by the stem of the frame names."""
     return {"fore_body": frame.fore_stations, "aft_body": frame.aft_stations}
 
 
 def segment_at(frame: Airframe, x: float) -> tuple[str, float]:
-    """Return the frame of the segment at a station, and the station of its origin."""
+    """Return the frame name of the segment at station ``x`` (m), and the station of the frame's origin (m)."""
     name = "fore_body" if x >= 0.0 else "aft_body"
     stations = np.abs(segments(frame)[name])
     index = min(int(np.searchsorted(stations, abs(x), side="right")), len(stations) - 1)
@@ -118,12 +118,12 @@ def segment_at(frame: Airframe, x: float) -> tuple[str, float]:
 
 
 def _chain(frame: Airframe, name: str, stations: np.ndarray, coordinate: float) -> list[Transform]:
-    """Return the segments of a beam: joints on it, lengths kept."""
+    """Return the transforms of the segments of a bent beam; each segment keeps its length."""
     height = np.array([frame.shape(x) for x in stations]) * coordinate
-    rise = np.clip(np.diff(height) / np.diff(stations), -STEEPEST, STEEPEST)
-    found, parent, at, before = [], BODY, 0.0, 0.0
-    for number, (length, turn) in enumerate(zip(np.diff(stations), np.arcsin(rise), strict=True), start=1):
+    sines = np.clip(np.diff(height) / np.diff(stations), -STEEPEST, STEEPEST)
+    found, parent, x, previous = [], BODY, 0.0, 0.0
+    for number, (length, pitch) in enumerate(zip(np.diff(stations), np.arcsin(sines), strict=True), start=1):
         child = f"{name}_{number}"
-        found.append(Transform(parent, child, at, 0.0, float(turn) - before))
-        parent, at, before = child, float(length), float(turn)
+        found.append(Transform(parent, child, x, 0.0, float(pitch) - previous))
+        parent, x, previous = child, float(length), float(pitch)
     return found

@@ -1,4 +1,4 @@
-"""The airframe for Foxglove and Lichtblick: one scene that stays, and the frames in which it moves."""
+"""The airframe for Foxglove and Lichtblick: a constant scene and the moving frames of its parts."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ SCENE_TOPIC = "/hsv/airframe/scene"
 TRANSFORMS_TOPIC = "/hsv/airframe/transforms"
 
 RATE = 25.0
-"""Samples a second that a picture needs at most: the faster mode has three periods in one."""
+"""Maximum rate of the frames, Hz. (The period of the faster bending mode is a third of a second.)"""
 
 _ARROWS: dict[str, Colour] = {FLIGHT_PATH: (0.1, 0.5, 0.25, 1.0), BODY: (0.0, 0.45, 0.7, 1.0)}
-"""Arrows along the x axis of these frames."""
+"""Frames with an arrow along their x axis, and its colour."""
 
 
 def scene(time_ns: int, exaggeration: float | None = None) -> SceneUpdate:
-    """Return the vehicle, to be sent once, to clients that connect later, and when the exaggeration changes."""
+    """Return the scene; it is sent once, to each new client, and when the exaggeration changes."""
     stamp = _stamp(time_ns)
     entities = [_entity(solid, stamp) for solid in solids()]
     length = 0.7 * airframe().length
@@ -59,7 +59,7 @@ def scene(time_ns: int, exaggeration: float | None = None) -> SceneUpdate:
 
 
 def frame_transforms(sample: Sample, time_ns: int, exaggeration: float | None = None) -> FrameTransforms:
-    """Return where the frames of :func:`scene` are at a moment."""
+    """Return the transforms of the frames of :func:`scene` for ``sample``, stamped ``time_ns``."""
     stamp = _stamp(time_ns)
     return FrameTransforms(
         transforms=[

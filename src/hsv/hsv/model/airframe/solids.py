@@ -1,4 +1,4 @@
-"""The airframe as solids of triangles, each in the frame of :mod:`hsv.model.airframe.pose` that it moves with."""
+"""The airframe as triangulated solids, each fixed to a frame of :mod:`hsv.model.airframe.pose`."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ FLAME_COLOURS: tuple[Colour, ...] = ((1.0, 0.93, 0.6, 0.95), (1.0, 0.66, 0.15, 0
 
 LABEL_COLOUR: Colour = (0.5, 0.55, 0.6, 1.0)
 LABEL_HEIGHT, LABEL_SIZE = 5.0, 1.0
-"""Metres: above the centre of gravity, and of a letter."""
+"""Height (m) of the label above the centre of gravity, and size (m) of its letters."""
 
 _FLAME_HEIGHTS = (0.85, 0.6, 0.3)
-"""Heights of the flame's pieces, relative to the height of the engine."""
+"""Heights of the parts of the flame, relative to the height of the engine."""
 _SUNK = 0.8
-"""Metres by which the engine reaches into the body, so that no gap opens when the body bends."""
+"""Depth (m) of the engine in the body, so that no gap opens when the body bends."""
 
 
 @dataclass(frozen=True)
 class Solid:
-    """Triangles (n, 3, 3) in metres, wound counter-clockwise from outside, in a frame."""
+    """A solid in a frame: triangles (n, 3, 3) in metres, counter-clockwise when seen from outside."""
 
     frame: str
     name: str
@@ -40,7 +40,7 @@ class Solid:
 
 
 def label(exaggeration: float | None = None) -> str:
-    """Return the text above the vehicle; ``exaggeration`` as in :func:`hsv.model.airframe.pose.transforms`."""
+    """Return the label above the vehicle; ``exaggeration`` as in :func:`hsv.model.airframe.pose.transforms`."""
     return f"bending x {airframe().exaggeration if exaggeration is None else exaggeration:g}"
 
 
@@ -74,7 +74,7 @@ def _segment(frame: Airframe, name: str, inner: float, outer: float) -> Solid:
 
 
 def _engine(frame: Airframe) -> Solid:
-    # The frame lies in the roof at the inlet; the lip of the cowl is sharp.
+    # The origin of the frame lies in the roof at the inlet. The cowl has a sharp lip.
     length, height, lip = frame.engine, frame.engine_height, 0.15 * frame.engine
     section = [(0.0, _SUNK), (-length, _SUNK), (-length, -height), (-lip, -height), (0.0, -0.9 * height)]
     width = 0.85 * frame.half_width
@@ -90,7 +90,7 @@ def _elevator(frame: Airframe, side: float) -> Solid:
 
 
 def _flame(frame: Airframe, name: str, height: float, colour: Colour) -> Solid:
-    # As long as the engine, which hides it while no fuel burns; its end tapers.
+    # The flame has the length of the engine, which hides it while no fuel burns; its end is tapered.
     length, middle, half = frame.engine, -0.5 * frame.engine_height, 0.5 * height * frame.engine_height
     section = [
         (-0.02 * length, middle + half),
@@ -104,7 +104,12 @@ def _flame(frame: Airframe, name: str, height: float, colour: Colour) -> Solid:
 
 
 def _prism(section: Sequence[Point], sides: Callable[[float], tuple[float, float]]) -> np.ndarray:
-    """Return the triangles of a convex section (x, z), counter-clockwise seen from the right, between two sides (y)."""
+    """Return the triangles (n, 3, 3) of a prism.
+
+    Args:
+        section: Corners (x, z) of the convex section, counter-clockwise when seen from the right.
+        sides: Lateral coordinates y of the right and the left side at a station x.
+    """
     right = [np.array([x, sides(x)[0], z]) for x, z in section]
     left = [np.array([x, sides(x)[1], z]) for x, z in section]
     found = []
@@ -115,7 +120,7 @@ def _prism(section: Sequence[Point], sides: Callable[[float], tuple[float, float
         after = (index + 1) % len(section)
         found.append((right[index], left[index], left[after]))
         found.append((right[index], left[after], right[after]))
-    # A section may end in an edge: the nose, the tail.
+    # Drop the degenerate triangles of a section that ends in an edge, as at nose and tail.
     kept = [
         corners for corners in found if np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0])) > 0
     ]

@@ -1,7 +1,7 @@
 """The airframe as a robot description: ``python3 -m hsv.model.airframe.urdf > airframe.urdf``.
 
-Its joints are the transforms of :mod:`hsv.model.airframe.pose`; a node that publishes them on /tf moves it. Boxes
-stand for solids.
+Its joints are the transforms of :mod:`hsv.model.airframe.pose`; a node that publishes these on /tf animates the robot.
+Each solid is represented by its bounding box.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ MOVED = Sample(*[0.01 * number for number in range(1, len(AT_REST) + 1)])
 
 
 def urdf() -> str:
-    """Return the description; lengths in metres, angles in radians."""
+    """Return the robot description as XML; lengths in metres, angles in radians."""
     robot = ElementTree.Element("robot", name="airframe")
     rest = transforms(AT_REST)
     moved = {t.child for t, other in zip(rest, transforms(MOVED), strict=True) if t != other}
@@ -55,7 +55,7 @@ def _add_joint(robot: ElementTree.Element, transform: Transform, moves: bool) ->
     ElementTree.SubElement(joint, "origin", xyz=_words(np.array([transform.x, 0.0, transform.z])), rpy="0 0 0")
     if not moves:
         return
-    # Flames slide aft; what turns does so nose up, about the axis to the right.
+    # Flames slide aft; other joints rotate nose up, about the axis to the right.
     ElementTree.SubElement(joint, "axis", xyz="-1 0 0" if slides else "0 -1 0")
     low, high = -0.5 * math.pi, 0.5 * math.pi
     if transform.child == ELEVATOR:

@@ -1,4 +1,4 @@
-"""Agreement of a polytopic model with the model that it represents, between its samples (paper fig. 2 and 8)."""
+"""Accuracy of a polytopic model, compared with the original model between its samples (paper fig. 2 and 8)."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ Model = Callable[[float, float], tuple[np.ndarray, np.ndarray]]
 """Discrete-time A (n, n) and B (n, m) at an altitude (m) and a velocity (m/s)."""
 
 _BODE_POINTS = 6
-"""Altitudes, and velocities, at which Bode plots are compared."""
+"""Number of altitudes, and of velocities, at which Bode plots are compared."""
 
 
 @dataclass(frozen=True)
 class ModelAccuracy:
-    """Worst deviations over the ``points`` looked at.
+    """Largest deviations of a polytopic model over a number of ``points``.
 
-    ``frobenius``: of [A - I, B] over the scales, relative to its norm there. ``magnitude`` (n, m) dB and ``phase``
-    (n, m) deg: of the Bode plot of each state to each input. ``smallest_weight``, and ``weight_sum``, the largest
-    distance of the sum from 1, of the vertices.
+    ``frobenius`` is the error of the scaled [A - I, B], relative to its Frobenius norm; ``magnitude`` (n, m; dB) and
+    ``phase`` (n, m; deg) are those of the Bode plots of all states to all inputs. ``smallest_weight`` is the smallest
+    weight of a vertex, ``weight_sum`` the largest difference of a sum of weights from 1.
     """
 
     points: int
@@ -35,7 +35,7 @@ class ModelAccuracy:
     weight_sum: float
 
     def report(self) -> dict[str, float]:
-        """Return the deviations for JSON, those of the worst Bode plot only."""
+        """Return the deviations for JSON, with the largest values over all Bode plots."""
         return {
             "points": self.points,
             "relative_frobenius_error": self.frobenius,
@@ -47,7 +47,7 @@ class ModelAccuracy:
 
 
 def off_grid(low: float, high: float, points: int) -> np.ndarray:
-    """Return ``points`` equidistant values in the interior of an interval, without its ends."""
+    """Return ``points`` equidistant values inside the interval from ``low`` to ``high``, without its ends."""
     return low + (high - low) * (np.arange(points) + 0.5) / points
 
 
@@ -66,18 +66,18 @@ def model_accuracy(
     frequencies: np.ndarray,
     period: float,
 ) -> ModelAccuracy:
-    """Return the worst deviations of ``polytope`` from ``model`` on all combinations of altitude and velocity.
+    """Return the largest deviations of ``polytope`` from ``model`` on all combinations of altitude and velocity.
 
-    The Bode plots, of every state to every input, are compared at the point of the largest Frobenius error, and at
-    every combination of about six altitudes and velocities, the outermost among them.
+    Bode plots of all states to all inputs are compared at the point of the largest Frobenius error, and at the
+    combinations of about six altitudes and six velocities, the outermost included.
 
     Args:
-        polytope: The model to judge.
-        model: Model that it represents.
+        polytope: Polytopic model.
+        model: Original model that ``polytope`` represents.
         altitudes: (a) m, off the samples.
         velocities: (b) m/s, off the samples.
-        state_scale: (n) sizes of the states that count as equal, SI.
-        input_scale: (m) sizes of the inputs, SI.
+        state_scale: (n) scales of the states, SI.
+        input_scale: (m) scales of the inputs, SI.
         frequencies: (f) rad/s, below the Nyquist frequency.
         period: Sampling period (s) of both models.
     """

@@ -1,4 +1,4 @@
-"""Linear systems behind actuators and a delay, discretised exactly: what the controller commands is held."""
+"""Exact discretisation of linear systems behind actuators and a delay, with commands held over a period."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hsv.model.signals import INPUT_NAMES, N_INPUTS
 
 
 def actuator_names(actuators: Sequence[ActuatorSet]) -> tuple[str, ...]:
-    """Return the names of the states of ``actuators``, a position and, of the second order, a rate each."""
+    """Return the names of the states of ``actuators``: a position each and, for second order, a rate."""
     return tuple(
         f"{actuator.channel}_{state}" for actuator in actuators for state in ("position", "rate")[: actuator.order]
     )
@@ -23,7 +23,7 @@ def actuator_names(actuators: Sequence[ActuatorSet]) -> tuple[str, ...]:
 def actuator_system(actuators: Sequence[ActuatorSet]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return A (a, a), B (a, 2), C (2, a), D (2, 2) of all actuators in continuous time, from commands to positions.
 
-    Limits are left out. A channel without an actuator passes its command.
+    Position and rate limits are ignored. On a channel without an actuator the position is the command.
 
     Args:
         actuators: Actuators of order 1 or 2, at most one per channel.
@@ -47,10 +47,10 @@ def actuator_system(actuators: Sequence[ActuatorSet]) -> tuple[np.ndarray, np.nd
 
 @dataclass(frozen=True, eq=False)
 class SampledActuators(Data):
-    """Actuators over a period, commands held: a+ = A a + B c exactly, and C a + D c is where they are on average.
+    """Actuators sampled with held commands: the state a+ = A a + B c is exact, C a + D c is the mean position.
 
-    A (a, a), B (a, 2), C (2, a), D (2, 2). To a vehicle that answers slowly the average is all that counts, so that
-    behind it the hull of the vertices of a polytopic model stays what it is.
+    A (a, a), B (a, 2), C (2, a), D (2, 2). A slow vehicle responds to the mean position over a period; with it as the
+    input, the vertices of the polytopic model stay unchanged.
     """
 
     KIND = "hsv_sampled"
@@ -61,9 +61,9 @@ class SampledActuators(Data):
 
 
 def sampled_actuators(actuators: Sequence[ActuatorSet], period: float) -> SampledActuators:
-    """Return ``actuators``, see :func:`actuator_system`, sampled at ``period`` (s)."""
+    """Return ``actuators`` (see :func:`actuator_system`) sampled at ``period`` (s)."""
     A, B, C, D = actuator_system(actuators)
-    # The actuators, with integrators of their positions.
+    # Integrators of the positions give their means.
     whole = np.block([[A, np.zeros((len(A), N_INPUTS))], [C, np.zeros((N_INPUTS, N_INPUTS))]])
     transition, entering = zero_order_hold(whole, np.vstack((B, D)), period)
     a = len(A)
@@ -76,30 +76,33 @@ def sampled_actuators(actuators: Sequence[ActuatorSet], period: float) -> Sample
 
 
 def respond(actuators: SampledActuators, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the states (k, a) before each period and the mean positions (k, 2) over it, for ``commands`` (k, 2).
+    """Return the states (k, a) at the start of each period and the mean positions (k, 2) over it.
 
-    They start from zero: commands are deviations from where the actuators rest.
+    Args:
+        actuators: Sampled actuators, initially at rest.
+        commands: (k, 2) deviations from the commands at rest.
     """
     states, means = np.empty((len(commands), len(actuators.A))), np.empty((len(commands), N_INPUTS))
-    given = (doubles(vector(each)) for each in (commands, states, means))
-    lib.hsv_respond(actuators.pointer, len(commands), *given)
+    arrays = (doubles(vector(each)) for each in (commands, states, means))
+    lib.hsv_respond(actuators.pointer, len(commands), *arrays)
     return states, means
 
 
 def held_behind(
     A: np.ndarray, B: np.ndarray, period: float, actuators: Sequence[ActuatorSet] = (), delay: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the discrete (A, B) of dx/dt = A x + B p, where p are the positions of actuators and commands are held.
+    """Return the discrete A and B of dx/dt = A x + B p, where p are the actuator positions and commands are held.
 
     Args:
-        A: (n, n), continuous time.
-        B: (n, 2).
+        A: (n, n) state matrix, continuous time.
+        B: (n, 2) input matrix, continuous time.
         period: Period of the commands (s).
-        actuators: See :func:`actuator_system`; their states follow the n.
-        delay: Delay (s) of all commands; delayed ones follow the actuators' states, the newest first.
+        actuators: See :func:`actuator_system`; their states follow those of x.
+        delay: Delay of all commands (s).
 
     Returns:
-        A (n + a + d, n + a + d) and B (n + a + d, 2), of a states of actuators and d commands under way.
+        A (n + a + d, n + a + d) and B (n + a + d, 2) for n states of x, a states of the actuators and d delayed
+        commands, the newest first.
     """
     from scipy.linalg import expm  # see hsv.model.lpv.linearisation
 
@@ -111,7 +114,7 @@ def held_behind(
         return zero_order_hold(whole, inputs, period)
     waiting = int(np.ceil(delay / period - 1e-12))
     late = delay - (waiting - 1) * period
-    # The older command acts for the first ``late`` seconds of a period, the newer one for the rest.
+    # In each period the older command acts for the first ``late`` seconds, the newer one for the rest.
     states = len(whole)
     transition, newer = zero_order_hold(whole, inputs, period - late)
     older = transition @ zero_order_hold(whole, inputs, late)[1]

@@ -17,14 +17,14 @@ from hsv.model.trim import trim
 
 
 def zero_order_hold(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the discrete (A, B) of dx/dt = A x + B u with u held over ``period`` (s) (paper eq. 12).
+    """Return the discrete A and B of dx/dt = A x + B u with u held over ``period`` (paper eq. 12).
 
     Args:
         A: (n, n) continuous-time state matrix, SI per second.
-        B: (n, m) continuous-time input matrix; the columns may be any inputs, disturbances too.
+        B: (n, m) continuous-time input matrix; its columns may include disturbances.
         period: Sampling period (s).
     """
-    # Here, because tube_mpc imports this module without using it, and scipy.linalg takes longer than all else.
+    # Imported here because scipy.linalg would dominate the start of a node, which does not need it.
     from scipy.linalg import expm
 
     n, m = B.shape
@@ -36,7 +36,7 @@ def zero_order_hold(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.nda
 
 
 class Filter(NamedTuple):
-    """A continuous-time filter of the pitch rate (paper eq. 39): A (k, k), B (k), C (k), D not zero."""
+    """A continuous-time filter of the pitch rate (paper eq. 39): A (k, k), B (k), C (k) and a non-zero D."""
 
     A: np.ndarray
     B: np.ndarray
@@ -45,7 +45,15 @@ class Filter(NamedTuple):
 
 
 def extended_derivative(x: np.ndarray, u: np.ndarray, p: VehicleParameters, notch: Filter, printed: bool) -> np.ndarray:
-    """Return dx'/dt (9 + k) (paper eq. 40), complex where ``x`` (9 + k) or ``u`` (2) is."""
+    """Return the derivative (9 + k) of the extended state of vehicle and filter (paper eq. 40).
+
+    Args:
+        x: (9 + k) extended state with the filtered pitch rate, real or complex.
+        u: (2) inputs, real or complex.
+        p: Vehicle.
+        notch: Filter with k states.
+        printed: True: the filtered pitch rate moves the vehicle, as the paper prints it; False: the true one does.
+    """
     filtered, s = x[PITCH_RATE], x[N_STATES:]
     passed = 0.0 * filtered
     for c, value in zip(notch.C, s, strict=True):
@@ -70,7 +78,10 @@ def extended_derivative(x: np.ndarray, u: np.ndarray, p: VehicleParameters, notc
 def extended_jacobian(
     x: np.ndarray, u: np.ndarray, p: VehicleParameters, notch: Filter, printed: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return A' (9 + k, 9 + k) and B' (9 + k, 2) (paper eq. 42, eq. 43), by the complex step."""
+    """Return the Jacobians A' (9 + k, 9 + k) and B' (9 + k, 2) by the complex step (paper eq. 42, eq. 43).
+
+    Arguments as for :func:`extended_derivative`.
+    """
     step = 1e-40
     n = len(x)
     columns = []
@@ -82,7 +93,7 @@ def extended_jacobian(
 
 
 def extended_state(x: np.ndarray, notch: Filter) -> np.ndarray:
-    """Return x' (9 + k) of a vehicle state ``x`` (9), the filter at rest: an equilibrium if x is one (eq. 41)."""
+    """Return the extended state (9 + k) of a vehicle state ``x`` (9) with the filter in equilibrium (paper eq. 41)."""
     rest = np.linalg.solve(-notch.A, notch.B * x[PITCH_RATE])
     extended = np.concatenate((x, rest))
     extended[PITCH_RATE] = notch.C @ rest + notch.D * x[PITCH_RATE]
@@ -90,7 +101,7 @@ def extended_state(x: np.ndarray, notch: Filter) -> np.ndarray:
 
 
 def from_true_rate(notch: Filter) -> np.ndarray:
-    """Return T (9 + k, 9 + k) with x' = T x, where x has the true pitch rate in place of the filtered one."""
+    """Return T (9 + k, 9 + k), which maps an extended state with the true pitch rate to one with the filtered rate."""
     T = np.eye(N_STATES + len(notch.B))
     T[PITCH_RATE, PITCH_RATE] = notch.D
     T[PITCH_RATE, N_STATES:] = notch.C
@@ -105,12 +116,12 @@ def linearise(vehicle: VehicleParameters, altitude: float, velocity: float) -> t
     """Return continuous-time A (9, 9) and B (9, 2) of the decoupled model at trim (paper eq. 6 to eq. 9), SI.
 
     Args:
-        vehicle: Parameters; their inertial coupling is left out.
-        altitude: m.
-        velocity: m/s.
+        vehicle: Parameters of the vehicle; their inertial coupling is ignored.
+        altitude: Altitude of the trim, m.
+        velocity: Velocity of the trim, m/s.
 
     Raises:
-        TrimError: No equilibrium there.
+        TrimError: There is no equilibrium at this altitude and velocity.
     """
     rigid = vehicle.decoupled()
     equilibrium = trim(rigid, altitude, velocity)
@@ -122,8 +133,8 @@ def linearise_extended(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return continuous-time A' (9 + k, 9 + k) and B' (9 + k, 2) of the decoupled ECM at trim (paper eq. 44), SI.
 
-    Arguments and errors as for :func:`linearise`; ``notch``: the filter, with k states. The pitch rate that moves the
-    vehicle is the true one.
+    The true pitch rate moves the vehicle. Arguments and errors are those of :func:`linearise`, with the filter
+    ``notch`` of k states.
     """
     rigid = vehicle.decoupled()
     equilibrium = trim(rigid, altitude, velocity)
@@ -133,7 +144,7 @@ def linearise_extended(
 def sample(
     model: Linearised, altitudes: np.ndarray, velocities: np.ndarray, period: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return zero-order-hold A (n_h, n_v, n, n) and B (n_h, n_v, n, m) of ``model`` on a grid (paper eq. 10).
+    """Return A (n_h, n_v, n, n) and B (n_h, n_v, n, m) of ``model`` with zero-order hold on a grid (paper eq. 10).
 
     Args:
         model: Continuous-time A (n, n) and B (n, m) at an altitude (m) and a velocity (m/s).
@@ -149,7 +160,7 @@ def sample(
 
 
 def grid_polytope(model: Linearised, altitudes: np.ndarray, velocities: np.ndarray, period: float) -> Polytope:
-    """Return the polytopic model whose vertices are the discretised linearisations on a grid, weights bilinear.
+    """Return the polytopic model with bilinear weights whose vertices are discretised linearisations on a grid.
 
     Args:
         model: Continuous-time A (n, n) and B (n, m) at an altitude (m) and a velocity (m/s).
@@ -169,7 +180,7 @@ def grid_polytope(model: Linearised, altitudes: np.ndarray, velocities: np.ndarr
 
 @dataclass(frozen=True)
 class Mode:
-    """A real pole, or the upper one of a pair (rad/s), its natural frequency (rad/s) and damping ratio."""
+    """A mode: its pole (rad/s; of a pair the upper one), natural frequency (rad/s) and damping ratio."""
 
     pole: complex
     natural_frequency: float
@@ -177,7 +188,7 @@ class Mode:
 
 
 def modes(A: np.ndarray) -> list[Mode]:
-    """Return the modes of ``A`` (n, n), fastest first; a damping ratio of -1 marks an unstable real pole."""
+    """Return the modes of ``A`` (n, n), fastest first; an unstable real pole has the damping ratio -1."""
     found = []
     for pole in np.linalg.eigvals(A).tolist():
         if pole.imag >= 0.0:
@@ -189,7 +200,7 @@ def modes(A: np.ndarray) -> list[Mode]:
 def frequency_response(
     A: np.ndarray, B: np.ndarray, frequencies: np.ndarray, period: float | None = None
 ) -> np.ndarray:
-    """Return the response (f, n, m) of all states to all inputs, complex.
+    """Return the complex frequency response (f, n, m) of all states to all inputs.
 
     Args:
         A: (n, n) state matrix.
@@ -216,6 +227,6 @@ def bode(response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def bode_difference(response: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return |difference| of magnitude (dB) and phase (deg, at most 180) of two complex responses."""
+    """Return the absolute differences of magnitude (dB) and phase (deg, at most 180) of two complex responses."""
     ratio = response / expected
     return np.abs(20.0 * np.log10(np.abs(ratio))), np.abs(np.degrees(np.angle(ratio)))

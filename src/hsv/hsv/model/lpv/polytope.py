@@ -1,4 +1,4 @@
-"""Polytopic linear parameter-varying model (paper eq. 11, eq. 12): vertices, weights over altitude and velocity."""
+"""Polytopic linear parameter-varying model (paper eq. 11, eq. 12): vertices, and weights by altitude and velocity."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from hsv.core.arithmetic import solve
 INTERPOLATIONS = ("linear", "cubic")
 
 BLOCK = lib.SUMS
-"""Entries that the core sums at a time."""
+"""Number of entries that the core sums at a time."""
 
 
 class AxisWeights(NamedTuple):
-    """Weights of the vertices along one scheduling variable, as a piecewise polynomial.
+    """Weights of r vertices along one scheduling variable, as piecewise cubic polynomials.
 
-    ``breakpoints`` (s), ``coefficients`` (4, s - 1, r): power 3 first, local to each piece, one column per vertex.
+    ``breakpoints`` (s) are values of the variable. ``coefficients`` (4, s - 1, r) belong to the powers 3 to 0 of the
+    distance from the left breakpoint of each piece.
     """
 
     breakpoints: np.ndarray
@@ -32,7 +33,7 @@ def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: st
 
     Args:
         breakpoints: (s) increasing values of the scheduling variable, SI.
-        samples: (s, r) weights of the r vertices there; rows sum to one.
+        samples: (s, r) weights of the r vertices at the breakpoints; rows sum to one.
         interpolation: ``"linear"`` (a grid of vertices) or ``"cubic"`` (tensor-product weights).
 
     Raises:
@@ -57,17 +58,17 @@ def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: st
 
 
 def _spline(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the coefficients (4, s - 1, r) of the cubic splines through ``y`` (s, r) at ``x`` (s), not-a-knot.
+    """Return the coefficients (4, s - 1, r) of the not-a-knot cubic splines through ``y`` (s, r) at ``x`` (s).
 
-    Two points give a line, three a parabola, four and more piecewise cubics with a continuous third derivative at the
-    second and at the last point but one (de Boor, A Practical Guide to Splines, ch. IV).
+    Two points give a line, three a parabola; with four and more points the third derivative is continuous at the
+    second and at the second last point (de Boor, A Practical Guide to Splines, ch. IV).
     """
     n = len(x)
     step = np.diff(x)
     secant = np.diff(y, axis=0) / step[:, None]
     if n == 2:
         return np.stack((np.zeros_like(secant), np.zeros_like(secant), secant, y[:-1]))
-    # The slopes at the breakpoints: second derivatives are continuous inside.
+    # Continuity of the second derivatives gives equations for the slopes at the inner breakpoints.
     left, right = np.zeros((n, n)), np.empty_like(y)
     for i in range(1, n - 1):
         left[i, i - 1 : i + 2] = step[i], 2.0 * (step[i - 1] + step[i]), step[i - 1]
@@ -87,7 +88,7 @@ def _spline(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def evaluate(weights: AxisWeights, values: np.ndarray) -> np.ndarray:
-    """Return the weights (n, r) at many ``values`` (n), clamped to the breakpoints; for design and plots."""
+    """Return the weights (n, r) at ``values`` (n) of the variable, which are clamped to the breakpoints."""
     breakpoints, coefficients = weights
     clamped = np.clip(values, breakpoints[0], breakpoints[-1])
     piece = np.clip(np.searchsorted(breakpoints, clamped, side="right") - 1, 0, len(breakpoints) - 2)
@@ -98,11 +99,11 @@ def evaluate(weights: AxisWeights, values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class PolytopeData(Data):
-    """A polytopic model as the core takes it.
+    """A polytopic model in the layout of the core.
 
-    ``S`` (r, e) holds the entries of [A_i, B_i] that are not zero in all vertices, row by row, then zeros up to a
-    multiple of :data:`BLOCK`. ``entries``: their places in the flattened [A_i, B_i] (n (n + m)). ``starts`` (2 n + 1):
-    where those of the rows of A and of B begin, alternately.
+    ``S`` (r, e) contains, row by row, the entries of [A_i, B_i] that are non-zero in some vertex, padded with zeros to
+    a multiple of :data:`BLOCK`. ``entries`` are their indices in the flattened [A_i, B_i]. ``starts`` (2 n + 1) are the
+    indices in ``entries`` at which the rows of A and B begin, alternately.
     """
 
     KIND = "hsv_polytope"
@@ -115,10 +116,10 @@ class PolytopeData(Data):
 
 @dataclass(frozen=True)
 class Polytope:
-    """A discrete-time polytopic model (paper eq. 12).
+    """A discrete-time polytopic model (paper eq. 12) scheduled by altitude (m) and velocity (m/s).
 
-    ``A`` (r, n, n), ``B`` (r, n, m), altitude-major: vertex i * r_velocity + j. Scheduling variables are altitude (m)
-    and velocity (m/s); outside the breakpoints they are clamped.
+    ``A`` (r, n, n) and ``B`` (r, n, m) are ordered by altitude, then velocity: vertex i * r_velocity + j. The
+    scheduling variables are clamped to the breakpoints.
     """
 
     A: np.ndarray
@@ -133,7 +134,7 @@ class Polytope:
             raise DesignError(f"vertices A {self.A.shape}, B {self.B.shape}: expected {r} matrices of matching size")
 
     def data(self) -> PolytopeData:
-        """Return the form that the core takes."""
+        """Return the model in the layout of the core."""
         n, m = self.B.shape[1:]
         S = np.concatenate((self.A, self.B), axis=2).reshape(len(self.A), -1)
         entries = np.flatnonzero(S.any(axis=0))

@@ -1,4 +1,4 @@
-"""Tensor-product model transformation (paper eq. 10 to eq. 12; Baranyi): few vertices, weights variable by variable."""
+"""Tensor-product model transformation (paper eq. 10 to eq. 12; Baranyi): few vertices, weights for each variable."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ FUNCTIONS = ("singular", "polynomial")
 
 @dataclass(frozen=True)
 class TensorProduct:
-    """A polytopic model found from samples.
+    """A polytopic model computed from samples.
 
-    ``altitude_samples`` and ``velocity_samples``: breakpoints (s) and weights (s, r) of each variable, between them
-    cubic splines. ``singular_values``: for each variable those of its unfolding, relative to the largest.
+    ``altitude_samples`` and ``velocity_samples`` are breakpoints (s) and weights (s, r) of the two variables, with
+    cubic splines between them. ``singular_values`` are those of the unfolding along each variable, relative to the
+    largest.
     """
 
     polytope: Polytope
@@ -40,19 +41,19 @@ def tensor_product(
 ) -> TensorProduct:
     """Return the polytopic model of discrete-time samples on a grid (paper eq. 11), with a tight hull.
 
-    The higher-order singular value decomposition is taken of [A - I, B] over the scales: the identity is the same
-    everywhere and would make the ranks depend on the sampling period.
+    The higher-order singular value decomposition is applied to the scaled [A - I, B]; with A in place of A - I the
+    ranks would depend on the sampling period.
 
     Args:
         A: (n_h, n_v, n, n) discrete-time state matrices, SI.
         B: (n_h, n_v, n, m) input matrices, SI.
         altitudes: (n_h) m, increasing.
         velocities: (n_v) m/s, increasing.
-        state_scale: (n) sizes of the states that count as equal, SI.
-        input_scale: (m) sizes of the inputs, SI.
-        tolerance: Singular values below this share of the largest are left out; the rest are the rank r.
-        functions: Functions that span the model in a variable: the constant and r - 1 ``"singular"`` functions, which
-            have the least total error, or the ``"polynomial"`` of degree r - 1, which at a low rank distributes the
+        state_scale: (n) scales of the states, SI.
+        input_scale: (m) scales of the inputs, SI.
+        tolerance: Singular values below this share of the largest are discarded; the rank r is the number of the rest.
+        functions: Basis of the model in each variable: the constant and r - 1 ``"singular"`` functions, which have the
+            smallest total error, or ``"polynomial"`` functions up to degree r - 1, which at a low rank distribute the
             error more evenly over small and large entries.
 
     Raises:
@@ -76,7 +77,7 @@ def tensor_product(
         rank = int(np.count_nonzero(values > tolerance * values[0]))
         if rank >= len(breakpoints):
             raise DesignError(f"{len(breakpoints)} samples of rank {rank}: expected more samples or a larger tolerance")
-        # With the constant in the basis, in place of one function, the weights can sum to one exactly.
+        # The constant replaces one function of the basis, so that the weights can sum to one exactly.
         if functions == "singular":
             basis = np.linalg.svd(unfolded - unfolded.mean(axis=0), full_matrices=False)[0][:, : rank - 1]
         else:
@@ -100,21 +101,21 @@ def tensor_product(
 
 
 _SUBDIVISION = 16
-"""Points per interval between breakpoints at which the optimisation keeps the weights non-negative."""
+"""Points per interval of the breakpoints at which the optimisation keeps the weights non-negative."""
 
 
 def hull_weights(breakpoints: np.ndarray, functions: np.ndarray) -> np.ndarray:
     """Return the weights of the vertices of a small simplex that encloses a curve.
 
-    The curve is (functions, 1); its cubic spline between the breakpoints stays inside too, exactly: weights are
-    non-negative and sum to one along the whole spline. Deterministic.
+    The curve is (functions, 1). The cubic splines of the weights are non-negative and sum to one between the
+    breakpoints as well. The result is deterministic.
 
     Args:
         breakpoints: (s) increasing values of the scheduling variable.
-        functions: (s, r - 1) functions of it; with the constant they span the model. They must be independent.
+        functions: (s, r - 1) functions of the variable, independent of each other and of the constant.
 
     Returns:
-        (s, r) weights at the breakpoints, vertices in the order in which their weights peak.
+        (s, r) weights at the breakpoints; vertices are ordered by the position of the peak of their weight.
 
     Raises:
         DesignError: The functions and the constant are dependent, or the optimisation ended without a result.
@@ -122,7 +123,7 @@ def hull_weights(breakpoints: np.ndarray, functions: np.ndarray) -> np.ndarray:
     s, r = len(breakpoints), functions.shape[1] + 1
     if r == 1:
         return np.ones((s, 1))
-    # Unit root mean square: the volume then compares functions, not their sizes.
+    # Functions are scaled to unit root mean square.
     centred = functions - functions.mean(axis=0)
     basis = np.hstack((np.ones((s, 1)), centred / np.sqrt(np.mean(centred**2, axis=0))))
     steps = np.arange(_SUBDIVISION) / _SUBDIVISION
@@ -145,13 +146,13 @@ def smallest_weight(breakpoints: np.ndarray, weights: np.ndarray) -> float:
 
 
 def relaxed(weights: np.ndarray, least: float) -> np.ndarray:
-    """Return ``weights`` (s, r) of the simplex enlarged about its centre until a weight of ``least`` becomes zero."""
+    """Return the weights (s, r) for the simplex, enlarged about its centre until the weight ``least`` becomes zero."""
     excess = max(0.0, -least)
     return np.asarray((weights + excess) / (1.0 + weights.shape[1] * excess))
 
 
 def _start(basis: np.ndarray) -> np.ndarray:
-    """Return Q (r, r) of the simplex through r points of the curve, enlarged until it holds the whole curve."""
+    """Return Q (r, r) of the simplex through r points of the curve, enlarged to contain the whole curve."""
     s, r = basis.shape
     chosen = np.round(0.5 * (1.0 - np.cos(np.pi * np.arange(r) / (r - 1))) * (s - 1)).astype(int)
     if np.linalg.matrix_rank(basis[chosen]) < r:
@@ -164,23 +165,23 @@ def _start(basis: np.ndarray) -> np.ndarray:
 
 
 def _smallest_simplex(basis: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Return Q (r, r) that maximises log |det Q| with basis Q >= 0 and Q 1 = e_1, which makes weights sum to one.
+    """Return the matrix Q (r, r) that maximises log |det Q| subject to basis Q >= 0 and Q 1 = e_1.
 
-    The vertices are the rows of Q^-1, so that a large determinant is a small simplex. The last column of Q follows
-    from the others.
+    The vertices are the rows of Q^-1, so that a large determinant means a small simplex. With Q 1 = e_1 the weights
+    sum to one, and the last column of Q follows from the others.
     """
     points, r = basis.shape
 
-    def whole(z: np.ndarray) -> np.ndarray:
+    def full(z: np.ndarray) -> np.ndarray:
         free = z.reshape(r, r - 1)
         last = np.eye(r)[:, :1] - free.sum(axis=1, keepdims=True)
         return np.hstack((free, last))
 
     def volume(z: np.ndarray) -> float:
-        return -float(np.linalg.slogdet(whole(z))[1])
+        return -float(np.linalg.slogdet(full(z))[1])
 
     def slope(z: np.ndarray) -> np.ndarray:
-        gradient = -np.linalg.inv(whole(z)).T
+        gradient = -np.linalg.inv(full(z)).T
         return (gradient[:, :-1] - gradient[:, -1:]).ravel()
 
     jacobian = np.zeros((r, points, r, r - 1))
@@ -200,4 +201,4 @@ def _smallest_simplex(basis: np.ndarray, start: np.ndarray) -> np.ndarray:
     )
     if not solution.success:
         raise DesignError(f"weights of {r} vertices: {solution.message}, expected a smallest simplex")
-    return whole(solution.x)
+    return full(solution.x)
