@@ -28,11 +28,11 @@ run: setup ## set up, then fly a scenario over DDS (SCENARIO=case1, ARGS="...")
 
 test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
 	@if [ -n '$(ARGS)' ]; then $(PYTEST) $(ARGS); exit; fi; \
-	$(PYTEST) -n auto -m "not (graph or $(NOT_IN_TEST))" && \
+	$(PYTEST) -n auto --dist loadfile -m "not (graph or $(NOT_IN_TEST))" && \
 	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -m "graph and not long"
 
 test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damaged" chooses)
-	@$(PYTEST) -n auto -m long $(ARGS)
+	@$(PYTEST) -n auto --dist loadfile -m long $(ARGS)
 
 fuzz: setup ## set up, then give 10 000 mutated files to every reader (ARGS="--fuzz-inputs 1000" for fewer)
 	@$(PYTEST) -n auto -m fuzz $(ARGS)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from full_disk import files_no_larger_than
+from marking import long
 from node_processes import short_scenario
 from recorded_flight import record_flight
 
@@ -26,26 +27,27 @@ def command(*words, out, buffered=True):
     return ran.returncode, ran.stderr
 
 
-@pytest.mark.parametrize("buffered", [True, False])
-@pytest.mark.parametrize("words", [("trim",), ("trim", "--json"), ("--help",)], ids=" ".join)
+@pytest.mark.parametrize(
+    ("words", "buffered"), [(("trim",), True), (("trim", "--json"), False), long(("--help",), True)]
+)
 def test_output_that_finds_no_space_is_one_line(words, buffered):
     with FULL.open("w") as full:
         code, error = command(*words, out=full, buffered=buffered)
     assert (code, error) == (2, "hsv: error: output: cannot be written (No space left on device)\n")
 
 
+@pytest.mark.long
 def test_an_error_stays_that_error_if_nothing_can_be_printed():
     with FULL.open("w") as full:
         code, error = command("verify", "nope.yaml", out=full)
     assert code == 2 and error.startswith("hsv: error: design = 'nope.yaml'") and error.count("\n") == 1
 
 
-@pytest.mark.parametrize("words", [("trim",), ("trim", "--json")], ids=" ".join)
-def test_a_reader_that_has_gone_is_told_nothing(words):
+def test_a_reader_that_has_gone_is_told_nothing():
     reading, writing = os.pipe()
     os.close(reading)
     try:
-        assert command(*words, out=writing) == (1, "")
+        assert command("trim", out=writing) == (1, "")
     finally:
         os.close(writing)
 
@@ -63,7 +65,7 @@ def bag(tmp_path_factory):
     return str(record_flight(tmp_path_factory.mktemp("bags") / "flight", duration=2.0, fault=1.0).path.parent)
 
 
-@pytest.mark.parametrize("name", ["flight.png", "flight.svg", "flight.pdf"])
+@pytest.mark.parametrize("name", ["flight.svg", long("flight.png"), long("flight.pdf")])
 def test_a_figure_that_does_not_fit(hsv, tmp_path, bag, name):
     with files_no_larger_than(2_000):
         ran = hsv("plot", bag, "--out", name)
@@ -72,7 +74,7 @@ def test_a_figure_that_does_not_fit(hsv, tmp_path, bag, name):
     assert not (tmp_path / name).exists()
 
 
-@pytest.mark.parametrize("form", ["csv", "parquet", "npz"])
+@pytest.mark.parametrize("form", ["csv", long("parquet"), long("npz")])
 def test_an_export_that_does_not_fit_is_not_in_the_way_of_the_next(hsv, tmp_path, bag, form):
     words = ("export", bag, f"--{form}", "--out", "table")
     with files_no_larger_than(2_000):

@@ -36,7 +36,7 @@ from hsv.flight.campaign.summary import Results, limits, shares, worst_flights
 from hsv.flight.scenario import load_scenario, scenario_names, scenario_text
 from hsv.model.vehicle import load_vehicle, vehicle_names, vehicle_text
 
-QUICK, LONG = 100, 10_000
+QUICK, LONG = 25, 10_000
 
 Fuzz = Callable[[st.SearchStrategy[Mutated], Callable[[Mutated], object]], None]
 
@@ -214,14 +214,14 @@ def test_the_result_of_a_campaign(fuzz: Fuzz, campaign: Results, tmp_path: Path)
 
 
 def test_no_flipped_bit_of_a_campaign_passes_as_another_result(campaign: Results, tmp_path: Path) -> None:
-    """Every byte once: what is read is what was flown, or it is refused."""
+    """What is read is what was flown, or it is refused."""
     from random import Random
 
     path, data = tmp_path / "mine.parquet", campaign.path.read_bytes()
     rows = repr(pq.read_table(campaign.path).to_pylist())
     refused = 0
     random = Random(1)
-    for _ in range(200):
+    for _ in range(50):
         path.write_bytes(flipped(data, random))
         try:
             found = Results(path)
@@ -229,7 +229,7 @@ def test_no_flipped_bit_of_a_campaign_passes_as_another_result(campaign: Results
             assert found.campaign == campaign.campaign
         except CampaignError:
             refused += 1
-    assert refused > 100
+    assert refused > 25
 
 
 def test_the_description_of_a_campaign(fuzz: Fuzz, campaign: Results, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from marking import long
 
 from hsv.flight.assembly import flight_parameters
 from hsv.flight.corners import corners
@@ -21,6 +22,7 @@ CLAIMS = [claim for claims in GROUPS.values() for claim in claims]
 PUBLISHED = (Path(__file__).parents[2] / "docs" / "claims.md").read_text(encoding="utf-8")
 OVER_VEHICLES = re.compile(r"corner|vehicles|flights")
 """What is read of all vehicles, of which the tests fly few: what is published is at least as bad."""
+SLOW = ("the set grows with the disturbances", "the co-designed model conforms")
 NOISE = 1e-8
 """In the page's units: smaller numbers are rounding, and differ between processors."""
 
@@ -110,7 +112,9 @@ def test_the_page_holds_every_claim_and_the_ranking():
     assert all(what in text for what, _ in METRICS.values())
 
 
-@pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim.name)
+@pytest.mark.parametrize(
+    "claim", [long(claim) if claim.name in SLOW else claim for claim in CLAIMS], ids=lambda claim: claim.name
+)
 def test_every_claim_is_measured_and_says_why(claim, evidence):
     result = claim.measure(evidence)
     assert 1 <= result.leading <= len(result.readings)

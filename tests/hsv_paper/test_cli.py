@@ -27,6 +27,7 @@ def test_a_figure_that_is_none_of_the_paper_s_is_named(hsv_paper):
     assert ran.error == "only = 7: expected one of 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17"
 
 
+@pytest.mark.long
 def test_a_study_is_plotted_and_printed_as_json(hsv_paper, tmp_path):
     ran = hsv_paper("sensitivity", "notch", "--coarseness", "20", "--out", "plots", "--json")
     assert ran.code == 0
@@ -35,6 +36,7 @@ def test_a_study_is_plotted_and_printed_as_json(hsv_paper, tmp_path):
     assert (tmp_path / "plots" / "notch.png").is_file()
 
 
+@pytest.mark.long
 def test_the_fault_study_flies_the_controllers_of_other_scenarios_beside(hsv_paper, tmp_path):
     (tmp_path / "mine.toml").write_text('extends = "case1_integral_heavy"\ntitle = "with integral action"\n')
     ran = hsv_paper("sensitivity", "fault", "--with", "mine.toml", "--coarseness", "33", "--out", "plots", "--json")

@@ -5,6 +5,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from marking import long
 
 from hsv.base.units import to_paper
 from hsv.control.notch_filter import notch_response
@@ -46,7 +47,7 @@ def test_the_catalogue_is_in_the_paper_s_order_and_flies_shipped_scenarios():
         assert set(figure.scenarios) <= set(scenario_names())
 
 
-@pytest.mark.parametrize("number", FIGURES)
+@pytest.mark.parametrize("number", [4, *map(long, FIGURES.keys() - {4})])
 def test_a_figure_is_written_as_pdf_and_png_of_bearable_size_with_its_page(number, draw, tmp_path):
     figure, drawing = FIGURES[number], draw(number)
     pdf, png = save(drawing.figure, tmp_path / figure.stem)

@@ -114,6 +114,7 @@ def test_a_finer_mesh_keeps_states_and_inputs():
     assert fine.state[0, :2] == pytest.approx(START) and fine.state[-1, :2] == pytest.approx(TARGET)
 
 
+@pytest.mark.long
 def test_the_deepest_fault_known_after_a_fifth_of_a_second():
     """The optimum is where full elevator without fuel just turns the nose: to the resolution of the bisection."""
     problem = recovery(VEHICLE, ENVELOPE, 0.2, HORIZON)

@@ -67,6 +67,7 @@ def cluster():
         yield started
 
 
+@pytest.mark.long
 def test_workers_that_do_not_come_are_waited_for_a_while_and_not_silently(monkeypatch, cluster):
     monkeypatch.setattr("hsv.flight.campaign.executors.WORKERS", 0.5)
     waited = []
@@ -108,6 +109,7 @@ def dask_worker(address, folder, environment, *flags):
         popen.wait()
 
 
+@pytest.mark.long
 def test_a_worker_without_the_program_or_with_another_one_is_refused_by_its_address(cluster, tmp_path):
     other = tmp_path / "other" / "hsv"
     (other / "flight" / "campaign").mkdir(parents=True)
@@ -146,10 +148,13 @@ def length_of(text, batch):
 
 
 def test_a_batch_that_ends_its_worker_is_named_and_ends_the_campaign_and_not_the_executor():
+    before = dict(os.environ)
     with make_executor(2) as workers:
         with pytest.raises(RunError, match=r"^campaign: flight 3: the worker process ended; what is finished is kept$"):
             list(workers.fly(end_of_the_third, "", range(8), "flight {}".format))
         assert dict(workers.fly(length_of, "text", range(8))) == dict.fromkeys(range(8), b"4")
+        pids = workers.pids()
+    assert dict(os.environ) == before and not any(map(alive, pids))
 
 
 def test_a_stopped_worker_is_reported_and_waited_for(monkeypatch):
@@ -168,6 +173,7 @@ def test_a_stopped_worker_is_reported_and_waited_for(monkeypatch):
     assert re.fullmatch(r"waiting for batch 0 and 2 more: stopped worker process \d+, \d+", notices[0])
 
 
+@pytest.mark.long
 def test_a_campaign_without_dask_workers_says_so_and_goes_on(monkeypatch, cluster):
     monkeypatch.setattr("hsv.flight.campaign.executors.NOTICE", 1.0)
     notices = []
@@ -201,30 +207,26 @@ def an_unportable_error(text, batch):
     raise UnportableError("so", "long")
 
 
+@pytest.mark.long
 def test_an_error_that_cannot_be_pickled_is_told():
     with make_executor(2) as workers, pytest.raises(RunError, match="UnportableError: solong"):
         list(workers.fly(an_unportable_error, "", range(2)))
 
 
+@pytest.mark.long
 def test_batches_that_nobody_took_are_not_taken_for_those_of_the_next_campaign():
     with make_executor(2) as workers:
         next(workers.fly(a_large_answer, "", range(6)))
         assert dict(workers.fly(length_of, "text", range(6))) == dict.fromkeys(range(6), b"4")
 
 
+@pytest.mark.long
 def test_workers_killed_while_they_wait_are_replaced():
     with make_executor(2) as workers:
         pids = workers.pids()
         os.kill(pids[0], signal.SIGKILL)  # the pool then ends the other one
         wait_until(lambda: not any(map(alive, pids)))
         assert dict(workers.fly(length_of, "text", range(3))) == dict.fromkeys(range(3), b"4")
-
-
-def test_an_executor_leaves_environment_and_no_process_behind():
-    before = dict(os.environ)
-    with make_executor(2) as workers:
-        pids = workers.pids()
-    assert dict(os.environ) == before and not any(map(alive, pids))
 
 
 def alive(pid):
