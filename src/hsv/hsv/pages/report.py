@@ -24,7 +24,7 @@ from hsv.pages.flights import DrawnCurve, ReportedRun, reported_runs
 from hsv.pages.panels import GROUPS, Kind, Panel
 from hsv.pages.picture import Drawing, Line, Picture, drawing, picture
 from hsv.pages.side_view import geometry
-from hsv.pages.text import capitalised, number, quantity, switched
+from hsv.pages.text import capitalised, number, percent, quantity, switched
 
 DECLARED = {p.name: p for table in (LOCKSTEP_PARAMETERS, *NODE_PARAMETERS.values()) for p in table}
 """Every parameter of every node by name."""
@@ -167,12 +167,10 @@ def _agreement(differences: Sequence[Sequence[Difference]]) -> str:
     if not any(difference.largest for found in differences for difference in found):
         return "states and commands are the same, bit for bit"
     if most.share <= NEARLY:
-        return (
-            f"the flights nearly agree: no quantity differs by more than {number(100 * most.share, 2)} % of its range"
-        )
+        return f"the flights nearly agree: no quantity differs by more than {percent(most.share)} of its range"
     if not np.isfinite(most.share):
         return f"the flights differ most in {title}"
-    return f"the flights differ most in {title}, by {number(100 * most.share, 3)} % of its range"
+    return f"the flights differ most in {title}, by {percent(most.share)} of its range"
 
 
 @dataclass(frozen=True)
@@ -227,7 +225,7 @@ def _difference_plot(found: Sequence[Difference], runs: Sequence[ReportedRun], n
     for each in found:
         text = quantity(each.largest, panel.unit, 3)
         text += f" at {number(float(each.time[np.nanargmax(np.abs(each.y))]), 6)} s"
-        text += f" ({number(100 * each.share, 2)} %)" if each.range else ""
+        text += f" ({percent(each.share)})" if each.range else ""
         notes.append(Markup('<span class="swatch run{}"></span> {}').format(each.run % 6, text))
     shades = [shade for shade in _shades(panel, runs) if shade["kind"] == "fault"]
     return Plot(f"difference_{panel.name}", panel.title, panel.unit, "differences", curves, shades=shades, notes=notes)

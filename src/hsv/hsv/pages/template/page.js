@@ -202,6 +202,7 @@ class Charts {
 
   layout(panel) {
     const y = panel.across ? null : panel.y || this.extent(panel);
+    const bars = panel.curves.find((curve) => curve.kind === "bars");
     const small = y && Math.max(Math.abs(y[0]), Math.abs(y[1])) < 1e-3;
     return {
       autosize: true, showlegend: false, hovermode: panel.across ? "closest" : "x unified", dragmode: "zoom", bargap: 0,
@@ -210,7 +211,7 @@ class Charts {
       modebar: { bgcolor: "rgba(0,0,0,0)", color: css("--muted"), activecolor: css("--ink") },
       xaxis: { zeroline: false, ...(panel.across ? {} : {
         range: this.time || [0, this.end], title: { text: "time [s]", standoff: 6 }, hoverformat: ".6~g", ticklabeloverflow: "allow" }) },
-      yaxis: { ...(y ? { range: y } : { autorange: true }), title: { text: panel.title || "" }, exponentformat: "power",
+      yaxis: { ...(y ? { range: y } : { autorange: true }), title: { text: panel.title || bars?.label || "" }, exponentformat: "power",
         minexponent: small ? 3 : 6, zeroline: false, automargin: true },
       shapes: [...this.shading(panel), ...this.limitLines(panel)],
     };
