@@ -1,0 +1,110 @@
+"""Seed small faults, each alone, and report which test of their room detects them; half of them are in C.
+
+python3 tests/seeded_faults.py REPORT.jsonl [COUNT]: a report that exists is continued.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import tokenize
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+LIBRARY = ROOT / "src" / "hsv"
+GROUPS = {
+    "vehicle": ("vehicle atmosphere actuators sensors", "model/*.py model/lpv/*.py", "model"),
+    "control": ("notch_filter estimator nominal tube_law effectiveness", "control/*.py", "control"),
+    "faults": ("faults", "model/faults/*.py", "model/faults"),
+    "flight": ("loop links metrics", "flight/*.py", "flight"),
+}
+"""Headers of the core, sources in Python, and the folder of the tests; for C, tests/core and golden flights as well."""
+OPERATORS = {"+": "-", "*": "/", "<": "<=", ">": ">=", "==": "!=", "&&": "||", "and": "or"}
+OPERATORS |= {new: old for old, new in OPERATORS.items()}
+TOKEN = re.compile(r"(?<= )(?:[-+*/<>]|[<>=!]=|&&|\|\||and|or)(?= )|(?<![\w.])\d+(?:\.\d*(?:e[-+]?\d+)?)?(?![\w.])")
+
+
+@cache
+def places(path: Path) -> list[tuple[Path, int, str]]:
+    """Return every token of a file that a fault may change, outside comments, strings and directives."""
+    text = path.read_text()
+    if path.suffix == ".h":
+        hidden = [match.span() for match in re.finditer(r'(?ms)/\*.*?\*/|"[^"\n]*"|^#[^\n]*', text)]
+    else:
+        begins = [0, *(match.end() for match in re.finditer("\n", text))]
+        tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+        spans = [(t.start, t.end) for t in tokens if t.type in (tokenize.STRING, tokenize.COMMENT)]
+        hidden = [tuple(begins[row - 1] + column for row, column in span) for span in spans]
+    found = [(path, match.start(), match[0]) for match in TOKEN.finditer(text)]
+    return [entry for entry in found if not any(begin <= entry[1] < end for begin, end in hidden)]
+
+
+def changed(token: str) -> str:
+    """Return another operator, the next integer, or a number that is off by 1 %."""
+    if token in OPERATORS:
+        return OPERATORS[token]
+    return str(int(token) + 1) if token.isdigit() else repr(float(token) * 1.01 or 0.01)
+
+
+def faults(count: int) -> list[tuple[str, Path, int, str]]:
+    """Draw the faults: group, file, place in its text, and the token there."""
+    draw, found = random.Random(1), []
+    for number in range(count):
+        group = [*GROUPS][number // 2 % len(GROUPS)]
+        headers, modules, _ = GROUPS[group]
+        patterns = modules.split() if number % 2 else [f"core/{name}.h" for name in headers.split()]
+        files = sorted(path for pattern in patterns for path in (LIBRARY / "hsv").glob(pattern))
+        found.append((group, *draw.choice([place for path in files for place in places(path)])))
+    return found
+
+
+def detected(group: str, path: Path, place: int, token: str) -> str:
+    """Seed one fault in a copy of the library; return the first test that fails, or "" if all pass."""
+    with tempfile.TemporaryDirectory(prefix="hsv_fault_") as folder:
+        copy = Path(folder, "hsv")
+        shutil.copytree(LIBRARY, copy, ignore=shutil.ignore_patterns("build", "*.egg-info", "__pycache__"))
+        file, text = copy / path.relative_to(LIBRARY), path.read_text()
+        file.write_text(text[:place] + changed(token) + text[place + len(token) :])
+        environment = os.environ | {"PYTHONPATH": f"{copy}:{os.environ.get('PYTHONPATH', '')}", "HSV_CFLAGS": "-O0"}
+        room = Path("tests", GROUPS[group][2])
+        tests = [*map(str, (ROOT / room).glob(f"test_{path.stem}.py")), str(room)]
+        if path.suffix == ".h":
+            tests = ["tests/core/test_vectors.py", "tests/flight/test_golden_flights.py", *tests, "tests/core"]
+            build = [sys.executable, "setup.py", "-q", "build_ext", "--inplace", "--force"]
+            if subprocess.run(build, cwd=copy, env=environment, capture_output=True).returncode:
+                return "it does not compile"
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-qx",
+            "-p",
+            "no:cacheprovider",
+            "-m",
+            "not (long or graph or fuzz)",
+            *tests,
+        ]
+        try:
+            ran = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=3600)
+        except subprocess.TimeoutExpired:
+            return "no end"
+        failed = re.search(r"^(?:FAILED|ERROR) (.*?)(?: - |$)", ran.stdout, re.MULTILINE)
+        return failed[1] if failed else "" if ran.returncode == 0 else ran.stdout[-300:]
+
+
+if __name__ == "__main__":
+    with Path(sys.argv[1]).open("a+") as stream:
+        stream.seek(0)
+        for group, path, place, token in faults(int((sys.argv[2:] or ["100"])[0]))[len(stream.readlines()) :]:
+            line = path.read_text()[:place].count("\n") + 1
+            where = f"{path.relative_to(ROOT)}:{line}: {token} -> {changed(token)}"
+            result = {"fault": where, "detected_by": detected(group, path, place, token)}
+            print(json.dumps(result), file=stream, flush=True)
