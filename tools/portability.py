@@ -24,8 +24,6 @@ PACKAGES = ("cffi", "numpy", "pint", "pydantic", "pyyaml", "scipy", "tomli-w")
 LIBRARY = ROOT / "src" / "hsv"
 """The sources of the library with the core that the set-up has compiled for this machine."""
 
-_DEBIAN_MACHINES = {"x86_64": "amd64", "aarch64": "arm64"}
-
 
 class MissingError(Exception):
     """An environment cannot be had; one line says what is missing."""
@@ -76,21 +74,16 @@ def aarch64(folder: Path) -> Environment:
     return Environment(command, install(folder, version, "aarch64", "constraints.txt"), str(library))
 
 
-def python_3_12(folder: Path) -> Environment:
-    """Return Python 3.12 of this machine, under the pins of the project."""
-    return Environment([python312()], install(folder, "3.12", platform.machine(), "constraints.txt"))
-
-
-def numpy_1_26(folder: Path) -> Environment:
-    """Return Python 3.12 of this machine, under the pins for an installed ROS 2 Jazzy."""
-    return Environment([python312()], install(folder, "3.12", platform.machine(), "constraints-jazzy.txt"))
+def python_3_12(folder: Path, pins: str = "constraints.txt") -> Environment:
+    """Return Python 3.12 of this machine, under pins of the project."""
+    return Environment([python312()], install(folder, "3.12", platform.machine(), pins))
 
 
 ENVIRONMENTS: dict[str, Callable[[Path], Environment]] = {
     "nehalem": nehalem,
     "aarch64": aarch64,
     "python-3.12": python_3_12,
-    "numpy-1.26": numpy_1_26,
+    "numpy-1.26": lambda folder: python_3_12(folder, "constraints-jazzy.txt"),
 }
 
 
@@ -111,9 +104,9 @@ def run(failure: str, command: list[str], cwd: Path = ROOT, variables: dict[str,
 
 def python312() -> str:
     """Return a CPython 3.12 of this machine, found on the PATH or where pyenv and uv put theirs."""
-    home = Path.home()
-    known = [*home.glob(".pyenv/versions/3.12*/bin/python3.12"), *home.glob(".local/share/uv/python/*/bin/python3.12")]
-    for command in filter(shutil.which, (sys.executable, "python3.12", *map(str, sorted(known, reverse=True)))):
+    places = (".pyenv/versions/3.12*/bin/python3.12", ".local/share/uv/python/*/bin/python3.12")
+    known = sorted(str(path) for place in places for path in Path.home().glob(place))
+    for command in filter(shutil.which, (sys.executable, "python3.12", *known)):
         probe = "import os, sys; print(os.path.realpath(sys.executable) if sys.version_info[:2] == (3, 12) else '')"
         # A shim of pyenv is there whether or not its version is.
         if path := subprocess.run([command, "-c", probe], capture_output=True, text=True).stdout.strip():
@@ -123,32 +116,28 @@ def python312() -> str:
 
 def emulator(machine: str) -> str:
     """Return the program that runs programs of ``machine``: the installed one, or Debian's, unpacked."""
-    for name in (f"qemu-{machine}", f"qemu-{machine}-static"):
-        if installed := shutil.which(name):
-            return installed
-    return str(unpack(platform.machine(), "qemu", "qemu-user-static") / "usr/bin" / f"qemu-{machine}-static")
+    found = shutil.which(f"qemu-{machine}") or shutil.which(f"qemu-{machine}-static")
+    return found or str(unpack(platform.machine(), "qemu", "qemu-user-static") / f"usr/bin/qemu-{machine}-static")
 
 
 def unpack(machine: str, name: str, *packages: str) -> Path:
     """Unpack Debian packages for ``machine``, and all that they depend on, into a folder of the cache; return it.
 
-    The system's sources and keys are used with separate lists and archives: the system learns neither of the other
-    architecture nor of the packages.
+    The system's sources and keys are used with separate lists and archives: nothing is installed.
     """
-    folder = CACHE / name
+    folder, architecture = CACHE / name, {"x86_64": "amd64", "aarch64": "arm64"}[machine]
     if folder.is_dir():
         return folder
     if not all(map(shutil.which, ("apt-get", "dpkg"))):
         raise MissingError(f"no {' and '.join(packages)} for {machine}: expected a system with apt-get and dpkg")
-    architecture = _DEBIAN_MACHINES[machine]
     apt = CACHE / f"apt-{architecture}"
     for part in ("lists/partial", "archives/partial"):
         (apt / part).mkdir(parents=True, exist_ok=True)
     (apt / "status").touch()
-    command = ["apt-get", "--quiet", "-o", f"APT::Architecture={architecture}", "-o", "APT::Sandbox::User=root"]
-    command += ["-o", f"APT::Architectures={architecture}", "-o", "APT::Install-Recommends=false"]
-    command += ["-o", f"Dir::State={apt}", "-o", f"Dir::State::status={apt}/status", "-o", f"Dir::Cache={apt}"]
-    command += ["-o", f"Dir::State::lists={apt}/lists", "-o", f"Dir::Cache::archives={apt}/archives"]
+    options = [f"APT::Architecture={architecture}", f"APT::Architectures={architecture}", "APT::Sandbox::User=root"]
+    options += ["APT::Install-Recommends=false", f"Dir::State={apt}", f"Dir::State::status={apt}/status"]
+    options += [f"Dir::Cache={apt}", f"Dir::State::lists={apt}/lists", f"Dir::Cache::archives={apt}/archives"]
+    command = ["apt-get", "--quiet", *(word for option in options for word in ("-o", option))]
     # A source that does not answer need not be the one that has them.
     subprocess.run([*command, "update"], capture_output=True)
     failure = f"apt-get has no {' and '.join(packages)} for {architecture}"
@@ -176,29 +165,17 @@ def install(folder: Path, version: str, machine: str, constraints: str) -> str:
     return str(packages)
 
 
-def prepare(name: str) -> Environment:
-    """Return environment ``name``, prepared anew if it is not there or older than pins, library or this program.
+def prepare(name: str) -> None:
+    """Prepare environment ``name`` anew.
 
     Raises:
         MissingError: The message says what is missing for it.
     """
     folder = CACHE / name
-    described = folder / "environment.json"
-    sources = [
-        Path(__file__),
-        *ROOT.glob("constraints*.txt"),
-        *LIBRARY.glob("setup.py"),
-        *LIBRARY.glob("hsv/**/*.[ch]"),
-    ]
-    found = Environment.read(name)
-    newest = max(path.stat().st_mtime for path in [*sources, *LIBRARY.glob("hsv/**/*.py")])
-    if found and described.stat().st_mtime > newest and shutil.which(found.command[0]):
-        return found
     shutil.rmtree(folder, ignore_errors=True)
     environment = ENVIRONMENTS[name](folder)
     folder.mkdir(parents=True, exist_ok=True)
-    described.write_text(json.dumps(asdict(environment)) + "\n")
-    return environment
+    (folder / "environment.json").write_text(json.dumps(asdict(environment)) + "\n")
 
 
 def main() -> int:

@@ -7,10 +7,8 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 MESSAGES = Path(__file__).parents[1] / "ros_ws" / "src" / "hsv_msgs"
 
@@ -34,48 +32,17 @@ def commands() -> str:
 
 
 def messages(folder: Path = MESSAGES) -> str:
-    """Return all messages and services of a package in Markdown, each field with its comment.
+    """Return the definitions of all messages and services of a package in Markdown, comments included.
 
     Args:
         folder: The package, with its folders ``msg`` and ``srv``.
-
-    Raises:
-        rosidl_adapter.parser.InvalidSpecification: If a file is no definition.
     """
-    from rosidl_adapter.parser import parse_message_file, parse_service_file
-
-    text = ["## Messages\n"]
-    for file in sorted((folder / "msg").glob("*.msg")):
-        message = parse_message_file(folder.name, str(file))
-        text.append(f"### {file.stem}\n\n`{folder.name}/msg/{file.stem}`: {_comment(message)}\n\n{_table(message)}")
-    text.append("## Services\n")
-    for file in sorted((folder / "srv").glob("*.srv")):
-        service = parse_service_file(folder.name, str(file))
-        text.append(f"### {file.stem}\n\n`{folder.name}/srv/{file.stem}`: {_comment(service.request)}\n")
-        text.append(f"Request:\n\n{_table(service.request)}")
-        text.append(f"Response:\n\n{_table(service.response)}")
+    text = []
+    for kind, title in (("msg", "Messages"), ("srv", "Services")):
+        text.append(f"## {title}\n")
+        for file in sorted((folder / kind).glob(f"*.{kind}")):
+            text.append(f"### {file.stem}\n\n```text\n{file.read_text(encoding='utf-8')}```\n")
     return "\n".join(text)
-
-
-def _table(message: Any) -> str:
-    """Return fields and constants of a message as tables."""
-    fields = [(f"`{field.name}`", f"`{field.type}`", _comment(field)) for field in message.fields]
-    constants = [(f"`{item.name}`", f"`{item.type}`", f"{item.value}", _comment(item)) for item in message.constants]
-    tables = [_rows(("field", "type", "unit and meaning"), fields)]
-    if constants:
-        tables.append(_rows(("constant", "type", "value", "meaning"), constants))
-    return "\n".join(tables)
-
-
-def _rows(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    lines = [header, ("---",) * len(header), *rows]
-    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
-
-
-def _comment(item: Any) -> str:
-    """Return what the definition says of a message, field or constant, safe in a table."""
-    text = " ".join(item.annotations["comment"])
-    return re.sub(r"([|*<_^$])", r"\\\1", text)
 
 
 def modules_of(package: str) -> list[str]:

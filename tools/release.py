@@ -1,8 +1,7 @@
 """Give all packages the version of a release: python3 tools/release.py 1.1.0.
 
 Writes the version to every package.xml, where setup.py takes it from, and to CITATION.cff, and heads what is
-"Forthcoming" in the changelogs of the packages and "Unreleased" in CHANGELOG.md with it and today's date: all files, or
-none if one of them is not as expected.
+"Forthcoming" or "Unreleased" in the changelogs with it and today's date: all files, or none.
 """
 
 from __future__ import annotations
@@ -24,17 +23,17 @@ def released(root: Path, version: str, date: str) -> dict[Path, str]:
     if not re.fullmatch(r"\d+\.\d+\.\d+", version):
         raise ValueError(f"version = {version!r}: expected three numbers, as 1.2.0")
     heading = f"{version} ({date})"
+    citation = f'version: {version}\ndate-released: "{date}"'
     changes = {
         root / "CHANGELOG.md": (r"^## Unreleased\n(?=\n*###)", f"## Unreleased\n\n## {version} - {date}\n"),
-        root / "CITATION.cff": (
-            r"^version: \S+\ndate-released: \S+$",
-            f'version: {version}\ndate-released: "{date}"',
-        ),
+        root / "CITATION.cff": (r"^version: \S+\ndate-released: \S+$", citation),
     }
     for manifest in sorted([*root.glob("src/*/package.xml"), *root.glob("ros_ws/src/*/package.xml")]):
         changes[manifest] = (r"(?<=<version>)\d+\.\d+\.\d+(?=</version>)", version)
-        forthcoming = f"{heading}\n{'-' * len(heading)}\n"
-        changes[manifest.with_name("CHANGELOG.rst")] = (r"^Forthcoming\n-+\n(?=\* )", forthcoming)
+        changes[manifest.with_name("CHANGELOG.rst")] = (
+            r"^Forthcoming\n-+\n(?=\* )",
+            f"{heading}\n{'-' * len(heading)}\n",
+        )
     texts = {}
     for path, (pattern, new) in changes.items():
         text = path.read_text(encoding="utf-8")
@@ -49,8 +48,8 @@ def released(root: Path, version: str, date: str) -> dict[Path, str]:
 
 if __name__ == "__main__":
     try:
-        [number] = sys.argv[1:] or [""]
-        for path, text in released(ROOT, number, datetime.datetime.now(datetime.UTC).date().isoformat()).items():
-            path.write_text(text, encoding="utf-8")
+        texts = released(ROOT, "".join(sys.argv[1:]), datetime.datetime.now(datetime.UTC).date().isoformat())
     except ValueError as error:
         sys.exit(f"release: {error}")
+    for path, text in texts.items():
+        path.write_text(text, encoding="utf-8")

@@ -12,7 +12,7 @@ import os
 import shlex
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 # Tells the stand-ins of other checkouts on PATH from the real command.
@@ -20,19 +20,11 @@ _SIGNATURE = "tools/ros2.py"
 _FULL_TOOLS = "needs the full ROS 2 command-line tools (apt package ros-jazzy-ros-base)"
 
 
-class RefusedError(Exception):
-    """The command cannot be carried out; the message is all that is printed."""
-
-
 def real_command() -> str | None:
     """Return a `ros2` on PATH that is not this replacement, or None."""
-    for directory in os.get_exec_path():
-        path = Path(directory, "ros2")
-        if not os.access(path, os.X_OK) or path.is_dir():
-            continue
-        with path.open("rb") as file:
-            if _SIGNATURE.encode() not in file.read(4096):
-                return str(path)
+    for path in (Path(directory, "ros2") for directory in os.get_exec_path()):
+        if path.is_file() and os.access(path, os.X_OK) and _SIGNATURE.encode() not in path.read_bytes()[:4096]:
+            return str(path)
     return None
 
 
@@ -40,138 +32,90 @@ def prefixes() -> dict[str, Path]:
     """Return the installation prefix of every package in the ament index; the first on the path wins."""
     found: dict[str, Path] = {}
     for prefix in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
-        index = Path(prefix, "share", "ament_index", "resource_index", "packages")
-        if index.is_dir():
-            for marker in index.iterdir():
-                if not marker.name.startswith("."):
-                    found.setdefault(marker.name, Path(prefix))
+        for marker in Path(prefix).glob("share/ament_index/resource_index/packages/[!.]*"):
+            found.setdefault(marker.name, Path(prefix))
     return found
 
 
 def executables(package: str) -> list[Path]:
-    """Return the executables of a package, sorted by path.
-
-    Raises:
-        RefusedError: there is no such package.
-    """
-    prefix = prefixes().get(package)
-    if prefix is None:
-        raise RefusedError(f"Package '{package}' not found")
-    return sorted(_executables_below(prefix / "lib" / package))
-
-
-def _executables_below(folder: Path) -> Iterator[Path]:
-    for directory, subdirectories, names in os.walk(folder):
+    """Return the executables of a package, sorted by path; exit with a message if there is no such package."""
+    if package not in (known := prefixes()):
+        sys.exit(f"Package '{package}' not found")
+    found = []
+    for directory, subdirectories, names in os.walk(known[package] / "lib" / package):
         subdirectories[:] = [name for name in subdirectories if not name.startswith(".")]
-        for name in names:
-            path = Path(directory, name)
-            if os.access(path, os.X_OK):
-                yield path
+        found += [path for path in (Path(directory, name) for name in names) if os.access(path, os.X_OK)]
+    return sorted(found)
 
 
-def run(package: str, executable: str, arguments: Sequence[str], prefix: str | None) -> None:
-    """Replace this process by the executable, so that signals and the exit code are its own.
-
-    Raises:
-        RefusedError: the package or the executable does not exist, or the name is ambiguous.
-    """
-    paths = [path for path in executables(package) if path.name == executable]
+def run(options: argparse.Namespace) -> None:
+    """Replace this process by the executable, so that signals and the exit code are its own."""
+    paths = [path for path in executables(options.package_name) if path.name == options.executable_name]
     if not paths:
-        raise RefusedError("No executable found")
+        sys.exit("No executable found")
     if len(paths) > 1:
-        raise RefusedError("Multiple executables found:" + "".join(f"\n- {path}" for path in paths))
-    command = [*shlex.split(prefix or ""), str(paths[0]), *arguments]
+        sys.exit("Multiple executables found:" + "".join(f"\n- {path}" for path in paths))
+    command = [*shlex.split(options.prefix or ""), str(paths[0]), *options.argv]
     try:
         os.execvp(command[0], command)
     except OSError as error:
-        raise RefusedError(f"{command[0]}: {error.strerror}") from error
+        sys.exit(f"{command[0]}: {error.strerror}")
 
 
-def list_executables(package: str | None, full_path: bool) -> None:
-    """Print the executables of one package, or of all.
+def list_packages(options: argparse.Namespace) -> None:
+    """Print all packages."""
+    print("\n".join(sorted(prefixes())))
 
-    Raises:
-        RefusedError: there is no such package.
-    """
-    for name in [package] if package else sorted(prefixes()):
+
+def list_executables(options: argparse.Namespace) -> None:
+    """Print the executables of one package, or of all."""
+    for name in [options.package_name] if options.package_name else sorted(prefixes()):
         for path in executables(name):
-            print(path if full_path else f"{name} {path.name}")
+            print(path if options.full_path else f"{name} {path.name}")
 
 
-def print_prefix(package: str, share: bool) -> None:
-    """Print where a package is installed.
-
-    Raises:
-        RefusedError: there is no such package.
-    """
-    prefix = prefixes().get(package)
-    if prefix is None:
-        raise RefusedError("Package not found")
-    print(prefix / "share" / package if share else prefix)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="ros2",
-        description="Run the executables of ROS 2 packages. (The wheels bring no ros2 command; this is the bench's.)",
-        epilog=f"Example: ros2 run hsv_plant plant. Anything else {_FULL_TOOLS}.",
-    )
-    commands = parser.add_subparsers(dest="command", metavar="command")
-    start = commands.add_parser("run", help="run a package's executable")
-    start.add_argument("--prefix", help="command that goes before the executable, e.g. 'gdb -ex run --args'")
-    start.add_argument("package_name")
-    start.add_argument("executable_name")
-    start.add_argument("argv", nargs=argparse.REMAINDER, help="arguments of the executable")
-
-    package = commands.add_parser("pkg", help="list packages and what is in them")
-    verbs = package.add_subparsers(dest="verb", metavar="verb", required=True)
-    listing = verbs.add_parser("executables", help="list executables")
-    listing.add_argument("package_name", nargs="?")
-    listing.add_argument("--full-path", action="store_true", help="print whole paths")
-    place = verbs.add_parser("prefix", help="print where a package is installed")
-    place.add_argument("--share", action="store_true", help="print the share directory of the package")
-    place.add_argument("package_name")
-    verbs.add_parser("list", help="list all packages")
-    return parser
-
-
-def _asks_for_more(arguments: Sequence[str]) -> str | None:
-    """Return the command, as typed, that only the full tools have, or None."""
-    words = [word for word in arguments[:2] if not word.startswith("-")]
-    if not words or words[0] == "run":
-        return None
-    if words[0] == "pkg" and (len(words) < 2 or words[1] in ("executables", "prefix", "list")):
-        return None
-    return "ros2 " + (" ".join(words) if words[0] == "pkg" else words[0])
+def print_prefix(options: argparse.Namespace) -> None:
+    """Print where a package is installed."""
+    if (prefix := prefixes().get(options.package_name)) is None:
+        sys.exit("Package not found")
+    print(prefix / "share" / options.package_name if options.share else prefix)
 
 
 def main(arguments: Sequence[str]) -> int:
     """Carry out one command line; return the exit code."""
     # A listing cut short by "| head" is no error.
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)
-    real = real_command()
-    if real is not None:
+    if real := real_command():
         os.execv(real, [real, *arguments])
-    more = _asks_for_more(arguments)
-    if more is not None:
-        print(f"{more} {_FULL_TOOLS}", file=sys.stderr)
+    parser = argparse.ArgumentParser(
+        prog="ros2",
+        description="Run the executables of ROS 2 packages. (The wheels bring no ros2 command; this is the bench's.)",
+        epilog=f"Example: ros2 run hsv_plant plant. Anything else {_FULL_TOOLS}.",
+    )
+    parser.set_defaults(carry_out=lambda options: parser.print_help())
+    commands = parser.add_subparsers(metavar="command")
+    start = commands.add_parser("run", help="run a package's executable")
+    start.add_argument("--prefix", help="command that goes before the executable, e.g. 'gdb -ex run --args'")
+    start.add_argument("package_name")
+    start.add_argument("executable_name")
+    start.add_argument("argv", nargs=argparse.REMAINDER, help="arguments of the executable")
+    start.set_defaults(carry_out=run)
+    verbs = commands.add_parser("pkg", help="list packages and what is in them").add_subparsers(required=True)
+    verbs.add_parser("list", help="list all packages").set_defaults(carry_out=list_packages)
+    listing = verbs.add_parser("executables", help="list executables")
+    listing.add_argument("package_name", nargs="?")
+    listing.add_argument("--full-path", action="store_true", help="print whole paths")
+    listing.set_defaults(carry_out=list_executables)
+    place = verbs.add_parser("prefix", help="print where a package is installed")
+    place.add_argument("--share", action="store_true", help="print the share directory of the package")
+    place.add_argument("package_name")
+    place.set_defaults(carry_out=print_prefix)
+    words = [word for word in arguments[:2] if not word.startswith("-")]
+    if (words and words[0] not in commands.choices) or (words[:1] == ["pkg"] and {*words[1:]} - verbs.choices.keys()):
+        print(f"ros2 {' '.join(words if words[0] == 'pkg' else words[:1])} {_FULL_TOOLS}", file=sys.stderr)
         return 2
-    parser = _parser()
     options = parser.parse_args(arguments)
-    try:
-        if options.command == "run":
-            run(options.package_name, options.executable_name, options.argv, options.prefix)
-        elif options.command == "pkg" and options.verb == "executables":
-            list_executables(options.package_name, options.full_path)
-        elif options.command == "pkg" and options.verb == "prefix":
-            print_prefix(options.package_name, options.share)
-        elif options.command == "pkg":
-            print("\n".join(sorted(prefixes())))
-        else:
-            parser.print_help()
-    except RefusedError as refusal:
-        print(refusal, file=sys.stderr)
-        return 1
+    options.carry_out(options)
     return 0
 
 

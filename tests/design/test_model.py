@@ -68,6 +68,7 @@ def codesign():
     return read_inputs(OFFLINE_DESIGN / "adjustable.toml")
 
 
+@pytest.mark.long
 def test_codesigned_model_keeps_six_vertices_and_agrees_with_the_ecm(codesign):
     notch = sections(codesign)
     model = design_model(codesign.model, load_vehicle(), notch)

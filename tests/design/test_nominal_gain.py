@@ -119,6 +119,7 @@ def test_the_gains_of_a_switched_family_do_not_shrink_the_ellipsoid_before_them(
     assert np.all(np.array(between[:4]) < 0.0)
 
 
+@pytest.mark.long
 def test_an_interpolated_family_is_certified_between_its_ellipsoids(problem, state):
     outer, inner = nested_gains(problem, state, [1.0, 0.6], interpolated=True)
     assert outer.between is None and "between_smallest_eigenvalues" not in outer.report()

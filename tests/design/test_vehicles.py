@@ -79,6 +79,7 @@ def hsv():
     return main
 
 
+@pytest.mark.long
 def test_a_design_is_for_the_vehicle_beside_its_inputs_and_its_certificate_is_enough(hsv, folder, monkeypatch):
     # Random sequences, which say nothing of vehicles, take most of a small design's time.
     monkeypatch.setattr("hsv.design.tube.SEQUENCES", 1000)

@@ -6,7 +6,6 @@ import pkgutil
 import re
 from pathlib import Path
 
-import pytest
 from typer.main import get_command
 
 import hsv
@@ -35,25 +34,10 @@ def test_every_command_has_a_section_with_all_its_options():
     assert "...\n" not in re.sub(r"^\$ .*", "", page, flags=re.MULTILINE)
 
 
-def test_every_field_of_every_message_is_there_with_its_unit_and_meaning():
-    pytest.importorskip("rosidl_adapter")
+def test_every_message_and_service_is_there_as_it_is_defined():
     page = reference_pages.messages()
-    sections = dict(re.findall(r"^### \w+\n\n`hsv_msgs/(\S+)`(.*?)(?=^##|\Z)", page, re.DOTALL | re.MULTILINE))
-    files = [*ROOT.glob("ros_ws/src/hsv_msgs/msg/*.msg"), *ROOT.glob("ros_ws/src/hsv_msgs/srv/*.srv")]
-    assert {*sections} == {f"{file.parent.name}/{file.stem}" for file in files}
-    for file in files:
-        section = sections[f"{file.parent.name}/{file.stem}"].replace("\\", "")
-        lines = file.read_text(encoding="utf-8").splitlines()
-        for line in lines:
-            if match := re.fullmatch(r"(\S+) +(\w+)(?: *= *(\d+))? *(?:# *(.*))?", line):
-                kind, name, value, comment = match.groups()
-                if kind.startswith(("#", "-")):
-                    continue
-                [row] = [row for row in section.splitlines() if row.startswith(f"| `{name}` |")]
-                assert (comment or "") in row and (value or "") in row, f"{file.name}: {line}"
-                assert kind.partition("/")[2] in row or kind in row
-        first = re.match(r"# (.*)", lines[0])
-        assert first is None or first[1] in section
+    for file in (*ROOT.glob("ros_ws/src/hsv_msgs/msg/*.msg"), *ROOT.glob("ros_ws/src/hsv_msgs/srv/*.srv")):
+        assert f"### {file.stem}\n\n```text\n{file.read_text(encoding='utf-8')}```\n" in page
 
 
 def test_every_package_and_module_of_the_library_is_on_its_page():

@@ -28,6 +28,7 @@ setup(
             "live = hsv_bringup.live:main",
             "fault = hsv_bringup.commands:fault",
             "player = hsv_bringup.player:main",
+            "ring = hsv_bringup.ring:main",
             "set_command = hsv_bringup.commands:set_command",
             "set_parameter = hsv_bringup.commands:set_parameter",
             "topic = hsv_bringup.topic:main",

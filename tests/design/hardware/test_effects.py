@@ -71,7 +71,8 @@ DECLARED = {
 }
 
 
-@pytest.mark.parametrize("name", ["all", *(pytest.param(n, marks=pytest.mark.long) for n in DECLARED if n != "all")])
+@pytest.mark.long
+@pytest.mark.parametrize("name", DECLARED)
 def test_the_errors_of_an_equipped_flight_evolve_as_the_enlarged_system_says(subject, plan, name):
     """Each step of e in a flight with sensors is A e + G d + the sensors' channels, and every channel is in its bound.
 

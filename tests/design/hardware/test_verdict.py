@@ -15,6 +15,7 @@ def test_where_no_set_is_found_the_reason_is_that_of_the_search(subject, monkeyp
     assert verdict.verdict("x", subject.design, subject).said() == "no set"
 
 
+@pytest.mark.long
 def test_a_design_that_knows_actuators_is_judged_with_those_that_fly(realistic):
     tube = realistic.certificate["tube"]
     known, ideal = verdict.certified_with(realistic, {}, "ideal")

@@ -181,7 +181,7 @@ def ring_lap(laps: int) -> float:
     Raises:
         RunError: A process ended before its time, or the workspace is not built.
     """
-    program = str(executable(NodeDescription("ring", "hsv_bench", "ring", (), ())))
+    program = str(executable(NodeDescription("ring", "hsv_bringup", "ring", (), ())))
     processes: dict[str, subprocess.Popen[str]] = {}
 
     def read_line(process: subprocess.Popen[str]) -> str:
