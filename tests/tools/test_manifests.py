@@ -22,18 +22,20 @@ KEYS |= {"typer": "python3-typer", "yaml": "python3-yaml"}
 
 WITHOUT_KEY = {
     "clarabel",
+    "control",
     "cvxpy",
     "distributed",
     "foxglove",
     "lz4",
     "markupsafe",
     "mcap",
+    "pandas",
     "pint",
     "piqp",
     "pyarrow",
 }
 WITHOUT_KEY |= {"rosbags", "tomli_w", "websockets", "zstandard"}
-"""Modules for which rosdep has no key of a Debian package that will do; docs/installation.md names them."""
+"""Modules for which rosdep has no key of a Debian package that will do, or of notebooks; docs/installation.md has them."""
 
 
 def imported(folder: Path) -> set[str]:
