@@ -1,20 +1,20 @@
-/* Actuators of first and second order with limits, discretised exactly, and the faults of actuators and effectors.
+/* Actuators of first and second order with limits, discretised exactly, and faults of actuators and effectors.
  *
  *   order 1: dp/dt = omega (c - p),   order 2: d2p/dt2 = omega^2 (c - p) - 2 zeta omega dp/dt
  *
- * with the command c held (sets and order of limits: Zipfel's CADAC GHAME6, Wiese's generic hypersonic vehicle). An
- * actuator moves on substeps of a quarter of the control period, and so does the vehicle, whose effector is held over
- * each at the mean of the substep's two ends. An ideal actuator is where its command is at once.
+ * with the command c held (parameters and order of limits: Zipfel's CADAC GHAME6, Wiese's generic hypersonic vehicle).
+ * Actuators and vehicle move on substeps of a quarter of the control period; over a substep the vehicle sees the mean
+ * of the two end positions. An ideal actuator reaches its command at once.
  *
- * Order: dynamics with the limits that faults leave; scale, bias, drift and oscillation of the effector; what replaces
- * its position, the newest of which wins; the stops.
+ * Order of effects: dynamics with the limits after faults; scale, bias, drift and oscillation of the effector; faults
+ * that replace its position, of which the last in the list prevails; the stops.
  */
 #pragma once
 #include "faults.h"
 
 enum { POSITION, RATE };
 
-/* Write F11, F12, F21, F22 that take position less command and rate over h (s). */
+/* Write F11, F12, F21, F22 of the transition over h (s) of (position - command, rate). */
 void hsv_actuator_map(int64_t order, double frequency, double damping, double h, double *map)
 {
     if (order == 1) {
@@ -31,8 +31,8 @@ void hsv_actuator_map(int64_t order, double frequency, double damping, double h,
     map[3] = decay * (cosine - damping * frequency * scaled);
 }
 
-/* Write position, rate and mean position h (s) later, from "state" (position, rate). A position beyond a stop that has
- * moved may stay there and return, but not go further. In equilibrium nothing changes, to the bit. */
+/* Write position, rate and mean position h (s) later, from "state" (position, rate). When a fault moves a stop, a
+ * position beyond it may stay or return, but not move further out. An equilibrium is kept to the bit. */
 void hsv_actuator_step(int64_t order, const double *map, const double *state, double command, double minimum_stop,
                        double maximum_stop, double rate_limit, double acceleration_limit, double h, double *out)
 {
@@ -57,7 +57,7 @@ void hsv_actuator_step(int64_t order, const double *map, const double *state, do
     out[2] = order > 0 || rate_limit < INFINITY ? 0.5 * (position + moved) : moved;
 }
 
-/* The position of an effector with a fault, "elapsed" (s) after the fault's start and "since" its onset. */
+/* Return the position of a faulty effector, "elapsed" (s) after the start of the fault and "since" (s) its onset. */
 static double deflected(const hsv_fault *fault, const hsv_fault_memory *memory, double elapsed, double since,
                         double alpha, double position)
 {
@@ -75,14 +75,14 @@ static double deflected(const hsv_fault *fault, const hsv_fault_memory *memory, 
     }
     case LOCK: return memory->kept;
     case LOCK_AT: return p[0];
-    case FLOAT: /* at zero, or along the flow */ return -p[0] * alpha;
+    case FLOAT: /* at zero or aligned with the flow */ return -p[0] * alpha;
     case HARD_OVER: return memory->kept + p[0] * since;
     }
     return position;
 }
 
-/* Move the actuators, state (2, 2), over a length of substeps, "substep" after the beginning of step k; replace the
- * positions of the effectors (2). */
+/* Advance the actuators, state (2, 2), by "length" substeps, beginning at "substep" of step k; write the positions of
+ * the effectors (2). */
 void hsv_move_effectors(const hsv_actuators *actuators, double *state, hsv_faults *faults, int64_t k, double substep,
                         double length, const double *command, double alpha, double *effector)
 {
@@ -126,7 +126,7 @@ void hsv_move_effectors(const hsv_actuators *actuators, double *state, hsv_fault
             position = deflected(fault, memory, elapsed, since, alpha, position);
         }
         position = limited(position, actuators->minimum[channel], actuators->maximum[channel]);
-        /* An actuator whose position is replaced is held, and goes on from there. */
+        /* An actuator whose position a fault replaces is held there, and continues from there afterwards. */
         own[POSITION] = replaced ? position : moved[0];
         own[RATE] = replaced ? 0.0 : moved[1];
         effector[channel] = position;

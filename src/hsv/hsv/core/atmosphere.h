@@ -1,24 +1,24 @@
-/* Air that moves and whose density differs from the model's: wind, shear, turbulence, gusts, density variation.
+/* Disturbances of the air: wind, shear, turbulence, gusts and variation of the density.
  *
  * Dryden turbulence (MIL-F-8785C, MIL-HDBK-1797) is white noise of unit density through
  *
  *   H_u(s) = sigma_u sqrt(2 tau_u) / (1 + tau_u s),
  *   H_w(s) = sigma_w sqrt(tau_w) (1 + sqrt(3) tau_w s) / (1 + tau_w s)^2,   tau = L / V.
  *
- * Both filters are discretised exactly over the distance flown in a period, and stationary from the first step on. The
- * density varies as a Gauss-Markov process along the path. A gust is (1 - cos) shaped (MIL-F-8785C, CS-25.341), its
- * mean over a period in closed form. Speed of sound: US Standard Atmosphere 1976.
+ * Both filters are discretised exactly over the distance flown in a period and are stationary from the first step. The
+ * density varies as a Gauss-Markov process along the path. A gust has the (1 - cos) shape of MIL-F-8785C and CS-25.341;
+ * its mean over a period is computed in closed form. Speed of sound: US Standard Atmosphere 1976.
  */
 #pragma once
 #include "noise.h"
 #include "vehicle.h"
 
-/* The memory: turbulence along the path and the two states of that across it, in units of sigma, the density's
- * variation likewise, and how far each gust was flown into (m). */
+/* Memory: turbulence along the path, the two states of the turbulence across it and the variation of the density, each
+ * in units of its sigma; then the distance (m) flown in each gust. */
 enum { ALONG, ACROSS_1, ACROSS_2, VARIATION, DISTANCE };
 
-/* Write F (2, 2) and the lower factor of I - F F' (three entries) of H_w over the distance r L. The states are standard
- * normal and uncorrelated; w = sigma / 2 (first + sqrt(3) second). */
+/* Write, for H_w over the distance r L, the transition F (2, 2) and the three entries of the lower Cholesky factor of
+ * I - F F'. The states are standard normal and uncorrelated; w = sigma / 2 (first + sqrt(3) second). */
 void hsv_dryden_cross_map(double r, double *map)
 {
     const double decay = exponential(-r), square = decay * decay;
@@ -29,7 +29,8 @@ void hsv_dryden_cross_map(double r, double *map)
     map[6] = root(maximum(1.0 - square * (1.0 - 2.0 * r + 2.0 * r * r) - lower * lower, 0.0));
 }
 
-/* The integral from 0 to x (m) of (1 - cos(pi x / length)) / 2, which ends after two lengths or stays after one. */
+/* Return the integral from 0 to x (m) of a gust of unit amplitude, (1 - cos(pi x / length)) / 2. It ends after two
+ * lengths, or stays at its maximum after one. */
 static double gust_integral(double x, double length, int64_t stays)
 {
     const double pi = 3.141592653589793, end = stays ? length : 2.0 * length, inside = limited(x, 0.0, end);
@@ -39,7 +40,7 @@ static double gust_integral(double x, double length, int64_t stays)
     return stays && x > end ? area + (x - end) : area;
 }
 
-/* The mean of a gust between two distances (m) flown into it, relative to its greatest velocity. */
+/* Return the mean of a gust between two distances (m) from its start, relative to its maximum velocity. */
 double hsv_gust_mean(double begin, double end, double length, int64_t stays)
 {
     return (gust_integral(end, length, stays) - gust_integral(begin, length, stays)) / (end - begin);
@@ -52,8 +53,8 @@ static void advance_markov(double *value, double r, int64_t k, int64_t seed, int
     *value = k == 0 ? drawn : decay * *value + root(maximum(1.0 - decay * decay, 0.0)) * drawn;
 }
 
-/* Write wind forward, wind up (m/s) and the relative density of step k at an altitude (m), flown through at a speed
- * (m/s), into the first of the conditions. */
+/* Write the first three conditions of step k, forward and upward wind (m/s) and relative density, for an altitude (m)
+ * and a speed (m/s). */
 void hsv_atmosphere_step(const hsv_atmosphere *air, double *memory, int64_t k, int64_t seed, double altitude,
                          double speed, double *conditions)
 {
@@ -94,7 +95,7 @@ void hsv_atmosphere_step(const hsv_atmosphere *air, double *memory, int64_t k, i
         }
 }
 
-/* m/s, at a geometric altitude of 11 to 32 km. */
+/* Return the speed of sound (m/s) at a geometric altitude (m) of 11 to 32 km. */
 double hsv_speed_of_sound(double altitude)
 {
     const double geopotential = 6356766.0 * altitude / (6356766.0 + altitude);

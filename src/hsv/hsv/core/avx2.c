@@ -1,4 +1,4 @@
-/* Four flights at a time, one in each lane of a register. */
+/* Four flights at a time, one in each lane of an AVX2 register. */
 #ifdef __x86_64__
 #include "target.h"
 BEGIN_TARGET("avx2")

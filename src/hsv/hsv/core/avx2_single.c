@@ -1,4 +1,4 @@
-/* One flight, with the instructions of AVX2. */
+/* One flight with AVX2 instructions. */
 #ifdef __x86_64__
 #include "target.h"
 BEGIN_TARGET("avx2")

@@ -1,4 +1,4 @@
-/* Eight flights at a time, one in each lane of a register. */
+/* Eight flights at a time, one in each lane of an AVX-512 register. */
 #ifdef __x86_64__
 #include "target.h"
 BEGIN_TARGET("avx512f,avx512dq,avx512vl")

@@ -1,20 +1,21 @@
-/* The numeric core as Python sees it. cffi reads what stands between the two marks, so that the layout of a struct is
- * declared once. hsv.core fills structs by the names of their fields. The comment beside an array gives its shape;
- * hsv.core checks it and sets the fields that count elements. SI units and radians. */
+/* Interface of the numeric core. cffi reads the text between the two marks, so that each struct is declared once.
+ * hsv.core fills structs by the names of their fields. The comment after a pointer gives the shape of the array and
+ * says whether it is optional (NULL); hsv.core checks the shape and sets the fields that count elements. Units are SI.
+ */
 #pragma once
 #include <stdint.h>
 /* begin */
 typedef double number;
-/* Numbers of states (the first of which are those of the rigid body), inputs, and conditions of air and engine; most
- * sections of the notch filter, most steps of a delay; integrated states; columns of a history, see
- * hsv.flight.history; entries of the scheduled model that are summed at a time. */
+/* Numbers of states, inputs, rigid-body states (which come first), and conditions of air and engine; maximum sections
+ * of the notch filter and steps of a delay; number of integrated states. */
 enum { STATES = 9, INPUTS = 2, RIGID = 5, CONDITIONS = 7, MAX_SECTIONS = 4, MAX_DELAY = 50, INTEGRATED = 2 };
+/* Columns of the history and of the auxiliary history, see hsv.flight.history; entries summed at a time. */
 enum { HISTORY = 25, AUXILIARY = 3, SUMS = 12 };
 enum { ALTITUDE, VELOCITY, ALPHA, PITCH, PITCH_RATE, ETA_1, ETA_1_RATE, ETA_2, ETA_2_RATE };
 enum { FUEL, ELEVATOR };
 
 /* clang-format off */
-/* Kinds of faults, of the command, an actuator, an effector, the engine and sensors, in the order of composition. */
+/* Types of faults in the order of composition: of the command, an actuator, an effector, the engine and a sensor. */
 enum {
     LOSS, REVERSAL, DELAY, DEAD_ZONE, BACKLASH, BANDWIDTH, RATE_LIMIT, STOP_LIMIT,
     SCALE, BIAS, DRIFT, OSCILLATION, LOCK, LOCK_AT, FLOAT, HARD_OVER, SOLID_OSCILLATION,
@@ -22,9 +23,9 @@ enum {
     SENSOR_SCALE, SENSOR_NOISE, SENSOR_BIAS, SENSOR_RUNAWAY, SENSOR_DROP_OUT, SENSOR_FREEZE
 };
 enum { ALWAYS, PERIODIC, RANDOM };
-enum { SSE2, AVX2, AVX512 }; /* instructions; elsewhere than on x86-64, the first stands for any */
+enum { SSE2, AVX2, AVX512 }; /* instruction sets; on other processors than x86-64 the first is the only one */
 
-/* First stream of each block, which has 256. Never change a number: it determines the random numbers of a flight. */
+/* First of the 256 random streams of each block. Never change a number: random numbers of a flight depend on it. */
 enum {
     TURBULENCE_FORWARD = 256, TURBULENCE_UP = 512, DENSITY_VARIATION = 768,
     SENSOR_NOISE_STREAM = 4096, SENSOR_CONSTANTS = 4352, SENSOR_LOSS = 4608,
@@ -46,27 +47,27 @@ typedef struct {
     const double *B; /* (sections, 2) */
     const double *C; /* (sections, 2) */
     const double *D; /* (sections) */
-    const double *G; /* (sections, 2) rest for an input of one */
+    const double *G; /* (sections, 2) equilibrium for unit input */
     int64_t sections;
 } hsv_notch;
 
-/* Weights of the vertices along a scheduling variable, a polynomial on each piece, power 3 first. */
+/* Weights of the vertices along a scheduling variable: cubic polynomials by piece, highest power first. */
 typedef struct {
     const double *coefficients; /* (4, pieces, vertices) */
     const double *breakpoints;  /* (pieces + 1) */
     int64_t pieces, vertices;
 } hsv_axis;
 
-/* The entries of [A_i, B_i] that are not zero in all vertices, and their places. */
+/* Polytopic model: the entries of [A_i, B_i] that are non-zero in some vertex, and their indices. */
 typedef struct {
     const double *S;        /* (vertices <= 64, size <= 108) */
-    const int64_t *entries; /* (used <= 99) places in the flattened [A_i, B_i] */
-    const int64_t *starts;  /* (19) where the entries of each row of A and of B begin, in turn */
+    const int64_t *entries; /* (used <= 99) indices in the flattened [A_i, B_i] */
+    const int64_t *starts;  /* (19) index in entries at which each row of A and of B begins, alternately */
     int64_t vertices, size, used;
     hsv_axis altitude, velocity;
 } hsv_polytope;
 
-/* Nested gains and ellipsoids, outermost first. */
+/* Nominal law: nested gains and ellipsoids, outermost first. */
 typedef struct {
     hsv_polytope polytope;
     const double *gains;      /* (count, 2, 9) */
@@ -74,7 +75,7 @@ typedef struct {
     int64_t count, interpolated;
 } hsv_nominal;
 
-/* Rows of the reference; row 0 is that of the step "first". */
+/* Reference by step; row 0 belongs to step "first". */
 typedef struct {
     const double *state;  /* (rows, 9) */
     const double *input;  /* (rows, 2) */
@@ -82,7 +83,7 @@ typedef struct {
     int64_t first, rows;
 } hsv_reference;
 
-/* Estimator of the elevator's effectiveness. */
+/* Estimator of the elevator effectiveness. */
 typedef struct {
     hsv_vehicle vehicle;
     double start[9];
@@ -91,20 +92,20 @@ typedef struct {
 
 typedef struct {
     const double *gains;   /* (count, 2, 9) F diag(tau) */
-    const int64_t *starts; /* (count) the step from which each holds */
+    const int64_t *starts; /* (count) first step of each gain */
     int64_t count, planned, filtered;
     double minimum[2], maximum[2], integral_rate, period;
     hsv_notch notch;
-    const hsv_effectiveness *effectiveness; /* NULL: not estimated */
+    const hsv_effectiveness *effectiveness; /* NULL: effectiveness is not estimated */
 } hsv_tube;
 
 typedef struct {
-    double planned[8], integral[2]; /* s_n of the filter of the plan */
-    double predicted[9], held[2];   /* of the effectiveness estimator: state of the step before, input held since */
+    double planned[8], integral[2]; /* state s_n of the plan's notch filter; integral of the error */
+    double predicted[9], held[2];   /* effectiveness estimator: state of the previous step, input since then */
     double known[9];
 } hsv_tube_memory;
 
-/* Extended Kalman filter of constant gain. */
+/* Extended Kalman filter with constant gain. */
 typedef struct {
     double gain[11][5], start[9], period;
     hsv_vehicle vehicle;
@@ -140,7 +141,7 @@ typedef struct {
 
 typedef struct {
     double lagged, drift, walk, bias, scale, held, given;
-    double queue[51]; /* samples on their way */
+    double queue[51]; /* delayed samples */
 } hsv_sensor_memory;
 
 typedef struct {
@@ -149,22 +150,22 @@ typedef struct {
     int64_t checksum, ideal;
 } hsv_link;
 
-/* A fault, and what it remembers. */
+/* A fault, and its memory. */
 typedef struct {
     double start, stop; /* steps [start, stop) */
     int64_t channel, code, occurrence;
-    double cycle[2]; /* period and duty in steps, or probabilities of going and of coming in a step */
+    double cycle[2]; /* period and duration in steps, or probabilities per step of disappearing and of returning */
     double parameter[12];
 } hsv_fault;
 
 typedef struct {
     int64_t acting, away;
-    double last, onset, since, kept; /* steps in which it acted last, and since which; what is kept of the signal */
+    double last, onset, since, kept; /* last step and first step of action, step of unstart; kept value of the signal */
     double queue[51];
 } hsv_fault_memory;
 
 typedef struct {
-    const hsv_fault *rows;    /* (count) in the order in which they are composed */
+    const hsv_fault *rows;    /* (count) in the order of composition */
     hsv_fault_memory *memory; /* (count) */
     int64_t count;
     double period;
@@ -178,13 +179,13 @@ typedef struct {
     hsv_atmosphere atmosphere;
     hsv_sensors sensors;
     hsv_link link;
-    double late; /* substeps after which the command of a period is there */
+    double late; /* delay of the command of a period, in substeps of the actuators */
     int64_t seed;
 } hsv_plant;
 
 typedef struct {
-    double *actuators;          /* (2, 2) position and rate of each */
-    double *command;            /* (2) of the period before */
+    double *actuators;          /* (2, 2) position and rate */
+    double *command;            /* (2) command of the previous period */
     double *effector;           /* (2) */
     double *atmosphere;         /* (air) */
     hsv_sensor_memory *sensors; /* (9) */
@@ -197,10 +198,10 @@ typedef struct {
     hsv_faults effector, engine, sensor;
 } hsv_plant_faults;
 
-/* A function of hsv_block.h with its arrays. */
+/* A step function of hsv_block.h with its arrays. */
 typedef int32_t (*hsv_step_function)(int64_t k, const double *in, double *out, double *state, const double *par);
 typedef struct {
-    hsv_step_function function; /* NULL: the core's own law flies */
+    hsv_step_function function; /* NULL: the law of the core is used */
     double *state;              /* or NULL */
     const double *par;          /* or NULL */
 } hsv_call;
@@ -213,7 +214,7 @@ typedef struct {
     int64_t size;
 } hsv_tube_set;
 
-/* Actuators over a period: a(k+1) = A a + B c, mean position C a + D c. */
+/* Sampled actuators: a(k+1) = A a + B c, mean position over the period C a + D c. */
 typedef struct {
     const double *A; /* (states <= 4, states) */
     const double *B; /* (states, 2) */
@@ -222,31 +223,31 @@ typedef struct {
     int64_t states;
 } hsv_sampled;
 
-/* A flight: what flies, and what it remembers. */
+/* A flight: its systems, their memory, and its history. */
 typedef struct {
-    double x[9]; /* the initial state */
+    double x[9]; /* initial state */
     const hsv_plant *plant;
     hsv_plant_memory *plant_memory;
     hsv_plant_faults *plant_faults;
     const hsv_notch *notch;
-    const hsv_estimator *estimator; /* NULL: none */
+    const hsv_estimator *estimator; /* NULL: no estimator */
     const hsv_nominal *nominal;
     const hsv_reference *reference;
     const hsv_tube *tube;
     const hsv_link *link;
     double *link_memory; /* (payloads) */
     int64_t payloads;
-    hsv_faults *faults; /* on the command */
+    hsv_faults *faults; /* of the command */
     hsv_call nominal_law, controller;
-    const hsv_tube_set *set; /* NULL: no level is computed */
+    const hsv_tube_set *set; /* NULL: the level is not computed */
     double *history;         /* (rows, 25) */
     double *auxiliary;       /* (rows, 3) */
     double *estimated;       /* (rows, 9), or NULL */
-    int64_t rows;            /* of the history, the first of which is the step at which a piece begins */
-    int64_t ended;           /* steps flown, written where it diverges */
-    int64_t returned;        /* by the controller, written */
-    double answer[2];        /* of the controller, written */
-    double worst;            /* level in the set, written */
+    int64_t rows;            /* rows of the history; the first belongs to the first step of a call */
+    int64_t ended;           /* output: number of steps, if the flight diverges */
+    int64_t returned;        /* output: return value of the controller */
+    double answer[2];        /* output: input returned by the controller */
+    double worst;            /* output: largest level in the set */
 } hsv_flight;
 
 /* Elementary functions and random numbers. */
@@ -259,7 +260,7 @@ double hsv_logarithm(double x);
 void hsv_philox(const uint64_t *counter, const uint64_t *key, uint64_t *words);
 void hsv_uniforms(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair);
 void hsv_normals(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair);
-/* Vehicle: conditions may be NULL. Forces: lift, drag, thrust, moment, dynamic pressure, angle of attack. */
+/* Vehicle; conditions may be NULL. Forces are lift, drag, thrust, moment, dynamic pressure and angle of attack. */
 void hsv_derivative(const double *x, const double *u, const hsv_vehicle *p, const double *conditions, double *out);
 void hsv_complex_derivative(const double *x, const double *u, const hsv_vehicle *p, double *out);
 void hsv_forces(const double *x, const double *u, const hsv_vehicle *p, const double *conditions, double *out);
@@ -279,7 +280,7 @@ void hsv_reference_rows(const hsv_vehicle *rigid, int64_t rows, const double *co
 int64_t hsv_steady_gain(const double *A, const double *B, double period, const double *process, const double *noise,
                         int64_t iterations, double settled, double *gain);
 void hsv_transition(const double *A, const double *B, double period, double *F);
-/* Equipment, one flight. */
+/* Equipment of one flight. */
 void hsv_actuator_map(int64_t order, double frequency, double damping, double h, double *map);
 void hsv_actuator_step(int64_t order, const double *map, const double *state, double command, double minimum,
                        double maximum, double rate_limit, double acceleration_limit, double h, double *out);
@@ -303,7 +304,7 @@ void hsv_sense(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_fault
                double *measurement);
 void hsv_plant_conditions(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k,
                           const double *x, double fuel);
-/* Blocks of the loop, one step. */
+/* One step of each block of the loop. */
 void hsv_advance_plant(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k,
                        const double *actuator, double *x);
 void hsv_notch_rest(const hsv_notch *notch, double rate, double *s);
@@ -321,11 +322,11 @@ double hsv_effectiveness_step(const hsv_effectiveness *effectiveness, hsv_tube_m
 void hsv_air_relative(double velocity, double path_angle, double forward, double up, double *out);
 void hsv_effectiveness_bounds(const hsv_effectiveness *effectiveness, const double *step, double *bounds);
 double hsv_level(const double *P, int64_t size, const double *x);
-/* Flights: one, or as many as a register has lanes, in pieces. */
+/* Flights: one, or one per lane of a register, over a range of steps. */
 int hsv_widest(void);
 int64_t hsv_memory_size(int64_t flights);
 int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop);
-/* Many steps at once: design, governor and metrics. */
+/* Sequences of steps for design, governor and metrics. */
 int hsv_schedule(const hsv_polytope *polytope, double altitude, double velocity, double *S);
 int hsv_plan(const hsv_nominal *nominal, const hsv_reference *reference, int64_t first, int64_t steps,
              const double *start, double *plan, double *deviation);
@@ -341,4 +342,4 @@ double hsv_worst_level(const hsv_tube_set *set, int64_t steps, const double *sta
 void hsv_curves(int64_t steps, int64_t stride, const double *history, const double *auxiliary, const double *reference,
                 double *curves, uint8_t *saturated);
 /* end */
-void hsv_any_sine_cosine(double x, double *sine, double *cosine); /* of any argument, for lanes */
+void hsv_any_sine_cosine(double x, double *sine, double *cosine); /* for any argument, one lane at a time */

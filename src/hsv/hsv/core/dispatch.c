@@ -1,4 +1,4 @@
-/* The instances of the loop that this processor can run. */
+/* Selection of the instance of the loop by the instruction set of the processor. */
 #include "core.h"
 
 typedef int64_t Fly(hsv_flight *const *flights, void *memory, int64_t start, int64_t stop);
@@ -19,7 +19,7 @@ int hsv_widest(void)
     return SSE2;
 }
 
-/* Bytes that hsv_fly needs between the pieces of a group of flights. */
+/* Return the size (bytes) of the memory of hsv_fly between calls for a group of flights. */
 int64_t hsv_memory_size(int64_t flights)
 {
 #ifdef __x86_64__

@@ -1,25 +1,26 @@
-/* Estimator of the elevator's effectiveness P in flight, by set membership on the pitch channel.
+/* Set-membership estimator of the elevator effectiveness P in flight, from the pitch rate.
  *
- * In every step the pitch rate over the last period is predicted with the equations of motion of the nominal vehicle,
- * with the elevator commanded and without any. The difference is the effect e of a healthy elevator; what the pitch
- * rate has done beyond the prediction without elevator is y. A vehicle of the declared uncertainty satisfies
+ * In every step the equations of motion of the nominal vehicle predict the pitch rate after the last period, with the
+ * commanded elevator and with zero elevator. The difference is the effect e of a healthy elevator; y is the measured
+ * pitch rate minus the prediction with zero elevator. A vehicle of the declared uncertainty satisfies
  *
  *   (1 + i) D + b = P (1 + g) e + d + v,   y = D + b,
  *
- * D the measured change of the pitch rate, b that of the nominal vehicle without elevator and opposite sign, i and g
- * the relative errors of inertia and elevator, d a slowly changing disturbance, |v| at most a declared share of |e| and
- * a noise. Every step bounds P by an interval. An interval without P = 1 is a fault; a loss of effectiveness, y - d
- * proportional to e, and an offset, y - d - e constant, are then followed, each as the intersection of what the steps
- * leave of it. While a loss explains all steps, the command is divided by the middle of its interval.
+ * where D is the measured change of the pitch rate, -b the change of the nominal vehicle with zero elevator, i and g
+ * the relative errors of inertia and elevator, d a slow disturbance, and |v| is at most a declared share of |e| plus
+ * noise. Every step gives an interval for P. An interval without P = 1 indicates a fault. Two hypotheses are then
+ * tracked, each as the intersection of the intervals of the steps: a loss of effectiveness (y - d proportional to e)
+ * and an offset (y - d - e constant). While a loss explains all steps, the command is divided by the middle of its
+ * interval.
  */
 #pragma once
 #include "vehicle.h"
 
-/* What is known: P by which the command is divided, its interval, the interval of an offset (rad/s), the disturbance
- * learned with g = 0 and the effect in that step (rad/s), mode, steps that the explanations have explained. */
+/* Estimates: P by which the command is divided, interval of P, interval of the offset (rad/s), disturbance estimated
+ * with g = 0 and the effect in that step (rad/s), mode, number of steps that the hypotheses explain. */
 enum { EFFECTIVENESS, LOW, HIGH, OFFSET_LOW, OFFSET_HIGH, DISTURBANCE, EFFECT, MODE, COUNT, KNOWN };
-/* Modes, as numbers: LOST where a loss of effectiveness explains all steps since the fault, OTHER where only an offset
- * does, PENDING where an explanation has yet to explain CONFIRMED steps before it replaces another. */
+/* Modes. LOST: a loss of effectiveness explains all steps since the fault. OTHER: only an offset does. PENDING: a new
+ * hypothesis has not yet explained the CONFIRMED steps that it needs to replace another. */
 static const double HEALTHY = 0.0, LOST = 1.0, OTHER = 2.0, PENDING = 3.0, CONFIRMED = 5.0;
 
 typedef struct {
@@ -28,13 +29,13 @@ typedef struct {
 
 static inline real within(real value, real greatest) { return minimum(maximum(value, -greatest), greatest); }
 
-/* The interval where it holds, elsewhere an empty one, which no widening brings back. */
+/* Return the interval where the hypothesis holds, elsewhere an empty interval that stays empty when widened. */
 static inline Interval kept_where(mask holds, real low, real high)
 {
     return (Interval){choose(holds, low, all(2.0)), choose(holds, high, all(-1.0))};
 }
 
-/* The interval of P that a step leaves (cut to the range of P), and that of an offset. */
+/* Write the interval of P given by one step, clipped to the range of P, and the interval of the offset. */
 static inline void step_intervals(const hsv_effectiveness *data, real y, real e, real turn, real disturbance,
                                   real effect, Interval *loss, Interval *offset)
 {
@@ -45,22 +46,22 @@ static inline void step_intervals(const hsv_effectiveness *data, real y, real e,
     const real reach = margin / ((1.0 - g) * magnitude(e));
     const real middle = known - e, wide = margin + g * magnitude(e - effect);
     const real low = minimum(strong, weak) - reach, high = maximum(strong, weak) + reach;
-    /* Below the range of P there is no loss that a division could make up for. */
+    /* A loss below the range of P cannot be compensated by division. */
     *loss = kept_where(high >= data->least, minimum(maximum(low, all(data->least)), all(1.0)), minimum(high, all(1.0)));
     *offset = (Interval){middle - wide, middle + wide};
 }
 
-/* Update what is known by a step, where the step is usable. */
+/* Update the estimates by one step, where the step is usable. */
 static inline void judge(const hsv_effectiveness *data, real *known, mask usable, int first, real y, real e, real turn)
 {
     const real mode = known[MODE];
     const mask healthy = mode == HEALTHY;
-    /* A flight begins healthy: what is off then is a disturbance, as far as one is admitted. */
+    /* A flight starts healthy: a difference in the first step is a disturbance, up to its bound. */
     const real greatest = data->offset * magnitude(e);
     real disturbance = first ? choose(healthy, within(y - e, greatest), known[DISTURBANCE]) : known[DISTURBANCE];
     const real effect = choose(healthy, e, known[EFFECT]);
 
-    /* The step alone, and its intersection with those before, widened by the drift. */
+    /* Intervals of this step, and their intersection with the earlier ones, which are widened by the drift. */
     Interval loss, offset;
     step_intervals(data, y, e, turn, disturbance, effect, &loss, &offset);
     const real widened = data->drift * magnitude(e);
@@ -69,8 +70,8 @@ static inline void judge(const hsv_effectiveness *data, real *known, mask usable
     real offset_low = maximum(known[OFFSET_LOW] - widened, offset.low);
     real offset_high = minimum(known[OFFSET_HIGH] + widened, offset.high);
 
-    /* While healthy, and where nothing explains the steps, everything begins with this one. A first fault is confirmed
-     * sooner than one that replaces another. */
+    /* Restart with this step while healthy, and where neither hypothesis explains the steps. A first fault needs fewer
+     * steps for confirmation than a fault that replaces another. */
     const mask begun = healthy | ((low > high) & (offset_low > offset_high));
     low = choose(begun, loss.low, low), high = choose(begun, loss.high, high);
     offset_low = choose(begun, offset.low, offset_low), offset_high = choose(begun, offset.high, offset_high);
@@ -83,7 +84,7 @@ static inline void judge(const hsv_effectiveness *data, real *known, mask usable
     const real middle = 0.5 * (low + high);
     const real estimate = choose(new == PENDING, known[EFFECTIVENESS], choose(new == LOST, middle, all(1.0)));
 
-    /* What is farther off than the bound is no disturbance. */
+    /* A difference beyond the bound is not a disturbance. */
     const real learned = disturbance + data->learning * within(y - e - disturbance, data->bound * magnitude(e));
     disturbance = choose(healthy & (new == HEALTHY), within(learned, greatest), disturbance);
     const Interval kept = kept_where(explained, low, high);
@@ -100,10 +101,10 @@ static inline void judge(const hsv_effectiveness *data, real *known, mask usable
     for (int i = 0; i < KNOWN; i++) known[i] = choose(usable, update[i], known[i]);
 }
 
-/* Return the effectiveness by which the elevator command of step k is divided. A step whose measurement is not finite,
- * or in which the elevator has no effect, changes nothing.
+/* Return the effectiveness by which the elevator command of step k is divided. A step has no effect on the estimates if
+ * its measurement is not finite or the elevator has no effect.
  *
- * predicted: state of the step before, measured where rigid and predicted where elastic; held: the input since. */
+ * predicted: state of the previous step, measured rigid states and predicted elastic states; held: input since then. */
 static inline real effectiveness_step(const hsv_effectiveness *data, const Vehicle *vehicle, real *predicted,
                                       const real *held, real *known, int64_t k, const real *x)
 {
@@ -122,7 +123,7 @@ static inline real effectiveness_step(const hsv_effectiveness *data, const Vehic
         const mask usable = is_finite(y) & is_finite(e) & (magnitude(e) > 1e-9);
         judge(data, known, usable, k == 1, choose(usable, y, all(1.0)), choose(usable, e, all(1.0)),
               choose(usable, turn, all(0.0)));
-        /* The elastic modes have felt the loss before it is confirmed. */
+        /* A loss affects the elastic modes before it is confirmed. */
         const mask unsure = (known[MODE] == PENDING) & (known[LOW] <= known[HIGH]);
         const real felt = choose(unsure, 0.5 * (known[LOW] + known[HIGH]), known[EFFECTIVENESS]);
         for (int i = RIGID; i < STATES; i++) {

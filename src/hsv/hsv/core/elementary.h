@@ -1,20 +1,20 @@
 /* Elementary functions with the same bits on every processor.
  *
- * Those of libm differ between machines in the last bit. The error of these is at most one unit in the last place in
- * the ranges stated; outside them the result is NaN.
+ * The functions of libm differ between machines in the last bit. The error of these functions is at most one unit in
+ * the last place in the stated ranges; outside them the result is NaN.
  *
- * sine_cosine and exponential accept a complex argument whose imaginary part is so small that its square vanishes, as
- * the complex step needs. sine_cosine, exponential and arctangent2 accept lanes.
+ * sine_cosine and exponential accept a complex argument with an imaginary part whose square is negligible, for the
+ * complex step. sine_cosine, exponential and arctangent2 accept vectors of lanes.
  *
  * Sources: argument reduction after Cody and Waite; rounding errors after Dekker (1971) and Knuth; power series.
  */
 #pragma once
 #include "real.h"
 
-/* Greatest magnitudes of arguments: of sine, cosine and tangent (rad); of the exponential; of the arctangent, whose
- * least nonzero one is the inverse. */
+/* Largest magnitudes of arguments: of sine, cosine and tangent (rad); of the exponential; of the arctangent, for which
+ * the inverse is the smallest non-zero magnitude. */
 static const double ANGLE_RANGE = 1e5, EXPONENT_RANGE = 700.0, RATIO_RANGE = 1e140;
-/* The first 33 bits of pi / 2, the next 33 bits, the remainder; sums of two numbers; the first 32 bits of log 2. */
+/* The first 33 bits of pi / 2, the next 33 bits, the remainder; pi / 2, pi / 4 and log 2 as sums of two numbers. */
 static const double HALF_PI_1 = 1.5707963267341256, HALF_PI_2 = 6.077100506303966e-11,
                     HALF_PI_3 = 2.0222662487959506e-21;
 static const double HALF_PI_HIGH = 1.5707963267948966, HALF_PI_LOW = 6.123233995736766e-17;
@@ -22,7 +22,7 @@ static const double QUARTER_PI_HIGH = 0.7853981633974483, QUARTER_PI_LOW = 3.061
 static const double LOG_2_HIGH = 0.6931471803691238, LOG_2_LOW = 1.9082149292705877e-10;
 static const double TWO_OVER_PI = 0.6366197723675814, LOG_2_INVERSE = 1.4426950408889634, ROOT_2 = 1.4142135623730951;
 static const double TAN_PI_8 = 0.41421356237309503, TAN_3_PI_8 = 2.414213562373095;
-/* Added and subtracted again, the first rounds to the nearest integer; the second splits a number in two of 26 bits. */
+/* Adding and subtracting TO_INTEGER rounds to the nearest integer; SPLIT splits a number into two of 26 bits. */
 static const double TO_INTEGER = 0x1.8p52, SPLIT = 0x1.0000002p27;
 
 /* Return sin y - y for |y| <= pi / 4; the series is summed in pairs. */
@@ -35,7 +35,7 @@ static inline plain sine_rest(plain y)
     return z * y * series;
 }
 
-/* Split cos y, |y| <= pi / 4, into 1 - y^2 / 2 and the rest. */
+/* Split cos y for |y| <= pi / 4 into the rounded 1 - y^2 / 2 and the remainder. */
 static inline void cosine_terms(plain y, plain *high, plain *low)
 {
     const plain z = y * y, w = z * z, v = w * w;
@@ -65,7 +65,7 @@ static inline plain product_error(plain a, plain b)
     return ((a_high * b_high - a * b) + a_high * b_low + a_low * b_high) + a_low * b_low;
 }
 
-/* Split (high + low) / (by_high + by_low) into its rounded value and the rest. */
+/* Split (high + low) / (by_high + by_low) into its rounded value and the remainder. */
 static inline void quotient(plain high, plain low, plain by_high, plain by_low, plain *q, plain *rest)
 {
     *q = high / by_high;
@@ -79,7 +79,7 @@ static const double ODD_INVERSE[] = {1.0 / 1.0,  1.0 / 3.0,  1.0 / 5.0,  1.0 / 7
                                      1.0 / 25.0, 1.0 / 27.0, 1.0 / 29.0, 1.0 / 31.0, 1.0 / 33.0, 1.0 / 35.0,
                                      1.0 / 37.0, 1.0 / 39.0, 1.0 / 41.0, 1.0 / 43.0, 1.0 / 45.0};
 
-/* Correct the angle high + low, whose tangent is at most tan(pi / 8), by the power series of the arctangent. */
+/* Return arctan(high + low) - high for |high| <= tan(pi / 8), by the power series. */
 static inline plain arctangent_rest(plain high, plain low)
 {
     const plain z = high * high;
@@ -89,7 +89,7 @@ static inline plain arctangent_rest(plain high, plain low)
 }
 
 #ifdef BASE
-/* Split sin x and cos x, |x| <= 1e5, into two numbers each. */
+/* Write sin x and cos x for |x| <= 1e5 as sums of two numbers each. */
 static inline void turned_terms(double x, double *s, double *s_low, double *c, double *c_low)
 {
     const double n = (x * TWO_OVER_PI + TO_INTEGER) - TO_INTEGER;
@@ -135,7 +135,7 @@ double hsv_tangent(double x)
     return high + low;
 }
 
-/* Return the angle from -pi / 2 to pi / 2 whose sine is x, |x| <= 1. */
+/* Return the angle from -pi / 2 to pi / 2 with the sine x, |x| <= 1. */
 double hsv_arcsine(double x)
 {
     /* (2k)! / (4^k k!^2 (2k + 1)), k = 1 ... 25 */
@@ -162,7 +162,8 @@ double hsv_arcsine(double x)
         angle = a + a * z * sum;
     else {
         const double r = __builtin_sqrt(z), product = r * r;
-        double rest = r > 0.0 ? ((z - product) - product_error(r, r)) / (2.0 * r) : 0.0; /* of rounding the root */
+        /* Rounding error of the root. */
+        double rest = r > 0.0 ? ((z - product) - product_error(r, r)) / (2.0 * r) : 0.0;
         rest += r * z * sum;
         double high, low;
         two_sum(HALF_PI_HIGH, -2.0 * r, &high, &low);
@@ -171,7 +172,7 @@ double hsv_arcsine(double x)
     return x < 0.0 ? -angle : angle;
 }
 
-/* Return the angle from -pi to pi of the point (x, y); that of (0, 0) is 0, and the sign of a zero does not count. */
+/* Return the angle from -pi to pi of the point (x, y). The angle of (0, 0) is 0; the sign of a zero is ignored. */
 double hsv_arctangent2(double y, double x)
 {
     const double a = __builtin_fabs(y), b = __builtin_fabs(x);
@@ -179,7 +180,7 @@ double hsv_arctangent2(double y, double x)
         !(b == 0.0 || (1.0 / RATIO_RANGE <= b && b <= RATIO_RANGE)))
         return NAN;
     if (a == 0.0) return x >= 0.0 ? 0.0 : 2.0 * HALF_PI_HIGH;
-    /* The angle of (b, a) is a multiple of pi / 4 and the angle of another point, at most pi / 8. */
+    /* The angle of (b, a) is a multiple of pi / 4 plus an angle of at most pi / 8. */
     double base, base_low, high, low;
     if (a <= TAN_PI_8 * b) {
         base = base_low = 0.0;
@@ -212,7 +213,7 @@ double hsv_logarithm(double x)
     uint64_t bits;
     memcpy(&bits, &x, sizeof bits);
     int exponent = (int)(bits >> 52) - 1023;
-    /* In two factors: 2^1023 has no inverse among the normal numbers. */
+    /* Scale by two factors, because 2^-1023 is not a normal number. */
     const int half = (exponent - (exponent & 1)) / 2;
     double mantissa = x * power_of_two(-half) * power_of_two(half - exponent);
     if (mantissa > ROOT_2) {
@@ -242,7 +243,7 @@ static inline void sine_cosine(real x, real *sine, real *cosine)
             hsv_any_sine_cosine(lane(a, i), &own_s, &own_c);
             lane(s, i) = own_s, lane(c, i) = own_c;
         }
-    const real step = x - a; /* zero where x is real */
+    const real step = x - a; /* zero for real x */
     *sine = s + c * step;
     *cosine = c - s * step;
 }
@@ -251,7 +252,7 @@ static inline void sine_cosine(real x, real *sine, real *cosine)
 static inline real arctangent2(real y, real x)
 {
     const real a = magnitude(y);
-    /* The usual case of an air-relative path: a small angle, but not zero. */
+    /* The usual case: a small non-zero angle between the inertial and the air-relative path. */
     if (every((a <= TAN_PI_8 * x) & (a >= 1.0 / RATIO_RANGE) & (x <= RATIO_RANGE))) {
         real high, low, total, rest;
         quotient(a, all(0.0), x, all(0.0), &high, &low);
@@ -284,5 +285,5 @@ static inline real exponential(real x)
     const mask inside = magnitude(a) <= EXPONENT_RANGE;
     const plain value =
         every(inside) ? plain_exponential(a) : choose(inside, plain_exponential(choose(inside, a, all(0.0))), all(NAN));
-    return value * (1.0 + (x - a)); /* the last factor is one where x is real */
+    return value * (1.0 + (x - a)); /* the last factor is one for real x */
 }

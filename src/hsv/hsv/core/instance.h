@@ -1,4 +1,4 @@
-/* An instance of the loop: hsv_fly_NAME, and the memory that it needs between pieces. */
+/* An instance of the loop: hsv_fly_NAME, and the size of its memory between calls. */
 #include "loop.h"
 #define JOINED_(a, b) a##b
 #define JOINED(a, b) JOINED_(a, b)

@@ -1,19 +1,19 @@
-/* Links of the loop: payloads that come late, are lost, or are corrupted.
+/* Communication links of the loop with delay, loss and corruption of payloads.
  *
- * The receiver keeps the last payload that arrived. Losses form a two-state Gilbert channel (Gilbert 1960). A corrupted
- * payload has one bit of one of its numbers flipped; with a checksum, or where the number is then not finite or beyond
- * LARGEST, the receiver notices, and the payload is lost.
+ * The receiver uses the last payload that arrived. Losses follow a two-state Gilbert channel (Gilbert 1960). Corruption
+ * flips one bit of one number. The receiver detects it by a checksum, or if the number is not finite or exceeds
+ * LARGEST; the payload is then lost.
  */
 #pragma once
 #include "noise.h"
 
 #define LARGEST 1e6 /* SI */
 
-/* The memory: step of the payload accepted last, whether the one before was lost, whether there was a payload yet, the
- * payload accepted last, and then those that may still arrive. */
+/* Memory: step of the last accepted payload, whether the previous payload was lost, whether a payload was ever sent,
+ * the last accepted payload, then the payloads that may still arrive. */
 enum { NEWEST, LOSING, BEGUN, ACCEPTED };
 
-/* Fill a link with one payload, as if it had been sent until now. */
+/* Fill a link with one payload, as if it had been sent in all earlier steps. */
 void hsv_fill_link(double *memory, int64_t size, const double *payload, int64_t n)
 {
     for (int64_t i = 0; i < size - ACCEPTED; i++) memory[ACCEPTED + i] = payload[i % n];
@@ -21,7 +21,7 @@ void hsv_fill_link(double *memory, int64_t size, const double *payload, int64_t 
     memory[BEGUN] = 1.0;
 }
 
-/* Corrupt the payload that arrives, if that is drawn; return whether the receiver accepts it. */
+/* Corrupt the arriving payload with the link's probability; return whether the receiver accepts it. */
 static int passes(const hsv_link *link, double *payload, int64_t n, int64_t k, int64_t seed)
 {
     double drawn[2];
@@ -36,11 +36,11 @@ static int passes(const hsv_link *link, double *payload, int64_t n, int64_t k, i
     word ^= UINT64_C(1) << (bit % 64);
     memcpy(number, &word, sizeof word);
     if (magnitude(*number) <= LARGEST) return 1;
-    memcpy(number, &before, sizeof before); /* it may arrive again, late */
+    memcpy(number, &before, sizeof before); /* the payload may arrive a second time */
     return 0;
 }
 
-/* Replace the payload (n) that is sent in step k by the one that the receiver then has. */
+/* Replace the payload (n) sent in step k by the payload that the receiver uses in step k. */
 void hsv_receive(const hsv_link *link, double *memory, int64_t size, int64_t k, int64_t seed, double *payload,
                  int64_t n)
 {
@@ -60,7 +60,7 @@ void hsv_receive(const hsv_link *link, double *memory, int64_t size, int64_t k, 
         arrives = arrives && !lost;
     }
     if (arrives) {
-        const int64_t slot = (newest % slots + slots) % slots; /* before the flight, newest is below zero */
+        const int64_t slot = (newest % slots + slots) % slots; /* newest is negative for payloads before the flight */
         double *arriving = memory + ACCEPTED + n * (1 + slot);
         if (!(link->corruption > 0.0) || passes(link, arriving, n, k, seed)) {
             memcpy(memory + ACCEPTED, arriving, (size_t)n * sizeof *payload);

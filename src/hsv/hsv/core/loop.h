@@ -1,15 +1,15 @@
-/* The closed loop: the order of a step, which nodes, replay and flights share.
+/* The closed loop: the order of a step, common to nodes, replay and flights.
  *
  *   x(k)              state of the vehicle at t = k T
  *   y(k)              measurement of x(k)
- *   x^(k)             estimate of x(k), or y(k) if no estimator flies
+ *   x^(k)             estimate of x(k), or y(k) without an estimator
  *   q_f(k), s(k)      notch filter (eq. 39), stepped with the pitch rate in x^(k)
  *   x_r, u_r, d_r     reference of the step and its defect
  *   u_n(k) = K x_n(k) nominal law (eq. 21; K by eq. 32 to eq. 35)
  *   u(k)              tube law or another controller, from x^(k), limited to U (eq. 36, eq. 29)
  *   x_n(k+1)          nominal system (eq. 20), scheduled by y(k)
- *   actuator(k)       u(k) after the link of the command and the faults on it (loss of effectiveness: eq. 14, eq. 15)
- *   x(k+1)            the plant, with actuator(k) held over [k T, (k+1) T)
+ *   actuator(k)       u(k) after link and faults of the command (loss of effectiveness: eq. 14, eq. 15)
+ *   x(k+1)            state of the plant with actuator(k) held over [k T, (k+1) T)
  *
  * x_n(0) = y(0) - x_r(0). A flight ends when its state leaves the range of the model.
  */
@@ -22,15 +22,15 @@
 #include "tube_law.h"
 
 typedef struct {
-    int equipped; /* whether any plant has more than an ideal one */
+    int equipped; /* whether any plant has non-ideal equipment */
     Vehicle vehicle, estimator_vehicle, tube_vehicle;
     TubeMemory tube;
-    real predicted[STATES], known[KNOWN]; /* of the effectiveness estimator */
+    real predicted[STATES], known[KNOWN]; /* memory of the effectiveness estimator */
     LevelMemory levels;
     real x[STATES], measurement[STATES], estimator[ESTIMATED], notch[2 * MAX_SECTIONS];
     real x_n[STATES], u_n[INPUTS], gain_index, gain[INPUTS * STATES], u[INPUTS], actuator[INPUTS];
     real x_r[STATES], u_r[INPUTS], d_r[STATES];
-    int64_t row[LANES], active[LANES]; /* of reference and gain in each lane */
+    int64_t row[LANES], active[LANES]; /* index of reference row and gain in each lane */
 } Loop;
 
 static inline void measure_lanes(hsv_flight *const *flights, Loop *f, int64_t k)
@@ -47,7 +47,7 @@ static inline void measure_lanes(hsv_flight *const *flights, Loop *f, int64_t k)
     }
 }
 
-/* Bring the rows of the reference and the gains of the tube law up to step k. */
+/* Load the reference row and the tube-law gain of step k in every lane. */
 static inline void schedule_lanes(hsv_flight *const *flights, Loop *f, int64_t k)
 {
     for (int i = 0; i < LANES; i++) {
@@ -108,7 +108,7 @@ static inline int call_blocks(hsv_flight *flight, Loop *f, int64_t k, const doub
     memcpy(next, f->x_n, sizeof f->x_n), next += STATES;
     memcpy(next, f->u_n, sizeof f->u_n), next += INPUTS;
     memcpy(next, s, 2 * (size_t)flight->notch->sections * sizeof *s);
-    u_unsaturated[0] = u_unsaturated[1] = NAN; /* an output that the controller does not set is noticed */
+    u_unsaturated[0] = u_unsaturated[1] = NAN; /* so that an output that the controller does not set is noticed */
     flight->returned = controller->function(k, in, u_unsaturated, controller->state, controller->par);
     memcpy(flight->answer, u_unsaturated, sizeof flight->answer);
     return flight->returned == 0 && is_finite(u_unsaturated[0]) && is_finite(u_unsaturated[1]) ? 1 : -1;
@@ -133,7 +133,7 @@ static inline void write_rows(hsv_flight *const *flights, const Loop *f, int64_t
     }
 }
 
-/* Note which flights have left the range of the model in step k; return whether all have. */
+/* End the flights that have left the range of the model in step k; return whether all have ended. */
 static inline int end_flights(hsv_flight *const *flights, const Loop *f, int64_t k)
 {
     const mask inside = in_model_range(f->x, flights[0]->plant->vehicle.angle_limit);
@@ -149,9 +149,9 @@ static inline int end_flights(hsv_flight *const *flights, const Loop *f, int64_t
     return flying == 0;
 }
 
-/* Fly the steps start ... stop - 1 of a group of flights, which share all but vehicle, seed, faults, reference, gains
- * of the tube law and the numbers of the equipment. Return the step after the last one flown, -1 - k where a block from
- * outside failed in step k. */
+/* Simulate the steps start ... stop - 1 of a group of flights, which may differ in vehicle, seed, faults, reference,
+ * gains of the tube law and parameters of the equipment only. Return the step after the last one, or -1 - k if an
+ * external block failed in step k. */
 static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t stop)
 {
     const hsv_flight *first = flights[0];
@@ -183,7 +183,7 @@ static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t s
         int answered = 0;
 #if LANES == 1
         flights[0]->history[HISTORY * (k - start) + STATES] =
-            q_f; /* tells a watching process which step is under way */
+            q_f; /* shows a monitoring process the current step */
         answered = call_blocks(flights[0], f, k, feedback_state, q_f, s, u_unsaturated);
         if (answered < 0) return -1 - k;
 #else

@@ -1,15 +1,15 @@
-/* What campaigns and certificates read of flights: level in the invariant set, curves of the metrics. */
+/* Evaluation of flights for campaigns and certificates: level in the invariant set, curves of the metrics. */
 #pragma once
 #include "nominal.h"
 #include "notch_filter.h"
 #include "vehicle.h"
 
 typedef struct {
-    real actual[2 * MAX_SECTIONS], planned[2 * MAX_SECTIONS]; /* states of the filter for x and for x_r + x_n */
-    real worst;                                               /* greatest level so far; once it is NaN it stays so */
+    real actual[2 * MAX_SECTIONS], planned[2 * MAX_SECTIONS]; /* states of the notch filter for x and for x_r + x_n */
+    real worst;                                               /* largest level so far; NaN persists */
 } LevelMemory;
 
-/* Take step k into the greatest level (e - c)' P (e - c), e = (x - x_r - x_n, s - s_n). */
+/* Update the largest level (e - c)' P (e - c) by step k, with e = (x - x_r - x_n, s - s_n). */
 static inline void level_step(const hsv_tube_set *set, LevelMemory *memory, int64_t k, const real *x, const real *x_r,
                               const real *x_n)
 {
@@ -40,9 +40,9 @@ double hsv_worst_level(const hsv_tube_set *set, int64_t steps, const double *sta
     return memory.worst;
 }
 
-/* Write the ten curves, each "stride" numbers long, and the saturation (steps, 2) of a piece of a flight: errors of
- * altitude and velocity, angle of attack, pitch angle, elastic rates, inputs, and the magnitudes by which angle of
- * attack and pitch angle differ from reference + nominal. */
+/* Write ten curves (10, stride) and the saturation (steps, 2) for some steps of a flight: errors of altitude and
+ * velocity, angle of attack, pitch angle, elastic rates, inputs, and the absolute differences of angle of attack and
+ * pitch angle from x_r + x_n. */
 void hsv_curves(int64_t steps, int64_t stride, const double *history, const double *auxiliary, const double *reference,
                 double *curves, uint8_t *saturated)
 {

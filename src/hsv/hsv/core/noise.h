@@ -1,16 +1,16 @@
-/* Random numbers that are functions of seed, step, stream and draw.
+/* Random numbers as functions of seed, step, stream and draw.
  *
  * The generator is Philox4x64-10 (Salmon, Moraes, Dror and Shaw 2011): a block of four words is a function of the
- * counter (step, stream, draw, 0) and the key (seed, 0), without a state. The numbers of any step are known without
- * those before it, in whatever order steps, blocks and flights are computed. numpy's Philox(counter=c, key=k) begins
- * with the block of c + 1. Normal numbers are those of Box and Muller (1958).
+ * counter (step, stream, draw, 0) and the key (seed, 0), without a state. The numbers of a step therefore do not depend
+ * on the order in which steps, blocks and flights are computed. numpy's Philox(counter=c, key=k) begins with the block
+ * of c + 1. Normal numbers follow Box and Muller (1958).
  *
- * A stream belongs to one channel of one named block: what is added to a flight leaves the noise of the rest as it was.
+ * Each stream belongs to one channel of one block: adding a block to a flight does not change the noise of others.
  */
 #pragma once
 #include "elementary.h"
 
-/* The high word of the product of two words of 64 bits. */
+/* Return the high word of the product of two 64-bit words. */
 static inline uint64_t high_product(uint64_t a, uint64_t b) { return (uint64_t)((unsigned __int128)a * b >> 64); }
 
 void hsv_philox(const uint64_t *counter, const uint64_t *key, uint64_t *words)
@@ -26,7 +26,7 @@ void hsv_philox(const uint64_t *counter, const uint64_t *key, uint64_t *words)
     words[0] = a, words[1] = b, words[2] = c, words[3] = d;
 }
 
-/* Two independent numbers, each uniform on the multiples of 2^-53 in [0, 1). */
+/* Write two independent numbers, uniform on the multiples of 2^-53 in [0, 1). */
 void hsv_uniforms(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair)
 {
     const uint64_t counter[4] = {(uint64_t)step, (uint64_t)stream, (uint64_t)draw, 0}, key[2] = {(uint64_t)seed, 0};
@@ -36,12 +36,12 @@ void hsv_uniforms(int64_t seed, int64_t step, int64_t stream, int64_t draw, doub
     pair[1] = (double)(words[1] >> 11) * 0x1p-53;
 }
 
-/* Two independent standard normal numbers, at most 8.6 in magnitude. */
+/* Write two independent standard normal numbers, at most 8.6 in magnitude. */
 void hsv_normals(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair)
 {
     double uniform[2], sine, cosine;
     hsv_uniforms(seed, step, stream, draw, uniform);
-    /* The logarithm of a number in (0, 1]. */
+    /* The argument of the logarithm lies in (0, 1]. */
     const double radius = __builtin_sqrt(-2.0 * hsv_logarithm(uniform[0] + 0x1p-53));
     sine_cosine(6.283185307179586 * uniform[1], &sine, &cosine);
     pair[0] = radius * cosine;

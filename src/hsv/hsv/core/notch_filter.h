@@ -1,9 +1,9 @@
-/* Notch filter on the pitch rate (paper eq. 38, eq. 39; q_f is its q', s its x_q): second-order sections in series,
+/* Notch filter of the pitch rate (paper eq. 38, eq. 39; q_f for q', s for x_q): second-order sections in series,
  *
  *   q_f(k) = C s(k) + D q(k),   s(k+1) = A s(k) + B q(k),
  *
- * discretised by the prewarped bilinear rule (hsv.control.notch_filter). It starts at rest for its first input:
- * s(0) = G q(0).
+ * discretised by the bilinear rule with prewarping (hsv.control.notch_filter). The filter starts in the equilibrium for
+ * its first input, s(0) = G q(0).
  */
 #pragma once
 #include "real.h"
@@ -16,7 +16,7 @@ static inline void notch_rest(const hsv_notch *notch, real rate, real *s)
     }
 }
 
-/* Return the filtered rate (rad/s), then update s. */
+/* Return the filtered rate (rad/s) and update s. */
 static inline real notch_step(const hsv_notch *notch, real *s, real rate)
 {
     for (int i = 0; i < notch->sections; i++) {

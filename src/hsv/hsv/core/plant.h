@@ -1,8 +1,8 @@
 /* The vehicle with its actuators, sensors and air over one control period.
  *
- * Equipment works with plain doubles, lane after lane; the equations of motion advance all lanes at once. While
- * actuators are ideal, the command is there in time and no fault of theirs acts, the vehicle takes the command within
- * the stops; otherwise actuators and vehicle move on the substeps of the actuators.
+ * Equipment is computed lane by lane in double precision; the equations of motion advance all lanes at once. With ideal
+ * actuators, without delay and without an acting fault of actuator or effector, the effectors follow the command within
+ * the stops. Otherwise actuators and vehicle move on the substeps of the actuators.
  */
 #pragma once
 #include "vehicle.h"
@@ -20,7 +20,7 @@ void hsv_sense(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_fault
 {
     if (plant->sensors.ideal && faults->sensor.count == 0)
         for (int i = 0; i < STATES; i++)
-            measurement[i] = memory->sensors[i].given = x[i]; /* a sensor that drops out later holds it */
+            measurement[i] = memory->sensors[i].given = x[i]; /* for a sensor that drops out later */
     else
         hsv_measure(&plant->sensors, memory->sensors, &faults->sensor, k, plant->seed, x, measurement);
     hsv_receive(&plant->link, memory->link, memory->payloads, k, plant->seed, measurement, STATES);
@@ -42,20 +42,20 @@ void hsv_plant_conditions(const hsv_plant *plant, hsv_plant_memory *memory, hsv_
 }
 #endif
 
-/* Whether the air is still and the engine has no faults: then no conditions change. */
+/* Return whether the air is still and the engine has no faults, so that the conditions are constant. */
 static inline int is_calm(const hsv_plant *plant, const hsv_plant_faults *faults)
 {
     return plant->atmosphere.still && faults->engine.count == 0;
 }
 
-/* Whether a plant has anything that is stepped lane by lane. */
+/* Return whether a plant has equipment that is computed lane by lane. */
 static inline int is_equipped(const hsv_plant *plant, const hsv_plant_faults *faults)
 {
     const int ideal = plant->actuators.ideal && plant->sensors.ideal && plant->link.ideal && plant->late == 0.0;
     return !ideal || !is_calm(plant, faults) || faults->effector.count > 0 || faults->sensor.count > 0;
 }
 
-/* Take the numbers of a vehicle into a lane. */
+/* Copy the constants of a vehicle into lane i. */
 static inline void gather_vehicle(const hsv_vehicle *p, int i, Vehicle *vehicle)
 {
     for (size_t j = 0; j < sizeof *vehicle / sizeof(plain); j++)
@@ -72,7 +72,7 @@ static inline void write_lane(const double *from, int count, int i, real *to)
     for (int j = 0; j < count; j++) lane(to[j], i) = from[j];
 }
 
-/* Move the effectors of the flights that are "moving" over a length of substeps, and then all vehicles. */
+/* Advance the effectors of the flights marked in "moving", then all vehicles, by "length" substeps. */
 static inline void advance_moving(hsv_flight *const *flights, const Vehicle *vehicle, const int *moving, int64_t k,
                                   double substep, double length, const real *command, const real *conditions, real *x)
 {
@@ -89,8 +89,7 @@ static inline void advance_moving(hsv_flight *const *flights, const Vehicle *veh
     advance(x, effector, vehicle, conditions, all(length * flights[0]->plant->actuators.substep), 1);
 }
 
-/* Replace the states x by those one period after step k; "actuator" is what reaches the actuators, from then on held.
- */
+/* Advance the states x by one period after step k, with the input "actuator" of the actuators held. */
 static inline void advance_plants(hsv_flight *const *flights, const Vehicle *vehicle, int64_t k, const real *actuator,
                                   real *x)
 {
@@ -120,7 +119,8 @@ static inline void advance_plants(hsv_flight *const *flights, const Vehicle *veh
     }
     if (number > 0)
         for (int j = 0; j < ACTUATOR_SUBSTEPS; j++) {
-            const double share = late - j < 0.0 ? 0.0 : late - j > 1.0 ? 1.0 : late - j; /* of the command before */
+            /* Share of the substep in which the previous command still acts. */
+            const double share = late - j < 0.0 ? 0.0 : late - j > 1.0 ? 1.0 : late - j;
             if (share > 0.0) advance_moving(flights, vehicle, moving, k, j, share, before, conditions, x);
             if (share < 1.0)
                 advance_moving(flights, vehicle, moving, k, j + share, 1.0 - share, actuator, conditions, x);

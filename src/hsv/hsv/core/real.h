@@ -1,16 +1,16 @@
 /* The number type of the core.
  *
- * A formula is written once, over the type "real". It is compiled as
+ * Each formula is written once, with the type "real", which is compiled as
  *
  *   double             for a single flight, for the nodes and for the exported controller,
  *   a vector register  of 4 (AVX2) or 8 (AVX-512) doubles for campaigns, one flight in each lane (LANES > 1),
  *   double _Complex    for derivatives by the complex step (COMPLEX).
  *
- * "plain" is the type of a real part: of everything that is compared or chosen. A "mask" is the result of a comparison.
- * Vector types of C have no ?:, && and !; choose, & and opposite replace them, and every reduces a mask to one answer.
+ * "plain" is the type of a real part, which can be compared. A "mask" is the result of a comparison. Vector types of C
+ * have no ?:, && and !; choose, & and opposite replace them, and every reduces a mask to a single truth value.
  *
- * Bits repeat on every processor because only additions, subtractions, multiplications, divisions and square roots of
- * IEEE 754 are used, in the order written, without contraction to fused operations (-ffp-contract=off).
+ * Results are the same to the bit on every processor: the core uses only additions, subtractions, multiplications,
+ * divisions and square roots of IEEE 754, in the order written, without fused operations (-ffp-contract=off).
  */
 #pragma once
 #include "core.h"
@@ -46,7 +46,7 @@ static inline plain magnitude(plain x) { return fabs(x); }
 static inline plain root(plain x) { return sqrt(x); }
 #define lane(x, i) (*((void)(i), &(x)))
 
-/* Return 2^n for an integer-valued n from -1022 to 1023: added to 1.5 2^52, n stands in the last bits. */
+/* Return 2^n for an integer-valued n from -1022 to 1023. The last bits of n + 1.5 2^52 are the integer n. */
 static inline plain power_of_two(plain n)
 {
     const plain shifted = n + 0x1.8p52;
@@ -64,7 +64,7 @@ typedef int64_t mask __attribute__((vector_size(8 * LANES)));
 typedef uint64_t word __attribute__((vector_size(8 * LANES)));
 typedef real plain;
 static inline real real_part(real x) { return x; }
-/* Not x + {}, which turns -0.0 into 0.0. */
+/* x + {} would turn -0.0 into 0.0. */
 static inline real all(double x) { return x - (real){0.0}; }
 static inline real choose(mask m, real a, real b) { return (real)((m & (mask)a) | (~m & (mask)b)); }
 static inline mask opposite(mask m) { return ~m; }
@@ -96,7 +96,7 @@ static inline double greatest_lane(real x)
 
 static inline mask is_finite(plain x) { return x - x == 0.0; }
 static inline mask never(void) { return (mask){0}; }
-/* A NaN in the first argument stays: the second one is taken only where it is beyond the first. */
+/* A NaN in the first argument is returned. */
 static inline plain minimum(plain a, plain b) { return choose(b < a, b, a); }
 static inline plain maximum(plain a, plain b) { return choose(b > a, b, a); }
 static inline plain limited(plain x, double low, double high)

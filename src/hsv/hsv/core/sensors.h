@@ -1,16 +1,16 @@
-/* Sensors, one of each state:
+/* Sensors, one for each state:
  *
  *   y = fault(clip(quantise(hold(delay(lag((1 + s) x) + b + n)))))
  *
- * with scale factor s and lag of the sensor, bias b and noise n (constant bias, Gauss-Markov drift, random walk, white
- * noise), latency in whole samples, samples that are lost and held, quantisation, range, and what fails. An ideal
- * sensor passes its state to the bit. In step 0 lags rest and queues are full of the first sample.
+ * with scale factor s, lag, bias b (constant, Gauss-Markov drift and random walk), white noise n, latency in samples,
+ * hold of the last sample after a drop-out, quantisation, range and faults. An ideal sensor returns its state to the
+ * bit. In step 0 lags are in equilibrium and queues contain the first sample.
  */
 #pragma once
 #include "faults.h"
 #include "vehicle.h"
 
-/* Bias and noise of a step; what is drawn once is drawn in step 0. */
+/* Return bias plus noise of step k; constants are drawn in step 0. */
 static double sensor_error(const hsv_sensors *s, hsv_sensor_memory *m, int i, int64_t k, int64_t seed)
 {
     double drawn[2];
@@ -34,7 +34,7 @@ static double sensor_error(const hsv_sensors *s, hsv_sensor_memory *m, int i, in
     return error + m->walk;
 }
 
-/* The measurement of a sensor that works. */
+/* Return the measurement of a healthy sensor. */
 static double sensor_sample(const hsv_sensors *s, hsv_sensor_memory *m, int i, int64_t k, int64_t seed, double x,
                             double error)
 {
@@ -54,7 +54,7 @@ static double sensor_sample(const hsv_sensors *s, hsv_sensor_memory *m, int i, i
     return m->held;
 }
 
-/* What a fault makes of a measurement; "given" is that of the step before. */
+/* Return the measurement after a fault; "given" is the measurement of the previous step. */
 static double sensor_failed(const hsv_fault *fault, hsv_fault_memory *memory, int64_t k, int64_t seed, double period,
                             double value, double given)
 {
@@ -77,13 +77,13 @@ static double sensor_failed(const hsv_fault *fault, hsv_fault_memory *memory, in
     return value;
 }
 
-/* Write the measurement (9) of the state x (9); steps follow one another from 0 on. */
+/* Write the measurement (9) of the state x (9) in step k; steps must be consecutive from 0. */
 void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faults *faults, int64_t k, int64_t seed,
                  const double *x, double *measurement)
 {
     const int64_t failing = hsv_begin_faults(faults, k, seed);
     double pitch_error = 0.0;
-    /* From the last state to the first: the angle of attack needs the error of the pitch angle. */
+    /* In reverse order, because the angle of attack needs the error of the pitch angle. */
     for (int i = STATES - 1; i >= 0; i--) {
         measurement[i] = x[i];
         if (!sensors->on[i]) continue;

@@ -1,11 +1,11 @@
-/* Many steps at once: the plan of a governor, and what the design measures along flights and random sequences. */
+/* Sequences of steps: the plan of a governor, and simulations of the design along trajectories and random sequences. */
 #pragma once
 #include "nominal.h"
 #include "noise.h"
 #include "notch_filter.h"
 #include "vehicle.h"
 
-/* Write [A(p), B(p)] (eq. 12), flattened (9, 11); return whether p is inside the envelope. */
+/* Write [A(p), B(p)] (9, 11), flattened (eq. 12); return whether p is inside the envelope. */
 int hsv_schedule(const hsv_polytope *polytope, double altitude, double velocity, double *S)
 {
     double weights[MAX_VERTICES], entries[MAX_SIZE];
@@ -16,8 +16,8 @@ int hsv_schedule(const hsv_polytope *polytope, double altitude, double velocity,
     return inside;
 }
 
-/* Write u_r + u_n (steps, 2) and x_n (steps, 9) from the step "first" on, where x_n is "start"; the model is scheduled
- * by x_r + x_n. Return whether x_n stays in the family. */
+/* Write the plan u_r + u_n (steps, 2) and x_n (steps, 9) from step "first" on, with the initial x_n "start". The model
+ * is scheduled by x_r + x_n. Return whether x_n stays in the family. */
 int hsv_plan(const hsv_nominal *nominal, const hsv_reference *reference, int64_t first, int64_t steps,
              const double *start, double *plan, double *deviation)
 {
@@ -37,7 +37,8 @@ int hsv_plan(const hsv_nominal *nominal, const hsv_reference *reference, int64_t
     return held;
 }
 
-/* Filter rates (steps), from rest for the first; write the states (steps, 2 sections) before each step, too. */
+/* Filter the rates (steps), from the equilibrium for the first one; write the filtered rates (steps) and the filter
+ * states (steps, 2 sections) before each step. */
 void hsv_notch_along(const hsv_notch *notch, int64_t steps, const double *rate, double *filtered, double *states)
 {
     double s[2 * MAX_SECTIONS] = {0};
@@ -65,7 +66,8 @@ static void respond_once(const hsv_sampled *f, const double *c, double *a, doubl
     memcpy(a, new, (size_t)n * sizeof *a);
 }
 
-/* Write the states (steps, states) before each step and the mean positions (steps, 2), for commands (steps, 2). */
+/* Write the actuator states (steps, states) before each step and the mean positions (steps, 2) for commands (steps, 2).
+ */
 void hsv_respond(const hsv_sampled *actuators, int64_t steps, const double *commands, double *before, double *means)
 {
     double a[4] = {0};
@@ -76,8 +78,10 @@ void hsv_respond(const hsv_sampled *actuators, int64_t steps, const double *comm
     }
 }
 
-/* Write the effect of the plan's lag on the error (steps, 5 + filter + actuator states) and on the feedback (steps, 2)
- * in closed loop, from zero; see hsv.design.error_system. gain (2, 5): F; scheduled, lag (steps, 2). */
+/* Write the response of the closed loop to the lag of the plan: error (steps, 5 + filter + actuator states), initially
+ * zero, and feedback (steps, 2); see hsv.design.error_system.
+ *
+ * gain (2, 5): F; scheduled (steps, 2): altitude (m) and velocity (m/s) of the model; lag (steps, 2). */
 void hsv_lag_response(const hsv_polytope *polytope, const double *gain, const hsv_notch *notch,
                       const hsv_sampled *actuators, int64_t steps, const double *scheduled, const double *lag,
                       double *errors, double *feedback)
@@ -108,11 +112,11 @@ void hsv_lag_response(const hsv_polytope *polytope, const double *gain, const hs
     }
 }
 
-/* Random sequences of vertices and disturbances against an ellipsoid, see hsv.design.sets.sampling. */
+/* Random sequences of vertices and disturbances as a test of an ellipsoid, see hsv.design.sets.sampling. */
 enum { MAX_WIDTH = 32 };
 #define GOLDEN UINT64_C(0x9E3779B97F4A7C15)
 
-/* splitmix64: a counter in, 64 good bits out. */
+/* Return 64 random bits for a counter, by splitmix64. */
 static uint64_t mix(uint64_t state)
 {
     uint64_t z = (state ^ (state >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
@@ -132,7 +136,7 @@ static void add_column(const double *column, double value, int64_t width, double
     for (int64_t i = 0; i < width; i++) sum[i] += column[i] * value;
 }
 
-/* Write the next v of a vertex, whose rows are the columns of states, of disturbances, and a constant one. */
+/* Write the next v at a vertex, whose rows are the columns of the n states, of the disturbances, and a constant one. */
 static void advance_sequence(const double *vertex, int64_t rows, int64_t width, int64_t n, uint64_t signs,
                              const double *v, double *new)
 {
@@ -141,7 +145,7 @@ static void advance_sequence(const double *vertex, int64_t rows, int64_t width, 
         add_column(vertex + width * j, j < n ? v[j] : j == rows - 1 || (signs >> j & 1) ? 1.0 : -1.0, width, new);
 }
 
-/* Return the signs that push outwards, one channel after the other: the greatest effect of a greedy choice. */
+/* Return the signs of the disturbances that push v outwards, chosen greedily channel by channel. */
 static uint64_t outward(const double *vertex, int64_t rows, int64_t width, int64_t n, const double *v, double *new)
 {
     uint64_t signs = 0;
@@ -156,8 +160,10 @@ static uint64_t outward(const double *vertex, int64_t rows, int64_t width, int64
     return signs;
 }
 
-/* Fly the sequences first ... end - 1, each of a kind (number mod 4: iid, held, switching, adversarial) from zero or
- * from the boundary; take the greatest levels into "worst" (4, 2). columns (vertices, rows, width), begin (width). */
+/* Simulate the sequences first ... end - 1, whose kind is their number mod 4 (independent, held, switching,
+ * adversarial), from "begin" (width) or from the boundary. Update the largest levels "worst" (4, 2) by kind and start.
+ *
+ * columns (vertices, rows, width). */
 void hsv_sample_sequences(int64_t vertices, int64_t rows, int64_t width, const double *columns, int64_t n,
                           const double *begin, int64_t first, int64_t end, int64_t steps, uint64_t seed, double *worst)
 {
@@ -170,7 +176,7 @@ void hsv_sample_sequences(int64_t vertices, int64_t rows, int64_t width, const d
         if (boundary) {
             memset(v, 0, sizeof v);
             for (int64_t i = 0; i < n; i++)
-                for (int j = 0; j < 4; j++) { /* four uniform numbers: near enough to a normal one for a direction */
+                for (int j = 0; j < 4; j++) { /* the sum of four uniform numbers is nearly normal */
                     state += GOLDEN;
                     v[i] += (double)(mix(state) >> 11) * 0x1p-53 - 0.5;
                 }

@@ -1,4 +1,4 @@
-/* Functions between BEGIN_TARGET and END_TARGET use the instructions named. */
+/* Functions between BEGIN_TARGET and END_TARGET are compiled for the named instruction set. */
 #pragma once
 #include <immintrin.h>
 #define PRAGMA(...) _Pragma(#__VA_ARGS__)

@@ -1,7 +1,7 @@
-/* Equilibria of flight (paper eq. 5), rows of the reference, and the steady gain of the estimator.
+/* Trims (paper eq. 5), rows of the reference, and the steady-state gain of the estimator.
  *
- * These are computed before a flight, but a flight is repeated by their bits: LAPACK chooses its kernels, and with them
- * the order of its sums, by the processor.
+ * They are computed before a flight, but the flight depends on their last bits. LAPACK is not used because the order of
+ * its sums depends on the processor.
  */
 #pragma once
 #include "estimator.h"
@@ -9,8 +9,8 @@
 
 enum { ROOM = ESTIMATED * ESTIMATED };
 
-/* Replace b (n, m) by the solution of A X = b, by elimination with partial pivoting; A (n, n) is destroyed. Where A is
- * singular the solution is not finite. */
+/* Replace b (n, m) by the solution of A X = b, by elimination with partial pivoting; A (n, n) is overwritten. For a
+ * singular A the solution is not finite. */
 void hsv_solve(int64_t n, int64_t m, double *A, double *b)
 {
     for (int64_t column = 0; column < n; column++) {
@@ -35,13 +35,13 @@ void hsv_solve(int64_t n, int64_t m, double *A, double *b)
         }
 }
 
-/* Complete the equilibrium of x (9), whose altitude and velocity are given, and u (2); return the greatest remaining
- * imbalance, SI per second.
+/* Compute the trim x (9), u (2) at the altitude and velocity in x; return the largest residual, SI per second.
  *
- * Newton's method with exact derivatives in angle of attack, equivalence ratio and elevator, from "unknown" (3), which
- * is replaced by the best that was found: dV/dt less the acceleration (m/s^2), dalpha/dt and dq/dt go to zero. theta is
- * alpha plus the path angle (rad); the pitch rate (rad/s) is that of a steady pull-up. The elastic coordinates are
- * N_i / omega_i^2: the pitching moment is zero, whatever the inertial coupling. "rigid": without coupling.
+ * Newton's method with exact derivatives solves dV/dt = acceleration (m/s^2), dalpha/dt = 0 and dq/dt = 0 for "unknown"
+ * (3): angle of attack, equivalence ratio and elevator. "unknown" contains the initial guess and then the best
+ * solution. theta is alpha plus the path angle (rad); the pitch rate (rad/s) is that of a steady pull-up. The elastic
+ * coordinates are N_i / omega_i^2: at trim the pitching moment is zero, so that inertial coupling has no effect.
+ * "rigid" has no coupling.
  */
 double hsv_balance(const hsv_vehicle *rigid, double path_angle, double acceleration, double pitch_rate, double *unknown,
                    double *x, double *u)
@@ -61,7 +61,7 @@ double hsv_balance(const hsv_vehicle *rigid, double path_angle, double accelerat
         rates[VELOCITY] -= acceleration;
         const double size =
             maximum(maximum(magnitude(rates[VELOCITY]), magnitude(rates[ALPHA])), magnitude(rates[PITCH_RATE]));
-        if (!is_finite(size) || (size >= best && best < converged)) /* at rounding level no further step helps */
+        if (!is_finite(size) || (size >= best && best < converged)) /* converged to rounding errors */
             break;
         if (size < best) {
             memcpy(unknown, trial, sizeof trial);
@@ -79,7 +79,7 @@ double hsv_balance(const hsv_vehicle *rigid, double path_angle, double accelerat
     }
     x[ALPHA] = unknown[0], x[PITCH] = unknown[0] + path_angle;
     u[FUEL] = unknown[1], u[ELEVATOR] = unknown[2];
-    /* At zero coordinates the elastic accelerations of the decoupled model are the generalised forces. */
+    /* At zero elastic coordinates the elastic accelerations of the decoupled model equal the generalised forces. */
     derivative(x, u, vehicle, NULL, rates);
     x[ETA_1] = rates[ETA_1_RATE] / (rigid->natural_frequency_1 * rigid->natural_frequency_1);
     x[ETA_2] = rates[ETA_2_RATE] / (rigid->natural_frequency_2 * rigid->natural_frequency_2);
@@ -88,8 +88,8 @@ double hsv_balance(const hsv_vehicle *rigid, double path_angle, double accelerat
 
 static int equal(const double *a, const double *b) { return a[0] == b[0] && a[1] == b[1]; }
 
-/* Fill x_r, u_r, d_r and the imbalance of the equilibria at altitude and velocity (rows, 2), whose rates are given
- * (rows, 2), and whose climb rate bends (rows). */
+/* Write x_r, u_r, d_r and the residuals of the trims for commands of altitude and velocity (rows, 2), their rates
+ * (rows, 2), and the rate of the climb rate, "bend" (rows). */
 void hsv_reference_rows(const hsv_vehicle *rigid, int64_t rows, const double *command, const double *rate,
                         const double *bend, const double *guess, double period, int64_t substeps, double *state,
                         double *input, double *defect, double *imbalance)
@@ -110,7 +110,7 @@ void hsv_reference_rows(const hsv_vehicle *rigid, int64_t rows, const double *co
             imbalance[k] = INFINITY;
             continue;
         }
-        /* The trim next to this one is near, but only a fixed start gives the same bits whatever came before. */
+        /* The previous trim would be a better guess, but the result would then depend on it in the last bits. */
         double unknown[3] = {guess[0], guess[1], guess[2]};
         const double turn = bend[k] / (now[1] * root(1.0 - sine * sine));
         imbalance[k] = hsv_balance(rigid, hsv_arcsine(sine), climb[1], turn, unknown, x, u);
@@ -126,7 +126,7 @@ void hsv_reference_rows(const hsv_vehicle *rigid, int64_t rows, const double *co
     }
 }
 
-/* Write A B, (n, m) (m, p), summed in the order of the columns of A. */
+/* Write the product A B of A (n, m) and B (m, p), summed in the order of the columns of A. */
 static void multiply(int n, int m, int p, const double *A, const double *B, double *product)
 {
     memset(product, 0, (size_t)(n * p) * sizeof *product);
@@ -135,8 +135,8 @@ static void multiply(int n, int m, int p, const double *A, const double *B, doub
             for (int j = 0; j < p; j++) product[p * i + j] += A[m * i + k] * B[p * k + j];
 }
 
-/* Write the matrix F (11, 11) that takes states and held inputs over a period (s), by its power series; A (9, 9) and
- * B (9, 2) are those of continuous time, with eigenvalues of a few per period at most. */
+/* Write the transition matrix F (11, 11) of states and held inputs over a period (s), by the power series, for
+ * continuous-time A (9, 9) and B (9, 2) whose eigenvalues are at most a few per period. */
 void hsv_transition(const double *A, const double *B, double period, double *F)
 {
     const int n = ESTIMATED;
@@ -156,10 +156,10 @@ void hsv_transition(const double *A, const double *B, double period, double *F)
     }
 }
 
-/* Iterate the Riccati equation to the steady gain (11, 5) of states and input offsets; return the iterations.
+/* Iterate the Riccati equation to the steady-state gain (11, 5) of states and input offsets; return the iterations.
  *
- * process, noise: standard deviations of the noise that a period adds (11) and of the measurements (5); settled:
- * relative change of a steady gain in an iteration. */
+ * process (11): standard deviation of the process noise per period; noise (5): standard deviation of the measurements;
+ * settled: relative change of the gain per iteration at which to stop. */
 int64_t hsv_steady_gain(const double *A, const double *B, double period, const double *process, const double *noise,
                         int64_t iterations, double settled, double *gain)
 {

@@ -2,19 +2,19 @@
  *
  *   u = F diag(tau) (x - x_r - x_n) + u_n + u_r,   limited to U (eq. 29)
  *
- * The pitch rate in x is the filtered one, q_f; that of x_r + x_n is filtered as well where the design says so
- * (eq. 48). Integral action on the altitude and velocity errors, k F diag(tau) integral of e, is an extension of the
- * paper's law, off by default; so is the division of the elevator command by its estimated effectiveness
+ * The pitch rate in x is the filtered rate q_f; if the design requires it, the pitch rate of x_r + x_n is filtered as
+ * well (eq. 48). Two extensions of the paper's law are off by default: integral action on the errors of altitude and
+ * velocity, k F diag(tau) integral of e, and division of the elevator command by its estimated effectiveness
  * (effectiveness.h).
  *
- * Robust MPC, the paper's comparison (section 5.2), is the same with a nominal gain K in place of F and without x_n and
- * u_n ("planned" is 0).
+ * Robust MPC, the comparison in the paper (section 5.2), has a nominal gain K in place of F and no x_n and u_n
+ * ("planned" is 0).
  */
 #pragma once
 #include "notch_filter.h"
 
 typedef struct {
-    real planned[2 * MAX_SECTIONS]; /* s_n of the filter of the plan */
+    real planned[2 * MAX_SECTIONS]; /* state s_n of the plan's notch filter */
     real integral[INTEGRATED];
 } TubeMemory;
 
@@ -25,13 +25,13 @@ static inline int64_t active_gain(const hsv_tube *tube, int64_t k)
     return index;
 }
 
-/* Write feedback, sum of all parts and limited input; "gain" is F diag(tau) (2, 9) in this step, "effectiveness" that
- * of the elevator, 1 where it is not estimated.
+/* Write the feedback (2), the unsaturated input (2) and the limited input (2). "gain" (2, 9) is F diag(tau) in this
+ * step, "effectiveness" that of the elevator, 1 if it is not estimated.
  *
- * The filter of the plan starts from the state s of the filter in the loop, which is exact where x = x_r + x_n; it is
- * stepped if the loop has a notch filter and either the law or its monitor needs it. The integral stands still
- * while an input is limited. Where the sum is not finite, the input is that of the reference: an actuator gets a number
- * whatever happens.
+ * The notch filter of the plan starts from the state s of the filter in the loop, which is exact for x = x_r + x_n. It
+ * is stepped if the loop has a notch filter and the law or the monitor needs it. The integral is frozen while an input
+ * is saturated. If the sum is not finite, the input of the reference is used, so that the actuators always receive a
+ * number.
  */
 static inline void tube_step(const hsv_tube *tube, TubeMemory *memory, const real *gain, real effectiveness, int64_t k,
                              int monitored, int64_t filter_states, const real *x, real q_f, const real *x_r,

@@ -14,17 +14,17 @@
  *   T = C_T3 alpha^3 + C_T2 alpha^2 + C_T1 alpha + C_T0, each affine in the equivalence ratio phi (beta_1 ... beta_8),
  *   N_i(alpha, delta_e), dynamic pressure q_bar = rho V^2 / 2, density rho = rho_0 exp(-(h - h_0) / h_s).
  *
- * The paper prints the thrust term of the moment and the density's exponent otherwise; see docs/errata.md.
+ * The thrust term of the moment and the exponent of the density differ from the printed equations; see docs/errata.md.
  *
  * State x: altitude h (m), velocity V (m/s), angle of attack alpha (rad), pitch angle theta (rad), pitch rate q
  * (rad/s), eta_1 (kg^0.5 m) and its rate, eta_2 and its rate. Input u: equivalence ratio phi (1), elevator delta_e
- * (rad). V and alpha are inertial; air that moves acts through "conditions", see forces_in.
+ * (rad). V and alpha are inertial; moving air acts through the conditions, see forces_in.
  */
 #pragma once
 #include "elementary.h"
 
-/* Conditions of air and engine: wind forward and up (m/s), density relative to the model's, factors of thrust, lift and
- * drag, increment of the pitching moment coefficient. */
+/* Conditions of air and engine: wind forward and up (m/s), density relative to the model, factors of thrust, lift and
+ * drag, increment of the pitching-moment coefficient. */
 enum { WIND_FORWARD, WIND_UP, DENSITY, THRUST_FACTOR, LIFT_FACTOR, DRAG_FACTOR, MOMENT_INCREMENT };
 
 typedef struct {
@@ -64,7 +64,7 @@ typedef struct {
     real speed, turn, sine, cosine; /* V_a (m/s); e = gamma_a - gamma (rad), its sine and cosine */
 } AirRelative;
 
-/* The velocity relative to air that moves, for the inertial path angle gamma = theta - alpha. */
+/* Return the velocity relative to the air for a wind (forward, up; m/s) and the inertial path angle theta - alpha. */
 static inline AirRelative air_relative(real velocity, real path_angle, real forward, real up)
 {
     real sine, cosine;
@@ -78,8 +78,8 @@ static inline AirRelative air_relative(real velocity, real path_angle, real forw
     return air;
 }
 
-/* Forces in given conditions of air and engine, and the angle of attack of the air (rad). Lift and drag of the air are
- * turned by the angle between the two paths: lift is across the inertial path, drag along it. */
+/* Return the forces under the conditions of air and engine, and write the angle of attack relative to the air (rad).
+ * Lift and drag are rotated by the angle between the two paths: the result is across and along the inertial path. */
 static inline Forces forces_in(const real *conditions, const real *x, const real *u, const Vehicle *p, real *alpha)
 {
     const AirRelative air =
@@ -89,7 +89,7 @@ static inline Forces forces_in(const real *conditions, const real *x, const real
     const real moment = conditions[DENSITY] *
                         (f.moment - p->thrust_moment_arm * f.thrust +
                          f.pressure * p->reference_area * p->mean_aerodynamic_chord * conditions[MOMENT_INCREMENT]);
-    f.thrust *= conditions[THRUST_FACTOR]; /* which does not depend on the density */
+    f.thrust *= conditions[THRUST_FACTOR]; /* in the model thrust does not depend on density */
     const real lift = f.lift * (conditions[DENSITY] * conditions[LIFT_FACTOR]);
     const real drag = f.drag * (conditions[DENSITY] * conditions[DRAG_FACTOR]);
     f.lift = lift * air.cosine - drag * air.sine;
@@ -100,7 +100,7 @@ static inline Forces forces_in(const real *conditions, const real *x, const real
 }
 #endif
 
-/* Write dx/dt; conditions: of air and engine, or NULL for still air and an engine that works. */
+/* Write dx/dt for the conditions of air and engine; NULL: still air and a healthy engine. */
 static inline void derivative(const real *x, const real *u, const Vehicle *p, const real *conditions, real *out)
 {
     const real velocity = x[VELOCITY], elevator = u[ELEVATOR];
@@ -118,7 +118,7 @@ static inline void derivative(const real *x, const real *u, const Vehicle *p, co
                          p->elastic_force_2_elevator * elevator + p->elastic_force_2_zero;
     const plain psi_1 = p->inertial_coupling_1, psi_2 = p->inertial_coupling_2;
     const plain omega_1 = p->natural_frequency_1, omega_2 = p->natural_frequency_2;
-    /* Couplings and moment, divided by the moment of inertia; the 2x2 system of the two accelerations is solved. */
+    /* Solve the 2x2 system of the elastic accelerations; couplings and moment are divided by the moment of inertia. */
     const plain c_1 = psi_1 / p->moment_of_inertia, c_2 = psi_2 / p->moment_of_inertia;
     const real angular = f.moment / p->moment_of_inertia;
     const plain k_1 = 1.0 + psi_1 * c_1, k_2 = 1.0 + psi_2 * c_2, k_12 = psi_1 * c_2;
@@ -145,7 +145,7 @@ static inline void derivative(const real *x, const real *u, const Vehicle *p, co
     out[ETA_2_RATE] = acceleration_2;
 }
 
-/* Replace x by the state one period (s) later, u and the conditions held: classical Runge-Kutta steps. */
+/* Advance x by one period (s) with u and the conditions held, in classical Runge-Kutta steps. */
 static inline void advance(real *x, const real *u, const Vehicle *p, const real *conditions, real period,
                            int64_t substeps)
 {
@@ -166,7 +166,7 @@ static inline void advance(real *x, const real *u, const Vehicle *p, const real 
 }
 
 #ifndef COMPLEX
-/* Whether the state is finite and its angles are within the range of the curve fits. */
+/* Return whether the state is finite and its angles are inside the range of the curve fits. */
 static inline mask in_model_range(const real *x, double angle_limit)
 {
     mask inside = x[VELOCITY] > 0.0;

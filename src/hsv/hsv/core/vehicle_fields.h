@@ -1,4 +1,4 @@
-/* The constants of the equations of motion in SI, in the order of hsv.model.dynamics.VehicleParameters. */
+/* Constants of the equations of motion, SI, in the order of hsv.model.dynamics.VehicleParameters. */
 number mass, moment_of_inertia, gravity, reference_area, mean_aerodynamic_chord, thrust_moment_arm;
 number reference_density, reference_altitude, density_scale_height;
 number lift_alpha, lift_elevator, lift_zero;
