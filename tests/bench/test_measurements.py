@@ -15,8 +15,8 @@ from hsv.bench.measure import against_imports, c_flight, graph_lap, ring_lap
 def test_the_loop_in_c_alone_flies_the_same_bits_every_time():
     # tests/cli/test_bench.py compares these bits with those of a flight from Python.
     in_c = c_flight(components("case1", duration=110.0))
-    first = in_c().flown.copy()
-    assert (in_c().flown == first).all()
+    first = in_c().signals.copy()
+    assert (in_c().signals == first).all()
 
 
 def test_a_missing_compiler_or_command_is_reported(tmp_path, monkeypatch):

@@ -38,7 +38,8 @@ def digest(array):
 
 def check(flight, expected):
     history = flight.history
-    found = flight.fingerprint, len(history.flown), flight.status.name, digest(history.beside), digest(history.estimate)
+    digests = digest(history.auxiliary), digest(history.estimate)
+    found = flight.fingerprint, len(history.signals), flight.status.name, *digests
     assert found == tuple(expected[name] for name in ("fingerprint", "rows", "status", "beside", "estimate"))
 
 

@@ -39,7 +39,7 @@ def test_disturbances_and_errors_are_those_of_the_design(name):
     share = share_of(subject.certificate["inputs"])
     flight = fly(region(subject, subject.design, share).perturbed({"mass": 0.05}))
     theirs = Region(subject.design, subject.inputs, share).fly({"mass": 0.05})
-    assert np.array_equal(flight.history.flown, theirs.history.flown)
+    assert np.array_equal(flight.history.signals, theirs.history.signals)
     found, model = disturbances(subject, flight), channel_model(subject.design, subject.vehicle)
     error, lag = model.errors(record(theirs))
     assert_allclose(found.error, error, rtol=0.0, atol=1e-9 * np.abs(error).max())

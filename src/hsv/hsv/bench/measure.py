@@ -75,7 +75,7 @@ def c_flight(components: Components) -> Callable[[], History]:
 
     def fly() -> History:
         flights = ffi.new("hsv_flight *[]", [flight.pointer])
-        loop(int(ffi.cast("intptr_t", flights)), memory.ctypes.data, 0, len(history.flown))
+        loop(int(ffi.cast("intptr_t", flights)), memory.ctypes.data, 0, len(history.signals))
         return history
 
     return fly
@@ -86,7 +86,7 @@ def against_c(repeats: int) -> list[Figure]:
     components = assemble_flight(load_scenario("case1"))
     in_c = c_flight(components)
     ours, theirs = interleaved(lambda: fly(components), in_c, repeats)
-    note = "the same bits" if fly(components).fingerprint == fingerprint(in_c().flown) else "OTHER bits"
+    note = "the same bits" if fly(components).fingerprint == fingerprint(in_c().signals) else "OTHER bits"
     what, against = "Case 1, 200 s, called from Python", f"its loop in C alone, cc {' '.join(FLAGS)}"
     return [Figure("in_process", what, against, ours, theirs, 1.3, note)]
 

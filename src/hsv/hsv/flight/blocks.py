@@ -1,7 +1,7 @@
-"""The loop as a table: which blocks are stepped in a period, in which order, what each takes and gives.
+"""The closed loop as a table of blocks: their inputs, outputs and order in a period.
 
-Stepwise flight, nodes, replay, recorder, parameter pages and cache warming read it; the compiled loop of
-:mod:`hsv.flight.closed_loop` has the same order, which the tests of bit-equality guard.
+Stepwise flight, nodes, replay, recorder and parameter pages use this table. The compiled loop of
+:mod:`hsv.flight.closed_loop` has the same order; tests compare the two to the bit.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from hsv.control.controllers import build_controller
 from hsv.model import signals as types
 from hsv.model.signals import N_INPUTS, PITCH_RATE, SignalType
 
-if TYPE_CHECKING:  # a node imports its own component alone
+if TYPE_CHECKING:  # a node imports only its own component
     from hsv.base.parameters import Parameter
     from hsv.control.design import ControlDesign
     from hsv.control.nominal_trajectory import NominalTrajectory
@@ -32,37 +32,37 @@ if TYPE_CHECKING:  # a node imports its own component alone
 
 
 class Signals:
-    """Signals between the blocks in a step, SI units and radians; each block writes its outputs.
+    """Signals between the blocks in a step, SI; each block writes its outputs.
 
-    The attributes other than step, period and stamp are the signals of :mod:`hsv.model.signals`, by name.
+    The attributes except step, period and stamp are the signals of :mod:`hsv.model.signals`.
     """
 
     step = -1
-    """k; -1 before the vehicle has said where it starts"""
+    """Step k; -1 before the first step"""
     period: float
-    """T, s"""
+    """Control period T, s"""
     stamp: tuple[int, int] = (0, 0)
-    """Seconds and nanoseconds of simulated time in the messages of the step, if there are any"""
+    """Simulated time in the messages of the step: seconds and nanoseconds"""
 
     state: np.ndarray
-    """x (9), the truth"""
+    """True state x (9)"""
     status = 0
     """:class:`hsv.model.plant.FlightStatus` of the state"""
     forces: tuple[float, float, float, float, float]
     """Lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa"""
     effector: np.ndarray
-    """(2), where the effectors are"""
+    """Positions of the effectors (2)"""
     air: np.ndarray
-    """Wind forward and up (m/s), and the density for that of the model (3), over the period before"""
+    """Forward and upward wind (m/s) and relative density (3) over the previous period"""
     measurement: np.ndarray
-    """x (9) as measured"""
+    """Measured state (9)"""
 
     estimate: np.ndarray
-    """x (9) as the controller is to take it: the measurement, or what an estimator makes of it"""
+    """State for feedback (9): the measurement, or the estimate if an estimator is enabled"""
     filtered_pitch_rate: float
     """q_f, rad/s"""
     filter_state: np.ndarray
-    """s (2 s) before its update"""
+    """State s (2 sections) of the notch filter before its update"""
 
     reference: np.ndarray
     """x_r (9)"""
@@ -73,53 +73,55 @@ class Signals:
     nominal_input: np.ndarray
     """u_n (2)"""
     gain: np.ndarray
-    """K (2, 9) if it was found in flight, else empty"""
+    """K (2, 9) if it was computed in flight, else empty"""
     gain_index: int
-    """Index of the nested gain, 0 for the outermost ellipsoid."""
+    """Index of the nested gain, 0 for the outermost ellipsoid"""
     nominal_status: int
     """:class:`hsv.control.nominal_law.NominalStatus`"""
 
     command: np.ndarray = np.zeros(N_INPUTS)
-    """u (2); that of the step before until the controller has said it, of which step 0 has none"""
+    """Input u (2); until the controller has been stepped, that of the previous step (zero before step 0)"""
     saturated: np.ndarray
-    """(2) whether the limits have changed it"""
+    """Mask (2) of the inputs changed by the limits"""
     diagnostics: ControllerResult
-    """Output of the controller besides its input."""
+    """Complete result of the controller"""
     actuator: np.ndarray
-    """(2), what becomes of the command"""
+    """Input of the actuators (2): the command after link and faults"""
     active_faults: tuple[ActiveFault, ...]
-    """Faults of this step."""
+    """Active faults of the step"""
 
 
 @dataclass(frozen=True)
 class Block:
-    """Interface of what is stepped once per period."""
+    """A block of the closed loop, stepped once per period."""
 
     name: str
     component: str
-    """Class, ``module:Class``, with PARAMETERS, ``from_parameters`` and ``reset``, imported when it is needed; empty if
-    the parameters choose it."""
+    """Class of the component as ``module:Class``, with PARAMETERS, ``from_parameters`` and ``reset``; empty if the
+    parameters choose it. It is imported on first use."""
     inputs: tuple[SignalType, ...]
-    """Signals of the same step that it needs: what it gives feeds through from them."""
+    """Inputs of the same step, with direct feedthrough to the outputs."""
     outputs: tuple[SignalType, ...]
     step: Callable[[Any, Signals], None]
-    """Steps a component on the signals."""
+    """Function that steps the component on the signals."""
     delayed: tuple[SignalType, ...] = ()
-    """Signals of the step before that it needs."""
+    """Inputs of the previous step."""
     state: tuple[SignalType, ...] = ()
-    """Signals that it keeps for the next step."""
+    """Signals that the component keeps for the next step."""
     designed: bool = False
-    """Whether it is built from the controller's design, too."""
+    """Whether the component is built from a control design."""
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The parameters of its own, beside those of the design."""
+        """Parameters of the component, without those of the design."""
         return tuple(self._class().PARAMETERS)
 
     def build(self, values: Mapping[str, Any], design: ControlDesign | None = None) -> Any:
-        """Return the component that the flat parameters ``values`` describe.
+        """Build the component.
 
-        ``design``: the one in ``values``, where it is known already.
+        Args:
+            values: Flat parameters.
+            design: The design in ``values``, if it is known already.
 
         Raises:
             ParameterError, DesignError, TrimError: A wrong value, named.
@@ -134,10 +136,10 @@ class Block:
 
 @dataclass(frozen=True)
 class ControllerBlock(Block):
-    """The block whose component the parameters choose."""
+    """The controller block, whose component is chosen by the parameters."""
 
     def build(self, values: Mapping[str, Any], design: ControlDesign | None = None) -> Controller:
-        """Return the controller that ``values`` name."""
+        """Build the controller named in ``values``."""
         return build_controller(values, design)
 
 
@@ -169,7 +171,7 @@ def _plan(trajectory: NominalTrajectory, signals: Signals) -> None:
 
 
 def _control(controller: Controller, signals: Signals) -> None:
-    result = controller.step(ControllerInput(signals.step, *_given(signals)))
+    result = controller.step(ControllerInput(signals.step, *_controller_inputs(signals)))
     signals.command, signals.saturated, signals.diagnostics = result.input, result.saturated, result
 
 
@@ -179,7 +181,7 @@ def _actuate(injector: FaultInjector, signals: Signals) -> None:
 
 
 _NO_GAIN = np.empty((0, 9))
-_given = attrgetter(*(signal.name for signal in CONTROLLER_INPUTS))
+_controller_inputs = attrgetter(*(signal.name for signal in CONTROLLER_INPUTS))
 
 VEHICLE = Block(
     "plant",
@@ -196,7 +198,7 @@ NOTCH_FILTER = Block(
     inputs=(types.MEASUREMENT,),
     outputs=(types.ESTIMATE, types.FILTERED_PITCH_RATE, types.FILTER_STATE),
     step=_filter,
-    delayed=(types.COMMAND,),  # of the estimator, where one flies: the nodes hear it there alone
+    delayed=(types.COMMAND,),  # input of the estimator; without one the node does not subscribe to it
     state=(types.FILTER_STATE,),
 )
 NOMINAL_TRAJECTORY = Block(
@@ -233,27 +235,27 @@ FAULT_INJECTOR = Block(
 
 
 def in_order(blocks: Sequence[Block]) -> tuple[Block, ...]:
-    """Return ``blocks`` in an order in which each finds the inputs that it needs.
+    """Return ``blocks`` sorted so that each block follows the sources of its inputs.
 
     Raises:
-        HsvError: A signal that nobody or that two give, or that is taken with another unit or size than it is given
-            with, or an algebraic loop.
+        HsvError: A signal has no source or two, an input differs from its source in unit or size, or there is an
+            algebraic loop.
     """
-    givers: dict[str, tuple[Block, SignalType]] = {}
+    sources: dict[str, tuple[Block, SignalType]] = {}
     for block in blocks:
         for signal in block.outputs:
-            if signal.name in givers:
-                other = givers[signal.name][0].name
+            if signal.name in sources:
+                other = sources[signal.name][0].name
                 raise HsvError(f"{block.name}: gives {signal.name}, expected no other block to, {other} does")
-            givers[signal.name] = block, signal
+            sources[signal.name] = block, signal
     for block in blocks:
         for signal in (*block.inputs, *block.delayed):
-            if signal.name not in givers:
-                raise HsvError(f"{block.name}: needs {signal.name}, expected one of {', '.join(givers)}")
-            giver, given = givers[signal.name]
-            if signal != given:
-                wanted, found = (f"{s.size} in {s.unit!r}" for s in (signal, given))
-                raise HsvError(f"{block.name}: needs {signal.name}, {wanted}, expected {found} as {giver.name} gives")
+            if signal.name not in sources:
+                raise HsvError(f"{block.name}: needs {signal.name}, expected one of {', '.join(sources)}")
+            source, output = sources[signal.name]
+            if signal != output:
+                needed, found = (f"{s.size} in {s.unit!r}" for s in (signal, output))
+                raise HsvError(f"{block.name}: needs {signal.name}, {needed}, expected {found} as {source.name} gives")
     ordered: list[Block] = []
 
     def place(block: Block, path: tuple[Block, ...]) -> None:
@@ -264,7 +266,7 @@ def in_order(blocks: Sequence[Block]) -> tuple[Block, ...]:
             )
         if block not in ordered:
             for signal in block.inputs:
-                place(givers[signal.name][0], (*path, block))
+                place(sources[signal.name][0], (*path, block))
             ordered.append(block)
 
     for block in blocks:
@@ -273,14 +275,14 @@ def in_order(blocks: Sequence[Block]) -> tuple[Block, ...]:
 
 
 LOOP = in_order((VEHICLE, NOTCH_FILTER, NOMINAL_TRAJECTORY, CONTROLLER, FAULT_INJECTOR))
-"""The blocks, in the order in which a step passes through them."""
+"""The blocks of the closed loop in the order of a step."""
 
 
 def steps(components: Components) -> Iterator[Signals]:
-    """Fly ``components`` from the beginning, step by step; yield the signals of every step, the same object each time.
+    """Simulate ``components`` from the start and yield the signals of every step; the object is the same each time.
 
     Raises:
-        RunError: A controller of one's own failed.
+        RunError: A custom controller failed.
     """
     signals = Signals()
     for block in LOOP:

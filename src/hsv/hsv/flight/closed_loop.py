@@ -1,4 +1,4 @@
-"""The closed loop in one process: the core flies it with the arithmetic and the order of the graph of nodes."""
+"""The closed loop in one process: the core simulates it with the arithmetic and the order of the node graph."""
 
 from __future__ import annotations
 
@@ -40,32 +40,36 @@ class Components:
     fault_injector: FaultInjector
 
     def perturbed(self, perturbation: Mapping[str, float]) -> Components:
-        """Return the loop around the perturbed vehicle, relative changes by parameter name; the rest is shared."""
+        """Return the loop with a perturbed vehicle; all other components are shared.
+
+        Args:
+            perturbation: Relative changes by parameter name.
+        """
         return replace(self, plant=self.plant.perturbed(perturbation))
 
 
 def fly(components: Components) -> Flight:
-    """Fly ``components`` from the plant's initial trim to the end of its duration, or until it diverges.
+    """Simulate ``components`` from the initial trim of the plant for its duration, or until the state diverges.
 
-    The core calls a nominal law that solves a problem in flight and a custom controller in Python. Flights with such a
-    block wait for one another: it has one state. With a controller in a shared library the loop flies in a child
-    process, and flights wait for one another, too.
+    The core calls back into Python for a nominal law that optimises in flight and for a custom Python controller.
+    Flights with such a block run one at a time, because the block has a single state. With a controller in a shared
+    library the loop runs in a child process, one flight at a time.
 
     Raises:
-        ControllerError: A custom controller failed; it is named, with the step.
-        ParameterError: The controller is a node of its own.
+        ControllerError: A custom controller failed; the message names it and the step.
+        ParameterError: The controller runs in a node of its own.
     """
     rows = components.plant.steps + 1
     if components.controller.library is not None:
         with watched(components.controller, rows) as (history, request):
-            flown = request("fly", rows, kept=vars(components))
-            return flight_of(components, history.copy().cut(flown))
+            steps = request("fly", rows, kept=vars(components))
+            return flight_of(components, history.copy().cut(steps))
     history = History.empty(rows, estimated=not is_ideal(components))
     return flight_of(components, history.cut(fly_into(history, components)))
 
 
 def is_ideal(components: Components) -> bool:
-    """Return whether equipment, links and air are ideal, and the controller receives the state itself."""
+    """Return whether equipment, links and air are ideal, so that the controller receives the true state."""
     injector = components.fault_injector
     ideal = components.plant.is_ideal(injector.known) and injector.link.ideal
     return ideal and components.notch_filter.estimator is None
@@ -73,16 +77,16 @@ def is_ideal(components: Components) -> bool:
 
 @contextmanager
 def watched(controller: Controller, rows: int) -> Iterator[tuple[History, Callable[..., Any]]]:
-    """Yield the history, of so many steps, that a library's flights are written to, and what requests them.
+    """Yield the shared history (rows) of a library's flights, and the function that requests a flight.
 
-    Flights are given up when they stand still; an error says in which step.
+    A flight that makes no progress is aborted with an error that names the step.
     """
     library = controller.library
     with library.sharing(rows * History.numbers()) as memory:
         history = History.over(memory, rows)
 
         def begun() -> int:
-            # The pitch rate of a step is written before the controller is called.
+            # The core writes the pitch rate of a step before it calls the controller.
             return int(np.count_nonzero(~np.isnan(history.filtered_pitch_rate)))
 
         history.filtered_pitch_rate[:] = np.nan
@@ -97,19 +101,19 @@ _ONE_AT_A_TIME = threading.Lock()
 
 
 def fly_into(history: History, components: Components) -> int:
-    """Fly ``components`` in this process, as many steps as ``history`` has rows; return how many were flown.
+    """Simulate ``components`` in this process for at most the rows of ``history``; return the number of steps.
 
     Raises:
-        ControllerError, ParameterError: As :func:`fly`.
+        ControllerError, ParameterError: As for :func:`fly`.
     """
     law, controller = components.nominal_trajectory.law, components.controller
     callbacks, calls = [], {}
     if not law.in_core:
-        callbacks.append(_solving(law))
+        callbacks.append(_law_callback(law))
         calls["nominal_law"] = callbacks[-1].call
     if not controller.in_core:
         if controller.kernel is None:
-            callbacks.append(_controlling(controller, 2 * len(components.notch_filter.data.D)))
+            callbacks.append(_controller_callback(controller, 2 * len(components.notch_filter.data.D)))
             calls["controller"] = callbacks[-1].call
         else:
             address, state, parameters = controller.kernel
@@ -119,7 +123,7 @@ def fly_into(history: History, components: Components) -> int:
         if callbacks:
             law.reset()
             controller.reset()
-        rows = core.fly([flight], core.loop_memory(1), 0, len(history.flown))
+        rows = core.fly([flight], core.loop_memory(1), 0, len(history.signals))
     for callback in callbacks:
         if callback.error is not None:
             raise callback.error
@@ -131,16 +135,16 @@ def fly_into(history: History, components: Components) -> int:
 
 
 NO_CALL = SimpleNamespace(function=None, state=None, par=None)
-"""In place of a block from outside: the core's own law flies."""
+"""Placeholder for an external block: the law of the core is used."""
 
 
 def flight_struct(components: Components, history: History, **others: Any) -> Struct:
-    """Return the flight of ``components`` as the core takes it, before its first step.
+    """Return the struct of a flight for the core, before its first step.
 
     Args:
-        components: The components, none of which is changed.
-        history: Written in flight.
-        others: Calls of a nominal law or a controller from outside, and the invariant set whose level is computed.
+        components: Components of the loop; they are not changed.
+        history: Output of the flight.
+        others: Calls of an external nominal law or controller, and the invariant set whose level is computed.
     """
     plant, notch, injector = components.plant, components.notch_filter, components.fault_injector
     nominal, controller = components.nominal_trajectory, components.controller
@@ -161,10 +165,10 @@ def flight_struct(components: Components, history: History, **others: Any) -> St
         "nominal_law": NO_CALL,
         "controller": NO_CALL,
         "set": None,
-        "history": history.flown,
-        "auxiliary": history.beside,
+        "history": history.signals,
+        "auxiliary": history.auxiliary,
         "estimated": history.estimated,
-        "ended": len(history.flown),
+        "ended": len(history.signals),
         "returned": 0,
         "answer": [0.0] * N_INPUTS,
         "worst": -np.inf,
@@ -172,24 +176,24 @@ def flight_struct(components: Components, history: History, **others: Any) -> St
     return Struct("hsv_flight", SimpleNamespace(**fields | others))
 
 
-def _solving(law: NominalLaw) -> Callback:
-    def solve(step: int, given: Any, out: Any) -> None:
-        chosen = law.step(np.array(ffi.unpack(given, N_STATES)))
-        out[0], out[1] = chosen.input
-        out[2] = chosen.gain_index
+def _law_callback(law: NominalLaw) -> Callback:
+    def solve(step: int, arguments: Any, out: Any) -> None:
+        result = law.step(np.array(ffi.unpack(arguments, N_STATES)))
+        out[0], out[1] = result.input
+        out[2] = result.gain_index
 
     return Callback(solve)
 
 
-def _controlling(controller: Controller, filter_states: int) -> Callback:
+def _controller_callback(controller: Controller, filter_states: int) -> Callback:
     ends = [*accumulate(filter_states if signal.size == VARYING else signal.size for signal in CONTROLLER_INPUTS)]
     cuts = [slice(*cut) for cut in pairwise((0, *ends))]
 
-    def control(step: int, given: Any, out: Any) -> None:
-        # A copy: a controller may keep its inputs.
-        now = np.array(ffi.unpack(given, ends[-1]))
-        estimate, filtered_pitch_rate, *others = [now[cut] for cut in cuts]
-        inputs = ControllerInput(step, estimate, float(filtered_pitch_rate[0]), *others)
+    def control(step: int, arguments: Any, out: Any) -> None:
+        # Copy the inputs, because the controller may keep them.
+        values = np.array(ffi.unpack(arguments, ends[-1]))
+        feedback_state, filtered_pitch_rate, *others = [values[cut] for cut in cuts]
+        inputs = ControllerInput(step, feedback_state, float(filtered_pitch_rate[0]), *others)
         out[0], out[1] = controller.unsaturated_input(inputs)
 
     return Callback(control)

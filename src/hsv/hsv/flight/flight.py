@@ -48,22 +48,22 @@ class Flight:
     @property
     def reference(self) -> np.ndarray:
         """x_r (n + 1, 9)."""
-        return self.trajectory.along(len(self.history.flown)).state
+        return self.trajectory.along(len(self.history.signals)).state
 
     @property
     def reference_input(self) -> np.ndarray:
         """u_r (n + 1, 2)."""
-        return self.trajectory.along(len(self.history.flown)).input
+        return self.trajectory.along(len(self.history.signals)).input
 
     @property
     def defect(self) -> np.ndarray:
         """d_r (n + 1, 9), see :mod:`hsv.control.reference_trajectory`."""
-        return self.trajectory.along(len(self.history.flown)).defect
+        return self.trajectory.along(len(self.history.signals)).defect
 
     @property
     def fingerprint(self) -> str:
         """The digest of all bits of the history, see :mod:`hsv.flight.fingerprint`."""
-        return fingerprint(self.history.flown)
+        return fingerprint(self.history.signals)
 
     @cached_property
     def metrics(self) -> dict[str, float]:
@@ -71,7 +71,7 @@ class Flight:
         return flight_metrics(self.data())
 
     def __repr__(self) -> str:
-        steps = len(self.history.flown) - 1
+        steps = len(self.history.signals) - 1
         return f"<Flight of {steps * self.period:g} s, {steps} steps, {self.status.name.lower()}, {self.fingerprint}>"
 
     def to_frame(self) -> DataFrame:

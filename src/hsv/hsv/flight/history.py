@@ -9,20 +9,19 @@ import numpy as np
 
 from hsv.model.signals import N_INPUTS, N_STATES
 
-X, Q_F, X_N, U_N, U, ACTUATOR, FLOWN = accumulate((0, N_STATES, 1, N_STATES, N_INPUTS, N_INPUTS, N_INPUTS))
-"""First columns of x, q_f, x_n, u_n, the command u and the actuators' input in :attr:`History.flown`, and the number of
-columns."""
+X, Q_F, X_N, U_N, U, ACTUATOR, SIGNAL_COLUMNS = accumulate((0, N_STATES, 1, N_STATES, N_INPUTS, N_INPUTS, N_INPUTS))
+"""First columns of x, q_f, x_n, u_n, command u and actuator input in :attr:`History.signals`; then their number."""
 
-GAIN_INDEX, U_UNSATURATED, BESIDE = accumulate((0, 1, N_INPUTS))
-"""First columns of gain index and unsaturated input in :attr:`History.beside`, and the number of columns."""
+GAIN_INDEX, U_UNSATURATED, AUXILIARY_COLUMNS = accumulate((0, 1, N_INPUTS))
+"""First columns of gain index and unsaturated input in :attr:`History.auxiliary`, and the total number."""
 
 
 class History(NamedTuple):
-    """Rows k = 0 ... n of all signals of a flight, SI."""
+    """All signals of a flight for the steps k = 0 ... n, SI."""
 
-    flown: np.ndarray
+    signals: np.ndarray
     """(n + 1, 25): the signals of the fingerprint"""
-    beside: np.ndarray
+    auxiliary: np.ndarray
     """(n + 1, 3): auxiliary signals"""
     estimated: np.ndarray | None
     """(n + 1, 9): measured or estimated state, None if that is the state itself"""
@@ -30,13 +29,17 @@ class History(NamedTuple):
     @classmethod
     def empty(cls, rows: int, *, estimated: bool = True) -> History:
         """Return an empty history of ``rows`` steps, with the measured or estimated state if ``estimated``."""
-        return cls.over(np.empty(rows * (cls.numbers() if estimated else FLOWN + BESIDE)), rows, estimated=estimated)
+        return cls.over(
+            np.empty(rows * (cls.numbers() if estimated else SIGNAL_COLUMNS + AUXILIARY_COLUMNS)),
+            rows,
+            estimated=estimated,
+        )
 
     @classmethod
     def over(cls, memory: np.ndarray, rows: int, *, estimated: bool = True) -> History:
         """Return a history of ``rows`` steps in ``memory`` (..., numbers), one matrix after the other."""
         matrices, start = [], 0
-        for width in (FLOWN, BESIDE, N_STATES)[: 3 if estimated else 2]:
+        for width in (SIGNAL_COLUMNS, AUXILIARY_COLUMNS, N_STATES)[: 3 if estimated else 2]:
             stop = start + rows * width
             matrices.append(memory[..., start:stop].reshape(*memory.shape[:-1], rows, width))
             start = stop
@@ -45,12 +48,12 @@ class History(NamedTuple):
     @staticmethod
     def numbers() -> int:
         """Return the number of values of a step."""
-        return FLOWN + BESIDE + N_STATES
+        return SIGNAL_COLUMNS + AUXILIARY_COLUMNS + N_STATES
 
     @property
     def state(self) -> np.ndarray:
         """State x (n + 1, 9)."""
-        return self.flown[:, X:Q_F]
+        return self.signals[:, X:Q_F]
 
     @property
     def estimate(self) -> np.ndarray:
@@ -60,37 +63,37 @@ class History(NamedTuple):
     @property
     def filtered_pitch_rate(self) -> np.ndarray:
         """q_f (n + 1), rad/s."""
-        return self.flown[:, Q_F]
+        return self.signals[:, Q_F]
 
     @property
     def deviation(self) -> np.ndarray:
         """x_n (n + 1, 9)."""
-        return self.flown[:, X_N:U_N]
+        return self.signals[:, X_N:U_N]
 
     @property
     def nominal_input(self) -> np.ndarray:
         """u_n (n + 1, 2)."""
-        return self.flown[:, U_N:U]
+        return self.signals[:, U_N:U]
 
     @property
     def gain_index(self) -> np.ndarray:
         """Index in the nested family (n + 1)."""
-        return self.beside[:, GAIN_INDEX]
+        return self.auxiliary[:, GAIN_INDEX]
 
     @property
     def u_unsaturated(self) -> np.ndarray:
         """Input before saturation (n + 1, 2)."""
-        return self.beside[:, U_UNSATURATED:BESIDE]
+        return self.auxiliary[:, U_UNSATURATED:AUXILIARY_COLUMNS]
 
     @property
     def command(self) -> np.ndarray:
         """Input u (n + 1, 2)."""
-        return self.flown[:, U:ACTUATOR]
+        return self.signals[:, U:ACTUATOR]
 
     @property
     def actuator(self) -> np.ndarray:
         """Input of the actuators (n + 1, 2)."""
-        return self.flown[:, ACTUATOR:FLOWN]
+        return self.signals[:, ACTUATOR:SIGNAL_COLUMNS]
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return all signals by name, in the order of the loop."""
@@ -99,12 +102,12 @@ class History(NamedTuple):
     def copy(self) -> History:
         """Return a copy in new memory."""
         estimated = None if self.estimated is None else self.estimated.copy()
-        return History(self.flown.copy(), self.beside.copy(), estimated)
+        return History(self.signals.copy(), self.auxiliary.copy(), estimated)
 
     def cut(self, rows: int) -> History:
         """Return the first ``rows`` steps."""
         estimated = None if self.estimated is None else self.estimated[:rows]
-        return History(self.flown[:rows], self.beside[:rows], estimated)
+        return History(self.signals[:rows], self.auxiliary[:rows], estimated)
 
 
 SIGNALS = (

@@ -1,10 +1,10 @@
-"""Child process of a shared library, which loads the library and flies the loop with it.
+"""Child process that loads a shared library and simulates the loop with its controller.
 
-Two processes: the first waits for the second, which does all that, to crash, tells the parent of it, and forks another
-one. It never loads the library itself, so that the next one starts afresh, and at once.
+There are two processes. The supervisor never loads the library; it forks the worker, which does. If the worker crashes,
+the supervisor reports the crash to the parent and forks a fresh worker.
 
-:mod:`hsv.control.library_process` starts it as ``python3 -m hsv.flight.library_child LIBRARY CONNECTION MEMORY``;
-the last two are file descriptors.
+:mod:`hsv.control.library_process` starts the supervisor as
+``python3 -m hsv.flight.library_child LIBRARY CONNECTION MEMORY``; the last two are file descriptors.
 """
 
 from __future__ import annotations
@@ -32,37 +32,43 @@ from hsv.flight.history import History
 
 
 class LoadedLibrary:
-    """A library in this process, and what its parent can request."""
+    """A shared library in this process, with the requests that the parent can make."""
 
     def __init__(self, path: Path, memory: SharedMemory) -> None:
-        """Write flights to the ``memory``, which the parent shares."""
+        """Prepare to load the library; flights are written to ``memory``, which is shared with the parent."""
         self._path = path
         self._memory = memory
         self._load = cache(load_block)
 
     @contextmanager
     def sharing(self, numbers: int) -> Iterator[np.ndarray]:
-        """Yield memory (numbers) that the parent shares."""
+        """Yield the shared memory as an array (numbers)."""
         yield self._memory.numbers(numbers)
 
     def request(self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, **_: Any) -> Any:
-        """Do what is requested, by the name of the method."""
+        """Call the method ``name`` and return its result.
+
+        Args:
+            name: Name of the method.
+            arguments: Positional arguments.
+            kept: Keyword arguments.
+        """
         return getattr(self, name)(*arguments, **(kept or {}))
 
     def describe(self, symbol: str) -> CBlock:
-        """Load the library, where it is not loaded yet, and return its block.
+        """Load the library on first use and return its block ``symbol``.
 
         Raises:
-            ParameterError: There is none; what is wrong is named.
+            ParameterError: The library or the block cannot be loaded.
         """
         return self._load(self._path, symbol)
 
     def fly(self, rows: int, **parts: Any) -> int:
-        """Fly, write so many steps at most to the shared memory, and return how many were flown.
+        """Simulate a flight into the shared memory and return its number of steps.
 
         Args:
-            rows: The steps that there is room for.
-            parts: Of :class:`hsv.flight.closed_loop.Components`.
+            rows: Maximum number of steps.
+            parts: Fields of :class:`hsv.flight.closed_loop.Components`.
 
         Raises:
             ControllerError: The library's function returned an error.
@@ -73,24 +79,24 @@ class LoadedLibrary:
         return fly_into(History.over(self._memory.numbers(rows * History.numbers()), rows), components)
 
     def step(
-        self, symbol: str, k: int, given: np.ndarray, state: np.ndarray, parameters: np.ndarray
+        self, symbol: str, k: int, inputs: np.ndarray, state: np.ndarray, parameters: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Call the library's function; return the wanted input (2) and the state after it.
+        """Call the step function of the library; return the unsaturated input (2) and the state after the step.
 
         Raises:
-            RunError: It returned an error.
+            RunError: The function returned an error.
         """
-        wanted = call_step_function(self.describe(symbol).address, k, given, state, parameters)
-        return wanted, state
+        u_unsaturated = call_step_function(self.describe(symbol).address, k, inputs, state, parameters)
+        return u_unsaturated, state
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Return what a function returns that flies with the library."""
+        """Return the result of a function that uses the library."""
         return function(*arguments)
 
 
 def main() -> None:
-    """Do what is requested until the parent has ended."""
-    # Ctrl-C is for the parent, which ends its child.
+    """Supervise workers until the parent has ended."""
+    # The parent handles Ctrl-C and ends its child.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     path, connection, memory = Path(sys.argv[1]), Connection(int(sys.argv[2])), SharedMemory(int(sys.argv[3]))
     connection.send(None)
@@ -105,7 +111,7 @@ def main() -> None:
 
 
 def serve(library: LoadedLibrary, connection: Connection[Any, Any]) -> NoReturn:
-    """Do what is requested until the parent has ended, or the library ends this process."""
+    """Serve requests until the parent has ended, or the library ends this process."""
     use_in_this_process(lambda path: library)
     Thread(target=_end_with_parent, args=(connection.fileno(),), daemon=True).start()
     kept: dict[str, Any] = {}
@@ -124,7 +130,7 @@ def serve(library: LoadedLibrary, connection: Connection[Any, Any]) -> NoReturn:
 
 
 def _end_with_parent(connection: int) -> None:
-    """Wait for the parent to end, and end; a step that goes on for ever would not see it."""
+    """End this process when the parent has ended, even during a step that never returns."""
     ended = select.poll()
     ended.register(connection, select.POLLHUP)
     ended.poll()

@@ -1,4 +1,4 @@
-"""The metrics of a flight: one implementation, for recorded flights and for those flown in process."""
+"""The metrics of a flight, for recorded flights and for flights in one process."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsv.core import doubles, ffi, lib
-from hsv.flight.history import ACTUATOR, BESIDE, FLOWN, Q_F, U_N, U_UNSATURATED, X_N, U, X
+from hsv.flight.history import ACTUATOR, AUXILIARY_COLUMNS, Q_F, SIGNAL_COLUMNS, U_N, U_UNSATURATED, X_N, U, X
 
 SETTLING_BAND = 0.02
-"""Share of the step within which a response counts as settled."""
+"""Largest error of a settled response, as a share of the step."""
 
 DECAY_LEVEL = 0.05
-"""Share of its own post-fault peak below which an elastic rate counts as decayed."""
+"""Largest magnitude of a decayed elastic rate, as a share of its peak after the fault."""
 
 PRE_FAULT_WINDOW = 5.0
-"""Seconds before the fault over which the pre-fault mean is taken."""
+"""Length of the window before the fault over which the mean is taken, s."""
 
 
 class Group(StrEnum):
-    """Group of metrics, in the order in which they are displayed."""
+    """Groups of metrics in the order of display."""
 
     tracking = "tracking"
     after_the_fault = "after the fault"
@@ -33,14 +33,14 @@ class Group(StrEnum):
 
 @dataclass(frozen=True)
 class Metric:
-    """Definition of a metric: its name in words, its unit (SI), its meaning, and its group."""
+    """Definition of a metric: name in words, unit (SI), meaning and group."""
 
     words: str
     unit: str
     meaning: str
     group: Group
     share: bool = False
-    """Whether it is a share of something, which people read in percent"""
+    """Whether the metric is a share, displayed in percent"""
 
 
 METRICS = {
@@ -114,7 +114,7 @@ METRICS = {
     "elevator_deflection_maximum": Metric("elevator deflection, largest", "rad", "largest command", Group.inputs),
     "saturated_steps": Metric("saturated steps", "1", "steps in which a command was limited", Group.inputs),
 }
-"""Every metric, in the order in which files have them."""
+"""All metrics in the order of the files."""
 
 CRITERIA = (
     "altitude_end_error",
@@ -124,16 +124,16 @@ CRITERIA = (
     "elastic_decay_time",
     "saturated_steps",
 )
-"""The metrics that the paper judges a flight by: where a scenario has no limit for one of them, it is named."""
+"""The metrics by which the paper judges a flight; a report names those for which the scenario has no limit."""
 
 
 def in_words(name: str) -> str:
-    """Return what people call a metric, or whatever else the program has a name for."""
+    """Return the display name of a metric or of another identifier."""
     return METRICS[name].words if name in METRICS else name.replace("_", " ")
 
 
 def is_share(name: str) -> bool:
-    """Return whether what is kept of a flight under a name is a share of something, which people read in percent."""
+    """Return whether ``name`` is a metric that is a share, displayed in percent."""
     return name in METRICS and METRICS[name].share
 
 
@@ -142,12 +142,12 @@ CURVES = 10
 
 
 class FlightCurves(NamedTuple):
-    """What metrics are made of, rows k = 0 ... n.
+    """The curves from which metrics are computed, for steps k = 0 ... n.
 
-    ``curves``, each on its own as it is read many times (10, n + 1): altitude and velocity less their references; angle
-    of attack and pitch angle; the two elastic rates; the commands; the magnitudes of what angle of attack and pitch
-    angle differ by from reference + nominal. Beside them time (s), whether each command was limited (n + 1, 2), and the
-    time of the first fault.
+    ``curves`` (10, n + 1): errors of altitude and velocity; angle of attack and pitch angle; the two elastic rates; the
+    two commands; absolute differences of angle of attack and pitch angle from reference + nominal; all SI. ``time``
+    (n + 1) and ``fault_start``, the time of the first fault, are in seconds; ``saturated`` (n + 1, 2) marks the limited
+    commands.
     """
 
     time: np.ndarray
@@ -158,10 +158,11 @@ class FlightCurves(NamedTuple):
 
 @dataclass(frozen=True)
 class FlightData:
-    """Data for metrics, rows k = 0 ... n: time (s); x, x_r, x_n (9); commands, limited and unlimited (2 each).
+    """Signals from which metrics are computed, for steps k = 0 ... n, SI.
 
-    ``unlimited`` is not a number where no more is known than that the command was limited. ``gain_index`` is the
-    nominal gain in use, counted from the outermost of the family.
+    ``time`` (n + 1); ``state``, ``reference`` and ``deviation`` (n + 1, 9): x, x_r and x_n; ``command`` and
+    ``unlimited`` (n + 1, 2): inputs after and before limitation. ``unlimited`` is NaN if a recording states only that
+    the command was limited. ``gain_index`` (n + 1) is the index of the nominal gain, counted from the outermost.
     """
 
     time: np.ndarray
@@ -181,31 +182,36 @@ class FlightData:
 
     @property
     def saturated(self) -> np.ndarray:
-        """Whether each command was limited (n + 1, 2)."""
+        """Mask (n + 1, 2) of the limited commands."""
         return self.flight_curves.saturated
 
     @cached_property
     def flight_curves(self) -> FlightCurves:
-        """What metrics are made of."""
+        """Curves from which metrics are computed."""
         rows = len(self.state)
-        flown, beside = np.zeros((rows, FLOWN)), np.zeros((rows, BESIDE))
-        flown[:, X:Q_F], flown[:, X_N:U_N], flown[:, U:ACTUATOR] = self.state, self.deviation, self.command
-        beside[:, U_UNSATURATED:] = self.unlimited
+        signals, auxiliary = np.zeros((rows, SIGNAL_COLUMNS)), np.zeros((rows, AUXILIARY_COLUMNS))
+        signals[:, X:Q_F], signals[:, X_N:U_N], signals[:, U:ACTUATOR] = self.state, self.deviation, self.command
+        auxiliary[:, U_UNSATURATED:] = self.unlimited
         curves, saturated = np.empty((CURVES, rows)), np.empty(self.command.shape, bool)
-        read_curves(flown, beside, np.ascontiguousarray(self.reference, float), curves, saturated)
+        read_curves(signals, auxiliary, np.ascontiguousarray(self.reference, float), curves, saturated)
         return FlightCurves(self.time, curves, saturated, self.fault_start)
 
 
 def read_curves(
-    flown: np.ndarray, beside: np.ndarray, reference: np.ndarray, curves: np.ndarray, saturated: np.ndarray
+    signals: np.ndarray, auxiliary: np.ndarray, reference: np.ndarray, curves: np.ndarray, saturated: np.ndarray
 ) -> None:
-    """Write the ``curves`` (10, n) and the saturation (n, 2) of the rows of a history, see ``core/metrics.h``.
+    """Compute the curves of a history with ``core/metrics.h``.
 
-    ``curves`` may be columns of a longer array.
+    Args:
+        signals: (n, 25) see :class:`hsv.flight.history.History`.
+        auxiliary: (n, 3) see there.
+        reference: (n, 9) x_r.
+        curves: (10, n) output; may be columns of a longer array.
+        saturated: (n, 2) output, mask of the limited commands.
     """
     stride = curves.strides[0] // curves.itemsize
-    given = map(doubles, (flown, beside, reference))
-    lib.hsv_curves(len(flown), stride, *given, _start(curves, "double *"), _start(saturated, "uint8_t *"))
+    inputs = map(doubles, (signals, auxiliary, reference))
+    lib.hsv_curves(len(signals), stride, *inputs, _start(curves, "double *"), _start(saturated, "uint8_t *"))
 
 
 def _start(array: np.ndarray, kind: str) -> Any:
@@ -213,7 +219,7 @@ def _start(array: np.ndarray, kind: str) -> Any:
 
 
 def flight_metrics(flight: FlightData | FlightCurves) -> dict[str, float]:
-    """Return the metrics of ``flight``, SI; those that it does not define (no step, no fault) are left out."""
+    """Return the metrics of ``flight``, SI, without those that it does not define (no step, no fault)."""
     values: dict[str, float] = {}
     time, curves = flight.time, flight.curves
     faultless = len(time) if flight.fault_start is None else int(np.searchsorted(time, flight.fault_start - 1e-9))
@@ -231,8 +237,8 @@ def flight_metrics(flight: FlightData | FlightCurves) -> dict[str, float]:
     if 0 < faultless < len(time):
         start = time[faultless]
         window = slice(int(np.searchsorted(time, start - PRE_FAULT_WINDOW - 1e-9)), faultless)
-        if window.start < faultless:  # of a recording with a gap before the fault there is no mean
-            mean = np.ascontiguousarray(curves[2:4, window].T).mean(axis=0)  # added row by row
+        if window.start < faultless:  # a recording with a gap before the fault has no mean
+            mean = np.ascontiguousarray(curves[2:4, window].T).mean(axis=0)  # summed row by row, in a fixed order
             values["post_fault_attitude_deviation"] = float(np.max(np.abs(curves[2:4, after] - mean[:, None])))
         values["post_fault_attitude_from_nominal"] = float(np.max(tube_error[:, after]))
         for mode, rate in enumerate(curves[4:6], 1):
@@ -246,7 +252,7 @@ def flight_metrics(flight: FlightData | FlightCurves) -> dict[str, float]:
 
 
 def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
-    """Return rise time, settling time and overshoot of a step whose size is the first error."""
+    """Return rise time (s), settling time (s) and overshoot of a step response; the first error is the step size."""
     if len(time) < 2 or abs(error[0]) < 1e-6:
         return {}
     done = 1.0 - error / error[0]
@@ -260,6 +266,6 @@ def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
 
 
 def _decay_time(time: np.ndarray, magnitude: np.ndarray) -> float:
-    """Return after what time ``magnitude`` last exceeds the decay level of its own peak; what is no number, too."""
+    """Return the time (s) at which ``magnitude`` last exceeds the decay level of its peak; NaN counts as above."""
     above = np.nonzero(~(magnitude <= DECAY_LEVEL * np.max(magnitude)))[0]
     return float(time[above[-1]] - time[0]) if len(above) else 0.0

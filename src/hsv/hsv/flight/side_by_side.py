@@ -58,8 +58,8 @@ class FlightGroup:
 
     def lane(self, i: int, *, estimated: bool = True) -> History:
         """Return the history of the last piece in a lane."""
-        flown, beside, estimate = self.history
-        return History(flown[i], beside[i], estimate[i] if estimated and estimate is not None else None)
+        signals, auxiliary, estimate = self.history
+        return History(signals[i], auxiliary[i], estimate[i] if estimated and estimate is not None else None)
 
     def fly(self, start: int, stop: int) -> int:
         """Fly the steps ``start`` ... ``stop`` - 1; return the one after the last that any flight has flown."""

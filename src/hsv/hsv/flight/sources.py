@@ -1,4 +1,4 @@
-"""Digest of everything that the outcome of a flight depends on; results are stored and found by it."""
+"""Digests of everything on which the outcome of a flight depends; they identify stored results."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from hsv.flight.scenario import load_scenario, scenario_text
 Result = TypeVar("Result")
 
 _FLOWN = ("base", "core", "model", "control", "flight")
-"""Packages whose code a flight runs through; the vehicle's table is among them."""
+"""Packages with the code and the vehicle tables that a flight uses."""
 
 _RUNNING = ("graph", "bags")
-"""Packages whose code starts the nodes, exchanges their messages, and writes and reads bags."""
+"""Packages with the code that starts the nodes, exchanges their messages, and writes and reads bags."""
 
 DIGITS = 12
-"""Digits of a digest in the name of a folder: enough that none meets another."""
+"""Digits of a digest in the name of a folder, enough to avoid collisions."""
 
 
 @cache
 def package_digest(*names: str) -> str:
-    """Return the digest of the code and tables in packages, ``names`` below the root, with those inside them."""
+    """Return the digest of code and tables in the packages ``names`` of ``hsv``, including their subpackages."""
     root = Path(str(files("hsv")))
     paths = [
         path for name in names for path in root.joinpath(name).rglob("*") if path.suffix in (".py", ".toml", ".c", ".h")
@@ -38,23 +38,22 @@ def package_digest(*names: str) -> str:
 
 @cache
 def code_digest() -> str:
-    """Return the digest of the code and the vehicle table that a flight runs through."""
+    """Return the digest of the code and the vehicle tables that a flight uses."""
     return package_digest(*_FLOWN)
 
 
 def measuring_code(*modules: str) -> list[bytes]:
-    """Return the sources of modules on which measurements of flights depend besides the flights themselves."""
+    """Return the sources of the modules that compute measurements of flights."""
     return [Path(str(spec.origin)).read_bytes() for spec in map(find_spec, modules) if spec]
 
 
 @cache
 def nodes_digest() -> str:
-    """Return the digest of everything that a run of the graph depends on besides the flight: nodes, messages, start.
+    """Return the digest of the code that runs the graph: nodes, messages and launcher.
 
-    The nodes are those of the sourced workspace, wherever it is: of all its packages named hsv_* the modules as they
-    would be imported and the definitions of messages and services.
+    It covers the modules and the message and service definitions of all packages hsv_* of the sourced workspace.
     """
-    # Of the sourced workspace: without one there is no graph, nor this package.
+    # Imported here because this package exists only in a sourced workspace.
     from ament_index_python.packages import get_packages_with_prefixes
 
     parts = [package_digest(*_RUNNING).encode()]
@@ -69,14 +68,14 @@ def nodes_digest() -> str:
 
 
 def flight_digest(scenario: str, *, graph: bool = False) -> str:
-    """Return the digest of everything that the flight of ``scenario`` (name or path) depends on.
+    """Return the digest of everything on which the flight of a scenario depends.
 
     Args:
-        scenario: A shipped one's name, or a path.
-        graph: Flown by the nodes, whose code counts then.
+        scenario: Name of a shipped scenario, or a path.
+        graph: Whether the nodes fly the scenario, so that their code is included.
 
     Raises:
-        ScenarioError, DesignError: No such scenario, or its design is not there.
+        ScenarioError, DesignError: The scenario or its design does not exist.
     """
     design = find_design(load_scenario(scenario).design).read_bytes()
     code = [code_digest(), nodes_digest()] if graph else [code_digest()]
@@ -86,9 +85,9 @@ def flight_digest(scenario: str, *, graph: bool = False) -> str:
 def kept(
     path: Path, make: Callable[[], Result], save: Callable[[Path, Result], None], load: Callable[[Path], Result]
 ) -> Result:
-    """Return the contents of the file ``path``, whose name ends in a digest; if there is none, compute and store them.
+    """Return the contents of the file ``path``, whose name ends in a digest; compute and store them if it is missing.
 
-    A file is there only when it is whole, and what was kept under another digest is dropped.
+    The file is written atomically; files with another digest are removed.
     """
     if path.is_file():
         return load(path)
@@ -102,7 +101,7 @@ def kept(
 
 
 def drop_older(path: Path) -> None:
-    """Remove outdated files: those with the name of ``path`` and another digest."""
+    """Remove outdated files, which have the name of ``path`` with another digest."""
     name, _, rest = path.name.rpartition("_")
     for other in path.parent.glob(f"{name}_{'[0-9a-f]' * DIGITS}{rest[DIGITS:]}"):
         if other != path:
@@ -110,7 +109,7 @@ def drop_older(path: Path) -> None:
 
 
 def digest_of(parts: Iterable[bytes]) -> str:
-    """Return one digest of several contents."""
+    """Return one digest (SHA-256) for several contents."""
     total = hashlib.sha256()
     for part in parts:
         total.update(hashlib.sha256(part).digest())

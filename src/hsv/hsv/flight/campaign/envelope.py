@@ -1,4 +1,4 @@
-"""Envelopes of the curves of all flights, updated while they are flown; the curves themselves are not stored."""
+"""Envelopes of the curves of all flights, updated during a campaign; the curves themselves are not stored."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import numpy as np
 from hsv.flight.metrics import FlightCurves
 
 WINDOWS = 400
-"""Windows into which a flight is cut; of each, least and largest value are kept, so that no peak is lost."""
+"""Number of time windows of a flight; each keeps minimum and maximum, so that no peak is lost."""
 
 
 class Signal(NamedTuple):
-    """A curve of the page."""
+    """A curve of the campaign page: name and unit."""
 
     name: str
     unit: str
@@ -41,7 +41,11 @@ def signals(flight: FlightCurves) -> np.ndarray:
 
 @dataclass
 class Envelope:
-    """Least and largest value, sum of the windows' mean values (windows, signals), and number of flights (windows)."""
+    """Envelope of the curves of several flights by window.
+
+    ``low`` and ``high`` (windows, signals) are minimum and maximum, ``total`` (windows, signals) is the sum of the
+    flights' means; ``count`` (windows) is the number of flights.
+    """
 
     low: np.ndarray
     high: np.ndarray
@@ -55,7 +59,7 @@ class Envelope:
         return cls(np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape), np.zeros(windows))
 
     def add(self, flight: FlightCurves, steps: int) -> None:
-        """Take in a flight that was to last ``steps`` steps; one that diverged covers fewer windows."""
+        """Add a flight with a planned length of ``steps`` steps; a diverged flight covers fewer windows."""
         curves = signals(flight)
         rows = curves.shape[1]
         starts = window_starts(steps, len(self.count))
@@ -65,12 +69,12 @@ class Envelope:
         self.low[reached] = np.fmin(self.low[reached], np.fmin.reduceat(finite, starts, axis=1).T)
         self.high[reached] = np.fmax(self.high[reached], np.fmax.reduceat(finite, starts, axis=1).T)
         means = np.add.reduceat(finite, starts, axis=1).T / np.diff(starts, append=rows)[:, None]
-        whole = np.isfinite(means).all(axis=1)
-        self.total[reached][whole] += means[whole]
-        self.count[reached] += whole
+        complete = np.isfinite(means).all(axis=1)
+        self.total[reached][complete] += means[complete]
+        self.count[reached] += complete
 
     def merge(self, other: Envelope) -> None:
-        """Take in all flights of ``other``."""
+        """Add all flights of ``other``."""
         self.low = np.fmin(self.low, other.low)
         self.high = np.fmax(self.high, other.high)
         self.total += other.total
@@ -78,20 +82,20 @@ class Envelope:
 
     @property
     def mean(self) -> np.ndarray:
-        """Mean over the flights that reached a window (windows, signals); not a number where none did."""
+        """Mean (windows, signals) over the flights that reached a window; NaN if none did."""
         with np.errstate(invalid="ignore"):
             return np.where(self.count[:, None] > 0.0, self.total / np.maximum(self.count, 1.0)[:, None], np.nan)
 
     def encode(self) -> str:
-        """Return the envelope as text."""
+        """Return the envelope as base64 text."""
         return base64.b64encode(np.column_stack((self.low, self.high, self.total, self.count)).tobytes()).decode()
 
     @classmethod
     def decode(cls, text: str) -> Self:
-        """Return the envelope that :meth:`encode` wrote.
+        """Return the envelope from the text of :meth:`encode`.
 
         Raises:
-            ValueError: It has other signals or windows.
+            ValueError: The number of signals or windows differs.
         """
         s = len(SIGNALS)
         table = np.frombuffer(base64.b64decode(text)).reshape(WINDOWS, 3 * s + 1).copy()
@@ -100,7 +104,7 @@ class Envelope:
 
 @lru_cache(maxsize=8)
 def window_starts(steps: int, windows: int = WINDOWS) -> np.ndarray:
-    """Return the first step of each window of a flight of ``steps`` steps, at most ``windows`` of them."""
+    """Return the first step of each window (at most ``windows``) of a flight of ``steps`` steps."""
     starts = np.unique(np.linspace(0, steps + 1, windows, endpoint=False).astype(int))
     starts.setflags(write=False)
     return starts

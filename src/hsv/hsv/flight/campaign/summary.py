@@ -1,4 +1,4 @@
-"""Summary of a campaign: the share of flights within each limit, with its confidence, and the worst flights."""
+"""Summary of a campaign: share of flights within each limit with its confidence interval, and the worst flights."""
 
 from __future__ import annotations
 
@@ -27,32 +27,32 @@ if TYPE_CHECKING:
 CONFIDENCE = 0.95
 
 CRASHED, DIVERGED = ENDED = ("crashed", "diverged")
-"""Rows that replace a limit: how a flight ended that did not finish."""
+"""Names that replace the limit of a flight that did not reach its end."""
 
 TUBE_LIMIT = 1.0
-"""Level of e - c up to which the error is in the set."""
+"""Largest level of e - c inside the invariant set."""
 
 
 @dataclass(frozen=True)
 class Share:
-    """Number of flights that satisfy a limit (SI, ``None`` for a yes-or-no statement), and the interval (95 %)."""
+    """Number of flights within a limit (SI; ``None`` for a yes-or-no statement), with the 95 % confidence interval."""
 
     name: str
     limit: float | None
     within: int
     flights: int
     interval: tuple[float, float] | None
-    """Clopper-Pearson; ``None`` for corners, which are all there are and no sample of anything."""
+    """Clopper-Pearson interval; ``None`` for corners, which are not a random sample."""
 
     @property
     def fraction(self) -> float:
-        """Share of the flights."""
+        """Share of the flights within the limit, from 0 to 1."""
         return self.within / self.flights
 
 
 @dataclass(frozen=True)
 class WorstFlight:
-    """A flight, the limit it comes closest to or breaks most, and value over limit (infinite: it did not end)."""
+    """A flight, the limit with its largest ratio of value to limit, and that ratio; infinite if it did not finish."""
 
     flight: int
     limit: str
@@ -61,17 +61,17 @@ class WorstFlight:
 
 
 class Results:
-    """The result file of a campaign, read back; only :attr:`sample_runner` loads a controller."""
+    """The results of a campaign from its file; only :attr:`sample_runner` loads a controller."""
 
     def __init__(self, path: Path, *, trust: bool = False) -> None:
         """Read ``path``.
 
         Args:
             path: The result file.
-            trust: Whether code that the file names may run, see :mod:`hsv.flight.trust`.
+            trust: Whether code named in the file may run, see :mod:`hsv.flight.trust`.
 
         Raises:
-            CampaignError: The file is missing, not the result of a campaign, or that of another version.
+            CampaignError: The file is missing, is not the result of a campaign, or has another version.
         """
         self.path = path
         self.trust = trust
@@ -82,25 +82,25 @@ class Results:
 
     @property
     def flyable(self) -> bool:
-        """Whether flights may be repeated: the controller is registered here, or the file is trusted."""
+        """Whether flights can be repeated: the controller is registered here, or the file is trusted."""
         return self.trust or not names_code(self.campaign.scenario.controller)
 
     @cached_property
     def sample_runner(self) -> SampleRunner:
-        """The sample runner that replays flights of the campaign; its first use loads the controller.
+        """The sample runner that repeats flights of the campaign; its first use loads the controller.
 
         Raises:
-            ParameterError: The file names the controller's code, and is not trusted.
+            ParameterError: The file names the code of a controller and is not trusted.
         """
         require_trust(self.campaign.scenario.controller, self.path, self.trust)
         return SampleRunner(self.campaign)
 
     def column(self, name: str) -> np.ndarray:
-        """Return a column (flights); numbers that a flight does not define are not a number."""
+        """Return a column (flights); values that a flight does not define are NaN."""
         return np.asarray(self._column(name).to_numpy())
 
     def frame(self) -> DataFrame:
-        """Return the whole file as a table: a row per flight, the units (SI) of its columns in ``attrs["units"]``."""
+        """Return the file as a table with one row per flight; ``attrs["units"]`` has the units (SI) of the columns."""
         table = self._read()
         frame = table.to_pandas()
         frame.attrs["units"] = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
@@ -108,19 +108,19 @@ class Results:
 
     @property
     def crashed(self) -> np.ndarray:
-        """Whether its controller ended a flight (flights)."""
+        """Mask (flights) of the flights ended by a failure of the controller."""
         return np.asarray(self._column("crashed").is_valid())
 
     @property
     def samples(self) -> np.ndarray:
-        """The samples (flights, factors)."""
+        """Samples of the factors (flights, factors), SI."""
         return np.column_stack([self.column(f"sample_{factor.name}") for factor in self.campaign.factors])
 
     def row(self, flight: int) -> dict[str, Any]:
-        """Return the row of a flight.
+        """Return the row of a flight by column.
 
         Raises:
-            CampaignError: There is no such flight.
+            CampaignError: The campaign has no such flight.
         """
         if not 0 <= flight < self.campaign.samples:
             raise CampaignError(f"flight = {flight}: expected 0 to {self.campaign.samples - 1}")
@@ -130,12 +130,12 @@ class Results:
         return dict(rows[0])
 
     def sample(self, flight: int) -> dict[str, float]:
-        """Return the recorded sample of a flight, by factor; errors as :meth:`row`."""
+        """Return the recorded sample of a flight by factor; errors as for :meth:`row`."""
         row = self.row(flight)
         return {factor.name: row[f"sample_{factor.name}"] for factor in self.campaign.factors}
 
     def file(self, flight: int, **replaced: str) -> str:
-        """Return the scenario of a flight as a file, with values ``replaced`` by key; errors as :meth:`row`."""
+        """Return the text of a flight's scenario file, with values ``replaced`` by key; errors as for :meth:`row`."""
         return self.campaign.file(flight, list(self.sample(flight).values()), **replaced)
 
     def _column(self, name: str) -> pa.ChunkedArray:
@@ -155,7 +155,7 @@ class Results:
 
 
 def limits(results: Results) -> dict[str, float]:
-    """Return the limits (SI) to hold flights against: those of the scenario, and the tube where there is a set."""
+    """Return the limits (SI) of the campaign by metric: those of the scenario, and the tube if there is a set."""
     stated = dict(results.campaign.scenario.limits)
     if np.any(np.isfinite(results.column("tube_level"))):
         stated["tube_level"] = TUBE_LIMIT
@@ -163,7 +163,7 @@ def limits(results: Results) -> dict[str, float]:
 
 
 def within_all(results: Results) -> int:
-    """Return how many flights come to their end within every limit; an undefined metric is not within."""
+    """Return the number of flights that finish within every limit; an undefined metric is not within its limit."""
     within = ~(results.column("diverged") | results.crashed)
     for name, limit in limits(results).items():
         within &= np.abs(results.column(name)) <= limit
@@ -171,12 +171,15 @@ def within_all(results: Results) -> int:
 
 
 def shares(results: Results) -> list[Share]:
-    """Return the share of flights that come to their end, and within each limit; an undefined metric is not within."""
-    flown = ~(results.column("diverged") | results.crashed)
-    rows = [_share(results.campaign, "flown_to_the_end", None, flown)]
+    """Return the share of flights that finish, and that finish within each limit.
+
+    An undefined metric is not within its limit.
+    """
+    finished = ~(results.column("diverged") | results.crashed)
+    rows = [_share(results.campaign, "flown_to_the_end", None, finished)]
     for name, limit in limits(results).items():
-        # A comparison with what is not a number is false.
-        rows.append(_share(results.campaign, name, limit, flown & (np.abs(results.column(name)) <= limit)))
+        # A comparison with NaN is false.
+        rows.append(_share(results.campaign, name, limit, finished & (np.abs(results.column(name)) <= limit)))
     return rows
 
 
@@ -186,7 +189,7 @@ def _share(campaign: Campaign, name: str, limit: float | None, within: np.ndarra
 
 
 def clopper_pearson(count: int, n: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Return the exact interval of a probability of which ``count`` of ``n`` independent trials were seen."""
+    """Return the exact confidence interval of a probability after ``count`` successes in ``n`` independent trials."""
     from scipy.stats import binomtest
 
     interval = binomtest(count, n).proportion_ci(confidence, method="exact")
@@ -194,7 +197,7 @@ def clopper_pearson(count: int, n: int, confidence: float = CONFIDENCE) -> tuple
 
 
 def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
-    """Return the flights with the largest metric over limit; first those that crashed, then diverged (earliest)."""
+    """Return the worst flights: crashed ones, then diverged ones by time, then by the ratio of value to limit."""
     stated = {name: limit for name, limit in limits(results).items() if limit > 0.0}
     diverged, crashed, end = results.column("diverged"), results.crashed, results.column("end_time")
     ratios = np.zeros((len(diverged), len(stated) or 1))
@@ -222,7 +225,7 @@ def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
 
 @dataclass(frozen=True)
 class Distribution:
-    """A metric over all flights that define it: unit (SI), least, median, 95th percentile, largest, mean."""
+    """Statistics of a metric over the number of ``flights`` that define it, in its ``unit`` (SI)."""
 
     name: str
     unit: str
@@ -235,7 +238,7 @@ class Distribution:
 
 
 def distributions(results: Results) -> list[Distribution]:
-    """Return the distribution of every outcome that any flight defines."""
+    """Return the distribution of every outcome that at least one flight defines."""
     found = []
     for name, unit in OUTCOMES.items():
         values = results.column(name)
