@@ -151,8 +151,8 @@ def test_a_batch_that_ends_its_worker_is_named_and_ends_the_campaign_and_not_the
     before = dict(os.environ)
     with make_executor(2) as workers:
         with pytest.raises(RunError, match=r"^campaign: flight 3: the worker process ended; what is finished is kept$"):
-            list(workers.fly(end_of_the_third, "", range(8), "flight {}".format))
-        assert dict(workers.fly(length_of, "text", range(8))) == dict.fromkeys(range(8), b"4")
+            list(workers.fly(end_of_the_third, "", range(4), "flight {}".format))
+        assert dict(workers.fly(length_of, "text", range(2))) == dict.fromkeys(range(2), b"4")
         pids = workers.pids()
     assert dict(os.environ) == before and not any(map(alive, pids))
 
