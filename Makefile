@@ -9,7 +9,7 @@ SCENARIO ?= case1
 ARGS ?=
 PYTHON_SOURCES := src ros_ws/src tests tools
 PYTEST := source ./env.sh && python3 -m pytest
-INSTALL = source ./env.sh && python3 -m pip install --quiet --constraint constraints$$([ "$$ROS_DISTRO" = jazzy ] && echo -jazzy).txt
+INSTALL = source ./env.sh && python3 -m pip install --quiet --constraint constraints$$(grep -qs ^jazzy .venv/hsv-setup && echo -jazzy).txt
 NOT_IN_TEST := long or fuzz or full_ros or portability
 
 help: ## list these commands

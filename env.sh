@@ -3,7 +3,7 @@
 # harmless.
 
 _hsv_env() {
-    local shell="$1" root route nounset=""
+    local shell="$1" root route sourced=wheels nounset=""
     root="$(cd "$(dirname "$2")" >/dev/null && pwd -P)" || return 1
     if [ "${HSV_ROOT:-$root}" != "$root" ]; then
         echo "env.sh: this shell already uses the checkout in $HSV_ROOT; open a new one" >&2
@@ -14,8 +14,10 @@ _hsv_env() {
         return 1
     fi
     read -r route _ < "$root/.venv/hsv-setup"
-    if [ "$route" != "${ROS_DISTRO:-wheels}" ]; then
-        echo "env.sh: set up for ROS from $route, this shell has ${ROS_DISTRO:-wheels}: source that, or make setup again" >&2
+    # An official ROS image sets ROS_DISTRO in every terminal, also where no installation is sourced.
+    [ -z "${AMENT_PREFIX_PATH:-}" ] || sourced="${ROS_DISTRO:-wheels}"
+    if [ -z "${HSV_ROOT:-}" ] && [ "$route" != "$sourced" ]; then
+        echo "env.sh: set up for ROS from $route, this shell has $sourced: source that, or make setup again" >&2
         return 1
     fi
 

@@ -1,6 +1,7 @@
 """The documentation's build (make docs)."""
 
 import re
+import shutil
 import sys
 from pathlib import Path
 
@@ -38,6 +39,8 @@ autodoc_default_options = {"members": True}
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 autosummary_generate = True
+# Pages of modules that are gone would not build.
+shutil.rmtree(Path(__file__).parent / "reference" / "generated", ignore_errors=True)
 autosummary_context = {"modules_of": reference_pages.modules_of}
 napoleon_numpy_docstring = False
 python_use_unqualified_type_names = True

@@ -219,9 +219,16 @@ def set_up(route: str, env: dict[str, str]) -> None:
                 (INSTALL / name / "hsv-setup").write_text(keys[name])
 
 
+def sourced_distribution() -> str:
+    """Return the sourced ROS distribution, or ``wheels``; official images set ROS_DISTRO without sourcing anything."""
+    prefixes = map(Path, filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)))
+    sourced = any(not prefix.is_relative_to(ROOT) for prefix in prefixes)
+    return (sourced and os.environ.get("ROS_DISTRO")) or "wheels"
+
+
 def main() -> int:
     """Set up, one process at a time; return the exit code."""
-    start, route = time.monotonic(), os.environ.get("ROS_DISTRO") or "wheels"
+    start, route = time.monotonic(), sourced_distribution()
     if sys.prefix != sys.base_prefix:  # the interpreter of the environment itself, or of another one
         os.execve(BASE, [BASE, *sys.argv], clean_environment(route))
     if route not in ROUTES:

@@ -19,6 +19,17 @@ def test_a_text_is_read_whole(tmp_path):
     assert read_text(path) == "Ünits\nμ\n"
 
 
+def test_a_byte_order_mark_and_the_line_ends_of_windows_are_no_part_of_a_text(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_bytes(b"\xef\xbb\xbfextends = 'case1'\r\nduration = '6 s'\r\n")
+    assert parse_toml(read_text(path)) == {"extends": "case1", "duration": "6 s"}
+
+
+def test_numbers_of_yaml_are_those_of_ros():
+    text = "[5665e-11, 1e5, -2E+4, .5e2, 1.5e3, 1e5x, e5, '1e5', 10]"
+    assert parse_yaml(text) == [5665e-11, 1e5, -2e4, 50.0, 1500.0, "1e5x", "e5", "1e5", 10]
+
+
 def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     for path in (tmp_path / "pipe", Path("/dev/zero")):

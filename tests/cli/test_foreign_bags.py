@@ -59,6 +59,28 @@ def test_a_topic_of_another_type_or_definition(
     assert ran.code == 2 and said in ran.error and str(made) in ran.error
 
 
+def test_definitions_may_have_the_line_ends_of_windows_or_be_empty(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
+    def written(topic: Topic) -> Topic:
+        if topic.name == "/rosout":
+            return replace(topic, type="std_msgs/msg/Empty", definition="")
+        return replace(topic, definition=topic.definition.replace("\n", "\r\n"))
+
+    made = changed_bag(bag, tmp_path / "made", written)
+    assert "identical" in hsv("diff", str(bag), str(made)).out
+    assert hsv("info", str(made)).code == 0
+    assert hsv("export", str(made), "--csv", "--topic", "/hsv/state", "--out", "tables").code == 0
+    assert '"altitude [m]"' in (tmp_path / "tables" / "hsv_state.csv").read_text()
+
+
+def test_a_bag_of_sqlite3_is_refused_with_the_command_that_converts_it(hsv: Hsv, tmp_path: Path) -> None:
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "old_0.db3").write_bytes(b"SQLite format 3\0")
+    for path in ("old", "old/old_0.db3"):
+        ran = hsv("info", path)
+        assert ran.code == 2
+        assert f"{path}: recorded with sqlite3, expected MCAP: ros2 bag convert -i {path} " in ran.error
+
+
 @pytest.mark.parametrize(
     ("kind", "field", "commands"),
     [

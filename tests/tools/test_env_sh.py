@@ -56,9 +56,17 @@ def test_nodes_have_a_place_for_their_logs_without_a_home():
 
 
 def test_another_sourced_ros_is_refused():
-    result = shell("bash", f"source '{ROOT}/env.sh'", ROS_DISTRO="humble")
+    humble = {"ROS_DISTRO": "humble", "AMENT_PREFIX_PATH": "/opt/ros/humble"}
+    result = shell("bash", f"source '{ROOT}/env.sh'", **humble)
     assert result.returncode == 1
     assert "humble" in result.stderr or "Jazzy" in result.stderr
+
+
+@pytest.mark.parametrize("name", SHELLS)
+def test_a_distribution_that_is_named_but_not_sourced_does_not_count(name):
+    script = f"source '{ROOT}/env.sh' && source '{ROOT}/env.sh' && python3 -c 'import rclpy, hsv_msgs'"
+    result = shell(name, script, ROS_DISTRO="jazzy")
+    assert (result.returncode, result.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("name", SHELLS)

@@ -35,7 +35,7 @@ WITHOUT_KEY = {
     "pyarrow",
 }
 WITHOUT_KEY |= {"rosbags", "tomli_w", "websockets", "zstandard"}
-"""Modules of notebooks, or for which rosdep has no key of a Debian package that will do, as docs/installation.md says."""
+"""Modules of notebooks, or for which rosdep has no key of a Debian package that will do; see docs/installation.md."""
 
 
 def imported(folder: Path) -> set[str]:

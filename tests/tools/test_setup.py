@@ -50,9 +50,18 @@ def test_an_old_cmake_is_missing(tmp_path):
 
 def test_another_ros_distribution_is_refused_in_one_line():
     command = [sys.executable, ROOT / "tools" / "setup.py"]
-    ran = subprocess.run(command, env={**os.environ, "ROS_DISTRO": "humble"}, capture_output=True, text=True)
+    sourced = {"ROS_DISTRO": "humble", "AMENT_PREFIX_PATH": "/opt/ros/humble"}
+    ran = subprocess.run(command, env={**os.environ, **sourced}, capture_output=True, text=True)
     assert (ran.returncode, ran.stdout) == (1, "")
     assert ran.stderr.startswith("make setup: ROS_DISTRO=humble is sourced") and ran.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("prefixes", "route"), [("", "wheels"), (f"{ROOT}/.venv", "wheels"), (f"{ROOT}/.venv:/opt/ros/jazzy", "jazzy")]
+)
+def test_a_distribution_counts_where_it_is_sourced(monkeypatch, prefixes, route):
+    monkeypatch.setattr(os, "environ", {"ROS_DISTRO": "jazzy", "AMENT_PREFIX_PATH": prefixes})
+    assert setup.sourced_distribution() == route
 
 
 def test_the_set_up_does_not_depend_on_what_the_shell_has_sourced(monkeypatch):

@@ -54,6 +54,11 @@ def find_files(path: Path) -> tuple[list[Path], list[str]]:
     Raises:
         RecordingError: There is none, or no telling which belong together.
     """
+    if path.suffix == ".db3" or (path.is_dir() and any(path.glob("*.db3"))):
+        raise RecordingError(
+            f"{path}: recorded with sqlite3, expected MCAP: ros2 bag convert -i {path} -o mcap.yaml makes it, and "
+            "docs/replay.md has that file"
+        )
     if path.is_file():
         return [path], []
     if not path.is_dir():

@@ -14,6 +14,9 @@ from hsv.flight.fingerprint import fingerprint
 from hsv.flight.metrics import FlightData
 from hsv.model.signals import STATE_NAMES
 
+MEASURED = (STATE, NOMINAL, COMMAND, ACTUATOR)
+"""Topics from which the metrics are computed."""
+
 
 def labels(bags: Sequence[Bag]) -> list[str]:
     """Return a distinct name for each of ``bags``: its scenario, with as much of its path as necessary."""

@@ -254,7 +254,7 @@ class Bag:
 
     def _text(self, schema: Schema) -> str:
         try:
-            return schema.data.decode()
+            return schema.data.decode("utf-8-sig").replace("\r\n", "\n")
         except UnicodeDecodeError as error:
             raise RecordingError(f"{self.path}: a definition of a message is no text: {error}") from None
 

@@ -93,13 +93,13 @@ def read_bytes(path: Path, max_bytes: int | None = None) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Return the text in the file ``path``.
+    """Return the text in the file ``path``, without a byte order mark and with the line ends of Unix.
 
     Raises:
         DocumentError: See :func:`read_bytes`; or the file is not UTF-8.
     """
     try:
-        return read_bytes(path, MAX_BYTES).decode().replace("\r\n", "\n")
+        return read_bytes(path, MAX_BYTES).decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise DocumentError("cannot be read (not text)") from error
 
@@ -183,6 +183,12 @@ class _Loader(Composer, _Parser, SafeConstructor, Resolver):
                     raise _refused(f"the key {key.value!r} occurs twice", key)
                 seen.add((key.tag, key.value))
         return node
+
+
+# A number for ROS and YAML 1.2, but a text for YAML 1.1, which wants a point and a sign: 5665e-11.
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)[eE][-+]?\d+$"), list("-+.0123456789")
+)
 
 
 def _parsed(text: Any, parse: Callable[[Any], Any]) -> Any:

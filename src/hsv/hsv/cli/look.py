@@ -170,9 +170,12 @@ def info(
 
 
 def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, Any], RecordingError | None]:
-    """Return the contents of a bag, and the reason if its metrics are missing; print them unless as ``json``."""
+    """Return the contents of a bag, and the error if it is damaged; print them unless as ``json``.
+
+    A bag that lacks a topic, as ``ros2 bag record`` writes it with a filter, has no metrics.
+    """
     from hsv.bags.bag_warnings import completeness
-    from hsv.bags.flight import flight_data
+    from hsv.bags.flight import MEASURED, flight_data
     from hsv.bags.info import describe
     from hsv.base.errors import RecordingError
     from hsv.cli.summary import print_metrics
@@ -180,20 +183,25 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
 
     description = describe(opened)
     problem, remark = None, ""
+    lacking = [opened.name_of(topic) for topic in MEASURED if topic not in opened.roles]
+    metrics: dict[str, float] = {}
     try:
-        metrics, remark = flight_metrics(flight_data(opened)), completeness(opened)
+        if not lacking:
+            metrics, remark = flight_metrics(flight_data(opened)), completeness(opened)
     except RecordingError as error:
         # The other contents help to see what is wrong with the bag.
-        metrics, problem = {}, error
+        problem = error
     quantities = {name: (value, METRICS[name].unit) for name, value in metrics.items()}
     if not json:
         _print_description(description, units)
-        if not problem:
+        if lacking:
+            say(f"no metrics: they need {', '.join(lacking)}")
+        elif not problem:
             print_metrics(f"Metrics of an incomplete bag: {remark}" if remark else "Metrics", metrics, units)
     if not problem:
         print_bag_warnings(opened)
     measured = {"metrics_complete": not remark, "metrics": to_json(quantities, units)}
-    return description | ({"metrics": None} if problem else measured), problem
+    return description | ({"metrics": None} if problem or lacking else measured), problem
 
 
 def _print_description(description: dict[str, Any], units: UnitSystem) -> None:
