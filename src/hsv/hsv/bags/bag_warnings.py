@@ -1,4 +1,4 @@
-"""Warnings about readable but incomplete bags, for every page, plot, table and line that is made of one."""
+"""Warnings about readable but incomplete bags, for pages, plots, tables and messages."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from hsv.bags.steps import complete_stamps, expected_stamps, irregularities
 from hsv.base.errors import RecordingError
 
 _NAMED = 3
-"""Files and damages that are named; of more, how many there are."""
+"""Maximum number of files and of damages listed by name; further ones are counted."""
 
 
 def bag_warnings(bag: Bag) -> list[str]:
-    """Return the warnings of a bag in words: damage, a missing end, missing topics, missing steps of a topic."""
+    """Return the warnings about a bag: damage, a missing end, missing topics, and topics with missing steps."""
     words = loss_in_words(bag.loss)
     if any(map(being_recorded, bag.files)):
         words.append(f"is still being recorded, {bag.span[1] * 1e-9:.2f} s so far: the end of its recorder closes it")
@@ -32,7 +32,7 @@ def bag_warnings(bag: Bag) -> list[str]:
 
 
 def loss_in_words(loss: Loss) -> list[str]:
-    """Return which files are missing in a bag, where it is damaged, and how much of it cannot be read."""
+    """Return messages about the missing files of a bag, its damages, and its lost messages and attachments."""
     words = [f"lacks its file {name}" for name in loss.files[:_NAMED]]
     if (more := len(loss.files) - _NAMED) > 0:
         words.append(f"lacks {more} more of its files")
@@ -49,7 +49,7 @@ def loss_in_words(loss: Loss) -> list[str]:
 
 
 def completeness(bag: Bag) -> str:
-    """Return of how many of its steps a bag has every topic, in words; empty if of all.
+    """Return the number of complete steps of a bag as text, such as ``"90 of 100 steps"``; empty if all are complete.
 
     Raises:
         RecordingError: A message does not fit its definition.

@@ -1,8 +1,8 @@
-"""Decoding all messages of a topic at once, into one array per field.
+"""Decode all messages of a topic at once into one array per field.
 
-Names of the columns are field paths such as ``header.stamp``. Times and durations become int64 nanoseconds; numbers
-arrays of shape (n,); arrays and sequences of numbers (n, length) or, where the lengths differ, objects; text and
-lists of messages objects, the latter lists of dictionaries.
+The names of the columns are field paths such as ``header.stamp``. Times and durations become int64 nanoseconds (n,),
+numbers arrays (n,), and arrays or sequences of numbers arrays (n, length). Arrays of objects (n,) hold texts, sequences
+of different lengths, and lists of messages as lists of dictionaries.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from hsv.bags.messages import ENCAPSULATION, MessageError, Structure
 from hsv.base.errors import RecordingError
 
 _TAIL = 3
-"""Bytes by which a message may be padded at its end."""
+"""Maximum padding at the end of a message, bytes."""
 _EMPTY_SEQUENCE_TAIL = 4
-"""rmw_fastrtps reserves room as if empty sequences were aligned like full ones, and serialize_message hands the
-surplus on; what is received over DDS does not have it."""
+"""Additional padding per empty sequence, bytes: serialize_message of rmw_fastrtps reserves space as if empty sequences
+were aligned like full ones. Messages received over DDS do not have it."""
 
 
 class Columns(dict[str, NDArray[Any]]):
-    """One array per field, by field path; reading a field that the definition does not have is a RecordingError."""
+    """Arrays by field path; reading a field that the definition does not have raises a RecordingError."""
 
     def __init__(self, source: str = "") -> None:
         super().__init__()
@@ -34,7 +34,7 @@ class Columns(dict[str, NDArray[Any]]):
         """Source of the messages, for error messages."""
 
     def rows(self, rows: NDArray[np.intp]) -> Columns:
-        """Return these rows of every column."""
+        """Return the chosen rows of every column."""
         chosen = Columns(self.source)
         chosen.update((name, column[rows]) for name, column in self.items())
         return chosen
@@ -44,17 +44,17 @@ class Columns(dict[str, NDArray[Any]]):
 
 
 def columns_at_once(types: Typesdict, message_type: str, messages: Sequence[bytes], source: str = "") -> Columns | None:
-    """Decode messages that all have the layout of the first, in milliseconds for ten thousand.
+    """Decode messages that all have the layout of the first; ten thousand take milliseconds.
 
     Args:
-        types: The definitions of the type and of those it depends on.
+        types: Definitions of the type and its dependencies.
         message_type: ``package/msg/Type``.
         messages: At least one message in CDR with its header.
-        source: Where the messages come from, for errors.
+        source: Source of the messages, for error messages.
 
     Returns:
-        The columns; None if the messages differ in layout, are big-endian, or have text or messages in a sequence: see
-        :func:`columns_one_by_one`.
+        The columns, or None if the messages differ in layout, are big-endian, or have texts or messages in a sequence;
+        then use :func:`columns_one_by_one`.
     """
     try:
         structure = Structure(types, message_type, messages[0])
@@ -73,14 +73,14 @@ def columns_at_once(types: Typesdict, message_type: str, messages: Sequence[byte
 
 
 def columns_one_by_one(types: Typesdict, message_type: str, messages: Sequence[object], source: str = "") -> Columns:
-    """Turn deserialized messages of any layout into the same columns as :func:`columns_at_once`."""
+    """Convert deserialized messages of any layout to the columns of :func:`columns_at_once`."""
     columns = Columns(source)
     _gather(types, message_type, messages, "", columns)
     return columns
 
 
 def _take(types: Typesdict, message_type: str, rows: NDArray[Any], prefix: str, columns: Columns) -> Columns:
-    """Add the columns of a type from a structured array of messages; lists of messages and texts are empty there."""
+    """Add the columns of a type from a structured array of messages, whose lists of messages and texts are empty."""
     for field in fields_of(types, message_type):
         path = prefix + field.name
         if field.format:

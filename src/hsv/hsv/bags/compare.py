@@ -1,4 +1,4 @@
-"""Comparing two tracks of one topic: count, order, bytes, and then every field of every message."""
+"""Compare two tracks of one topic: number, order and bytes of the messages, then every field."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Difference:
 
     topic: str
     step: int
-    """Step number that the message carries, or its row where it carries none."""
+    """Step number in the message, or the row of a message without one."""
     time_ns: int
     field: str
     expected: Any
@@ -33,24 +33,24 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Result of comparing two tracks; ``first`` is None if all is equal within the tolerance."""
+    """Result of a comparison of two tracks; ``first`` is None if all fields are equal within the tolerance."""
 
     topic: str
     expected_count: int
     actual_count: int
     common_count: int
-    """Messages of the same time, which are compared with each other."""
+    """Number of messages with equal times, which are compared with each other."""
     different_bytes: int
-    """Messages whose bytes differ, among those that both tracks have."""
+    """Number of common messages whose bytes differ."""
     different_padding: int = 0
-    """Number of those that differ only in padding: DDS leaves there whatever its buffers held before."""
+    """Number of common messages that differ in padding only; DDS does not initialise padding."""
     first: Difference | None = None
     largest: dict[str, float] = field(default_factory=dict)
-    """Largest |a - b| of each field that is not everywhere equal; not a number where it is no number that differs."""
+    """Largest |a - b| of each field with a difference; NaN for a field that is not a number."""
 
     @property
     def identical(self) -> bool:
-        """Whether the tracks are equal in every byte but padding."""
+        """Whether the tracks are equal in all bytes except padding."""
         return (
             self.expected_count == self.actual_count == self.common_count
             and self.different_bytes == self.different_padding
@@ -59,16 +59,16 @@ class Comparison:
 
 
 def compare(expected: Track, actual: Track, ignored: Sequence[str] = (), tolerance: float = 0.0) -> Comparison:
-    """Compare two tracks of one topic, the messages of one time with each other.
+    """Compare two tracks of one topic, message by message at equal times.
 
-    Numbers are equal where |a - b| <= max(tolerance, tolerance max(|a|, |b|)), both are NaN, or both are the same
-    infinity; integers, text and lists only where they are the same (lists of messages element by element as numbers).
+    Floating-point numbers count as equal if |a - b| <= max(tolerance, tolerance max(|a|, |b|)), if both are NaN, or if
+    both are the same infinity. Integers, texts and lists must be the same; lists of messages are compared by element.
 
     Args:
         expected: Recorded messages.
         actual: Messages to compare with them.
-        ignored: Field paths that do not count.
-        tolerance: Absolute and relative at once.
+        ignored: Field paths to ignore.
+        tolerance: Absolute and relative tolerance.
     """
     counts = len(expected.data), len(actual.data)
     found: list[Difference] = []
@@ -102,7 +102,7 @@ def compare(expected: Track, actual: Track, ignored: Sequence[str] = (), toleran
 
 
 def _apart(expected: Track, actual: Track) -> Difference:
-    """Return where two tracks of different times part: at a time that only one has, or where their order differs."""
+    """Return the first difference in time of two tracks: a time in only one of them, or a different order."""
     ours, theirs = expected.times, actual.times
     only = np.setxor1d(ours, theirs)
     swapped = (a for a, b in zip(ours, theirs, strict=False) if a != b)
@@ -119,7 +119,7 @@ def _apart(expected: Track, actual: Track) -> Difference:
 
 
 def _content(track: Track, message: bytes) -> bytes:
-    """Return a message serialized again from its fields, with zeros for padding."""
+    """Return the message serialized anew from its fields, with zero padding."""
     try:
         return bytes(track.types.serialize_cdr(track.types.deserialize_cdr(message, track.type), track.type))
     except SerdeError:

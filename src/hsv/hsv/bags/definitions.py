@@ -16,18 +16,19 @@ SEPARATOR = "=" * 80
 
 
 def definition(message_type: str) -> str:
-    """Return the definition of a type with those it depends on, in the ``ros2msg`` format of MCAP.
+    """Return the definition of a type with its dependencies, in the ``ros2msg`` format of MCAP.
 
     Args:
         message_type: ``package/msg/Type``; looked up as ``share/package/msg/Type.msg`` below each prefix of
             AMENT_PREFIX_PATH.
 
     Returns:
-        The root text, then for each dependency a line of 80 ``=``, a line ``MSG: package/Type`` and its text. Without
-        ``msg``, as rosbag2 writes it: Foxglove and Lichtblick look types up by what stands in the fields.
+        The text of the type, then for each dependency a line of 80 ``=``, a line ``MSG: package/Type`` and its text.
+        The name is without ``msg``, as in rosbag2, because Foxglove and Lichtblick look types up by the names in the
+        fields.
 
     Raises:
-        RecordingError: If the type or one of its dependencies is not installed or cannot be read.
+        RecordingError: The type or one of its dependencies is not installed or cannot be read.
     """
     texts: dict[str, str] = {}
     waiting = [message_type]
@@ -45,7 +46,7 @@ def type_hash(message_type: str) -> str:
     """Return the hash of a type (``RIHS01_`` and 64 digits) from its installed description.
 
     Raises:
-        RecordingError: If the type is not installed.
+        RecordingError: The type is not installed.
     """
     description = json.loads(_share_file(message_type, ".json").read_text(encoding="utf-8"))
     return next(str(row["hash_string"]) for row in description["type_hashes"] if row["type_name"] == message_type)

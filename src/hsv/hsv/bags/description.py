@@ -1,7 +1,7 @@
-"""The graph of nodes, described once: ``hsv run``, the launch file, the nodes and the replay all read this.
+"""Description of the node graph, shared by ``hsv run``, the launch file, the nodes and the replay.
 
-Topics and nodes stand here by their role. What a topic of a running graph is called depends on the namespace and the
-remappings of the nodes, and so does what a node is called; a bag says which of its topics plays which role.
+Topics and nodes are identified by their roles. Their names in a running graph depend on namespace and remappings; a bag
+records the names of its topics by role.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ PARAMETER_EVENTS = "/parameter_events"
 MARKERS = "hsv/airframe"
 """Topic of the airframe node for RViz2; no node of the graph uses it, and no bag contains it."""
 WIRE_ALIGNMENT = 4
-"""Messages sent over DDS are padded with zeros to a multiple of this number of bytes."""
+"""Alignment of the length of messages sent over DDS, bytes; they are padded with zeros."""
 INJECT_FAULT = "hsv/inject_fault"
 CLEAR_FAULT = "hsv/clear_fault"
 SET_COMMAND = "hsv/set_command"
@@ -54,8 +54,8 @@ TOPICS = {
     TUBE_STATUS: "hsv_msgs/msg/TubeStatus",
     ACTUATOR: "hsv_msgs/msg/Actuator",
 }
-"""Topics with exactly one message a step, in the order in which a step is recorded; which of them there are depends on
-the controller, see :func:`step_topics`."""
+"""Types of the step topics, which have exactly one message per step, in order of recording. A graph has those of its
+controller, see :func:`step_topics`."""
 
 CARRIED: dict[str, dict[SignalType, str]] = {
     MEASUREMENT: {signals.MEASUREMENT: "state", signals.STATUS: "status"},
@@ -81,18 +81,18 @@ CARRIED: dict[str, dict[SignalType, str]] = {
     TUBE_STATUS: {signals.DIAGNOSTICS: "level"},
     ACTUATOR: {signals.ACTUATOR: "fuel_equivalence_ratio", signals.ACTIVE_FAULTS: "active"},
 }
-"""The signals of the loop in the messages of a topic, and the field in which each one begins: the message within the
-message, the sequence, or the first of the consecutive numbers."""
+"""The signals in the messages of each topic, with the field at which each signal begins: a nested message, a sequence,
+or the first of several consecutive numbers."""
 
 TOPIC_OF = {signal.name: topic for topic, carried in CARRIED.items() for signal in carried}
-"""The topic that carries a signal, by its name; of one that is passed on, the last."""
+"""The topic of each signal by name; the last one for a signal that later topics repeat."""
 
 LATCHED_TOPICS = {
     RUN: "hsv_msgs/msg/Run",
     READY: "hsv_msgs/msg/Ready",
     REFERENCE: "hsv_msgs/msg/Reference",
 }
-"""Announcements that late joiners receive."""
+"""Types of the latched topics, whose last message late subscribers receive."""
 
 OTHER_TOPICS = {
     **LATCHED_TOPICS,
@@ -100,54 +100,54 @@ OTHER_TOPICS = {
     DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
     PARAMETER_EVENTS: "rcl_interfaces/msg/ParameterEvent",
 }
-"""Topics beside those with one message a step; recorded at the simulated time at which they arrive.
+"""Types of the other recorded topics, whose messages are recorded at the simulated time of their arrival.
 
-Those with a leading slash are ROS's own: every node of a domain has them under this name, in whatever namespace it is.
+Topics with a leading slash belong to ROS: they have the same name in every namespace.
 """
 
 LAST_STATE = "hsv/last_state"
-"""Topic on which the plant says, latched, with which state a run ended: finished, diverged, or running where it was
-broken off. One message a run, and not recorded: the bag holds the state itself."""
+"""Latched topic of the last state of a run, one message per run. Its status is finished, diverged, or running if the
+run was broken off. It is not recorded, because the bag contains the state."""
 
 INTERFACE_VERSION = 3
-"""Version of the messages and services, as ``hsv_msgs/msg/Run`` states it."""
+"""Version of the messages and services, as in ``hsv_msgs/msg/Run``."""
 
 EXIT_DIVERGED = 3
 """Exit code of the plant after a flight that left the range of the model."""
 
 LANDED = (0, EXIT_DIVERGED)
-"""Exit codes of the process that ends the run, when it has flown to the end."""
+"""Exit codes of the process that ends the run, after a flight that finished or diverged."""
 
 
 @dataclass(frozen=True)
 class NodeDescription:
-    """A node by its role: where its executable is and which step topics it publishes and subscribes."""
+    """A node by its role: its executable, and the step topics that it publishes and subscribes to."""
 
     name: str
-    """The role, and the node's name unless it is remapped."""
+    """Role, and name of the node unless it is remapped."""
     package: str
     executable: str
     publishes: tuple[str, ...]
-    """Topics in the order in which a step publishes them, those that others wait for first."""
+    """Published step topics in the order of publication in a step."""
     subscribes: tuple[str, ...]
     known_by: str = ""
-    """Type of a message that only this role publishes: who does plays the role, whatever it and its topics are called.
+    """Type of a message that only this role publishes. It identifies the node, whose name and topics may be remapped.
 
-    Empty for what is not a node of the graph.
+    Empty for a process that is not a node of the graph.
     """
 
     announces: tuple[str, ...] = ()
     """Further topics that only this role publishes, not in every step."""
     block: Block | None = None
-    """Block that the node steps, if any."""
+    """Block of the loop that the node steps, if any."""
     delayed: tuple[str, ...] = ()
-    """Subscribed topics whose message of the previous step is taken."""
+    """Subscribed topics of which the node uses the message of the previous step."""
     foreign: bool = False
-    """Whether it is not one of this bench's: it knows the messages alone, and announces itself to nobody."""
+    """Whether the node is external: it uses the messages only and does not announce itself."""
 
     @property
     def label(self) -> str:
-        """Name of the process in words: its role, or what was started if it is not a node of this bench."""
+        """Display name of the process: its role, or package and executable of an external node."""
         return f"{self.package}/{self.executable}" if self.foreign else self.name
 
     @property
@@ -168,18 +168,18 @@ RECORDER = NodeDescription(
 
 
 def _publisher(topic: str) -> Block:
-    """Return the last block of the loop that makes a signal of a topic; the other signals are passed on."""
+    """Return the block that publishes a topic: the last in the loop with an output among its signals."""
     return next(block for block in reversed(LOOP) if set(block.outputs) & set(CARRIED[topic]))
 
 
-def _carrying(wanted: Iterable[SignalType]) -> tuple[str, ...]:
-    """Return the fewest topics that carry these signals together, of as few the first."""
+def _carrying(required: Iterable[SignalType]) -> tuple[str, ...]:
+    """Return the smallest set of topics that contains all ``required`` signals; the first one if there are several."""
     choices = (chosen for count in range(len(CARRIED) + 1) for chosen in combinations(CARRIED, count))
-    return next(chosen for chosen in choices if set(wanted) <= {s for topic in chosen for s in CARRIED[topic]})
+    return next(chosen for chosen in choices if set(required) <= {s for topic in chosen for s in CARRIED[topic]})
 
 
 def _stepping(block: Block, package: str, first: str, **others: Any) -> NodeDescription:
-    """Return the node that steps ``block``, known by the type of the topic ``first``."""
+    """Return the node that steps ``block``; the type of the topic ``first`` identifies it."""
     publishes = tuple(topic for topic in CARRIED if _publisher(topic) is block)
     needed = _carrying((*block.inputs, *block.delayed))
     delayed = tuple(topic for topic in needed if not {*CARRIED[topic]} & {*block.inputs})
@@ -190,7 +190,7 @@ def _stepping(block: Block, package: str, first: str, **others: Any) -> NodeDesc
 
 
 ESTIMATOR = _stepping(blocks.NOTCH_FILTER, "hsv_ctrl", FILTERED_STATE)
-"""The node of the notch filter where an estimator flies, which is told the commands."""
+"""The notch filter node with an estimator, which also subscribes to the commands."""
 
 NOTCH_FILTER = replace(ESTIMATOR, subscribes=_carrying(blocks.NOTCH_FILTER.inputs), delayed=())
 NOMINAL_TRAJECTORY = _stepping(blocks.NOMINAL_TRAJECTORY, "hsv_ctrl", NOMINAL, announces=(REFERENCE,))
@@ -199,10 +199,10 @@ FAULT_INJECTOR = _stepping(blocks.FAULT_INJECTOR, "hsv_plant", ACTUATOR)
 _TUBE = _stepping(blocks.CONTROLLER, "hsv_ctrl", COMMAND)
 
 CONTROLLER = replace(_TUBE, publishes=(COMMAND,))
-"""Flies any controller of a class of one's own, named by the parameter ``controller``."""
+"""The node of a custom controller class, named by the parameter ``controller``."""
 
 TUBE_MPC, ROBUST_MPC = (replace(_TUBE, name=name, executable=name) for name in ("tube_mpc", "robust_mpc"))
-"""Controllers with a node and a name of their own, which publish diagnostics of the tube, too."""
+"""Controllers with their own node, which publish diagnostics of the tube as well."""
 
 CONTROLLERS = {node.name: node for node in (TUBE_MPC, ROBUST_MPC)}
 
@@ -219,20 +219,20 @@ PLAYER = NodeDescription("player", "hsv_bringup", "player", (), ())
 """Process outside the graph that republishes a bag."""
 
 LIVE = NodeDescription("live", "hsv_bringup", "live", (), ())
-"""Process outside the graph that shows a running flight. No node waits for it, and it ends with the others."""
+"""Process outside the graph that displays a running flight. No node waits for it; it ends with the others."""
 
 FAULT, SET_COMMAND_CLIENT, SET_PARAMETER, TOPIC, WATCH = (
     NodeDescription(f"hsv_{name}", "hsv_bringup", name, (), ())
     for name in ("fault", "set_command", "set_parameter", "topic", "watch")
 )
-"""Processes outside the graph: commands that act on a running one."""
+"""Processes outside the graph: commands that act on a running graph."""
 
 
 def controller_node(controller: str) -> NodeDescription:
-    """Return the node of a controller, named as in a scenario.
+    """Return the node of a controller by its name in a scenario.
 
     Raises:
-        ParameterError: A node without a package or an executable.
+        ParameterError: The name of an external node lacks package or executable.
     """
     if not controller.startswith(NODE):
         return CONTROLLERS.get(controller, CONTROLLER)
@@ -245,7 +245,7 @@ def controller_node(controller: str) -> NodeDescription:
 
 
 def flown_role(role: NodeDescription, estimator: bool) -> NodeDescription:
-    """Return what ``role`` is in a graph with or without an ``estimator``."""
+    """Return the description of ``role`` in a graph with or without an ``estimator``."""
     return ESTIMATOR if estimator and role.name == ESTIMATOR.name else role
 
 
@@ -256,13 +256,13 @@ def graph(controller: str = TUBE_MPC.name, estimator: bool = False) -> tuple[Nod
 
 
 def step_topics(controller: str) -> tuple[str, ...]:
-    """Return the topics with one message a step in a graph with the named controller, in order of recording."""
+    """Return the step topics of a graph with the named controller, in order of recording."""
     published = {topic for node in graph(controller) for topic in node.publishes}
     return tuple(topic for topic in TOPICS if topic in published)
 
 
 def peers(me: NodeDescription, controller: str, recorded: bool, estimator: bool = False) -> list[NodeDescription]:
-    """Return the other nodes of the graph that ``me`` flies in, the recorder only if ``recorded``."""
+    """Return the other nodes of the graph of ``me``; the recorder is included if ``recorded``."""
     nodes = graph(me.name if me.name in CONTROLLERS else controller, estimator)
     return [node for node in nodes if node.name != me.name and (recorded or node is not RECORDER)]
 
@@ -270,7 +270,7 @@ def peers(me: NodeDescription, controller: str, recorded: bool, estimator: bool 
 def links(
     me: NodeDescription, controller: str, recorded: bool, estimator: bool = False
 ) -> list[tuple[str, NodeDescription]]:
-    """Return the (topic, other node) pairs that ``me`` must be matched with, the recorder's if ``recorded``."""
+    """Return the (topic, other node) pairs that ``me`` must be matched with, those of the recorder if ``recorded``."""
     return [
         (topic, other)
         for topic in TOPICS
@@ -280,22 +280,22 @@ def links(
 
 
 ROOT = "/"
-"""The namespace of a graph that is not moved."""
+"""The default namespace of a graph."""
 
 LONGEST_NAMESPACE = 200
-"""Characters; DDS takes some 250 for a whole topic or service, of which the longest name below takes its part."""
+"""Maximum number of characters; DDS admits about 250 for a complete name of a topic or service."""
 
 
 def resolved(topic: str, namespace: str = ROOT) -> str:
-    """Return the full name that a topic or service has in ``namespace``, unless it is remapped."""
+    """Return the full name of a topic or service in ``namespace`` without remapping."""
     return topic if topic.startswith("/") else f"{namespace.rstrip('/')}/{topic}"
 
 
 def checked_namespace(text: str) -> str:
-    """Return a namespace as ROS 2 writes it, with its leading slash.
+    """Return a namespace with its leading slash.
 
     Raises:
-        ParameterError: It is none by the rules of ROS 2.
+        ParameterError: The text is not a namespace by the rules of ROS 2.
     """
     name = text if text.startswith("/") else f"/{text}"
     if name != ROOT and not re.fullmatch(r"(/[A-Za-z_][A-Za-z0-9_]*)+", name):

@@ -1,4 +1,4 @@
-"""Sensors, links, effectors and air in a bag that are not ideal."""
+"""Deviations of sensors, links, effectors and air from the ideal in a bag."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from hsv.bags.reader import Bag
 from hsv.model.signals import INPUT_NAMES, STATE_NAMES
 
 CALM_AIR = {"wind_forward": 0.0, "wind_up": 0.0, "density_factor": 1.0}
-"""Fields of the air, with their values in calm air."""
+"""Fields of the air and their values in calm air."""
 
 _EFFECTOR = "effector."
 
 
 def equipment_topics(bag: Bag) -> list[str]:
-    """Return the topics that the functions below read, of those that are in ``bag``."""
+    """Return the topics in ``bag`` that the functions of this module read."""
     return [topic for topic in (STATE, MEASUREMENT, COMMAND, ACTUATOR, FORCES) if topic in bag.roles]
 
 
 def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return measurement less truth (n), SI, of the states where they differ in any step.
+    """Return the measurement error (n), SI, of each state with an error in any step.
 
     Args:
-        topics: Columns of the topics of :func:`equipment_topics`, rows of the same steps.
+        topics: Columns of the topics of :func:`equipment_topics`, with equal steps row by row.
     """
     if MEASUREMENT not in topics:
         return {}
@@ -36,9 +36,9 @@ def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def held(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the steps (n) in which a link held all of its old payload although a newer one was due.
+    """Return masks (n) of the steps in which the link of measurement or command held its old payload.
 
-    Of measurement and command, where there are any; arguments as of :func:`measurement_errors`.
+    A link without such steps is omitted; the argument is that of :func:`measurement_errors`.
     """
     ends = {}
     if MEASUREMENT in topics:
@@ -50,33 +50,33 @@ def held(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def _repeats(rows: np.ndarray) -> np.ndarray:
-    """Return which of the ``rows`` (n, m) are those before."""
+    """Return the mask (n) of the ``rows`` (n, m) that equal the previous row."""
     return np.append(False, (rows[1:] == rows[:-1]).all(axis=1))[: len(rows)]
 
 
 def effectors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the positions (n), SI, of effectors that differed from the command, over the period of a step.
+    """Return the positions (n), SI, over the period of each step, of the effectors that differ from their command.
 
-    The last is not known, NaN; arguments as of :func:`measurement_errors`.
+    The last position is NaN; the argument is that of :func:`measurement_errors`.
     """
     if ACTUATOR not in topics:
         return {}
-    told = dict(zip(INPUT_NAMES, input_columns(topics[ACTUATOR]).T, strict=True))
-    were = {name: _over_the_period(topics, f"{_EFFECTOR}{name}") for name in INPUT_NAMES}
-    return {name: y for name, y in were.items() if len(y) and (np.isfinite(y) & (y != told[name])).any()}
+    commanded = dict(zip(INPUT_NAMES, input_columns(topics[ACTUATOR]).T, strict=True))
+    positions = {name: _over_the_period(topics, f"{_EFFECTOR}{name}") for name in INPUT_NAMES}
+    return {name: y for name, y in positions.items() if len(y) and (np.isfinite(y) & (y != commanded[name])).any()}
 
 
 def moving_air(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the fields of :data:`CALM_AIR` (n) that differ from calm air, over the period of a step, as above."""
+    """Return the fields of :data:`CALM_AIR` that differ from calm air, as values (n) over the period of each step."""
     air = {name: _over_the_period(topics, name) for name in CALM_AIR}
     return {name: y for name, y in air.items() if (np.isfinite(y) & (y != CALM_AIR[name])).any()}
 
 
 def _over_the_period(topics: Mapping[str, Columns], field: str) -> np.ndarray:
-    """Return a field of the forces (n) over the period that begins with a step, NaN where no message tells it."""
+    """Return a field of the forces (n) over the period that begins with each step; NaN if it is not recorded."""
     if FORCES not in topics or field not in topics[FORCES]:
         return np.empty(0)
     forces = topics[FORCES]
-    # A step tells of the period before it, and the first one of the trim.
-    next_is_there = np.diff(forces["step"].astype(np.int64)) == 1
-    return np.append(np.where(next_is_there, forces[field][1:], np.nan), np.nan)
+    # The message of a step contains the forces over the previous period, that of the first step those at trim.
+    consecutive = np.diff(forces["step"].astype(np.int64)) == 1
+    return np.append(np.where(consecutive, forces[field][1:], np.nan), np.nan)

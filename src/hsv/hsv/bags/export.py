@@ -1,4 +1,4 @@
-"""Writing the topics of a bag as tables: CSV, Parquet, npz or mat, with the names and units of fields."""
+"""Export the topics of a bag as tables in CSV, Parquet, npz or mat, with names and units of the fields."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hsv.bags.units import Units
 from hsv.base.errors import RecordingError, reason
 
 INCOMPLETE = "incomplete"
-"""Name of the file that lists what is missing in the exported bag."""
+"""Name of the file or array with the warnings about an incomplete bag."""
 
 
 class Format(StrEnum):
@@ -36,13 +36,13 @@ class Format(StrEnum):
 
 
 def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[Path]:
-    """Write ``topics``, by name or role; return the files written.
+    """Write ``topics``, given by name or role; return the written files.
 
-    CSV and Parquet: a folder ``target`` with a file per topic, ``/hsv/state`` as ``hsv_state.csv``; a column a number,
-    ``filter_state[0] [kg^0.5 m/s]``, texts and lists of messages as they stand or as JSON. npz: one file with an array
-    per field, ``hsv_state.elastic_rate_1 [kg^0.5 m/s]``. mat: one file with a structure per topic, ``hsv_state``, with
-    a field ``elastic_rate_1`` and its unit in ``hsv_state.units.elastic_rate_1``. The first column of each is the
-    simulated ``time [s]``.
+    CSV and Parquet: the folder ``target`` contains one file per topic, such as ``hsv_state.csv`` for ``/hsv/state``,
+    with one column per number, such as ``filter_state[0] [kg^0.5 m/s]``, and texts or JSON for other fields. npz: one
+    file with one array per field, such as ``hsv_state.elastic_rate_1 [kg^0.5 m/s]``. mat: one file with one structure
+    per topic, such as ``hsv_state``, with a field ``elastic_rate_1`` and its unit in
+    ``hsv_state.units.elastic_rate_1``. The first column or field of a topic is the simulated ``time [s]``.
 
     Raises:
         RecordingError: A topic is missing, or the target exists or cannot be written.
@@ -61,14 +61,14 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
         raise _refused(target, error) from error
     try:
         if form.single:
-            said: dict[str, Any] = {INCOMPLETE: np.array(lacking)} if lacking else {}
+            notes: dict[str, Any] = {INCOMPLETE: np.array(lacking)} if lacking else {}
             with target.open("wb") as stream:
                 if form is Format.mat:
                     from scipy.io import savemat
 
-                    savemat(stream, contents | said, long_field_names=True, do_compression=True, oned_as="column")
+                    savemat(stream, contents | notes, long_field_names=True, do_compression=True, oned_as="column")
                 else:
-                    np.savez_compressed(stream, **contents, **said)
+                    np.savez_compressed(stream, **contents, **notes)
             return [target]
         write = _write_csv if form is Format.csv else _write_parquet
         written = [write(target / f"{_file_stem(topic)}.{form}", table) for topic, table in contents.items()]
@@ -77,7 +77,7 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
             written[-1].write_text(f"{bag.path}: {lacking}\n", encoding="utf-8")
         return written
     except BaseException as error:
-        # Half an export would be in the way of the next one.
+        # An incomplete export would block the next one.
         shutil.rmtree(target, ignore_errors=True)
         target.unlink(missing_ok=True)
         if isinstance(error, OSError):
@@ -117,12 +117,12 @@ def _file_stem(topic: str) -> str:
 
 
 def _columns(bag: Bag, topic: str) -> tuple[dict[str, NDArray[Any]], dict[str, Units]]:
-    """Return the fields of a topic and their units, the simulated time (s) before all others."""
+    """Return the fields of a topic and their units; the simulated time (s) is the first."""
     return {"time": bag.times(topic) * 1e-9} | bag.columns(topic), {"time": Units(("s",))} | bag.units(topic)
 
 
 def _fields(bag: Bag, topic: str) -> dict[str, tuple[NDArray[Any], str]]:
-    """Return one array per field with its units; what has no common length as JSON."""
+    """Return one array per field with its units; fields of varying length are JSON."""
     columns, units = _columns(bag, topic)
     fields = {}
     for name, column in columns.items():
@@ -132,11 +132,11 @@ def _fields(bag: Bag, topic: str) -> dict[str, tuple[NDArray[Any], str]]:
 
 
 def table(columns: Mapping[str, NDArray[Any]], units: Mapping[str, Units]) -> dict[str, NDArray[Any]]:
-    """Return one column per number, with its unit in its name; sequences as wide as the longest, the rest empty.
+    """Return one column per number, with its unit in its name; short sequences are padded with NaN.
 
     Args:
-        columns: The fields of messages, as :mod:`hsv.bags.columns` has them.
-        units: Unit of every field, from :func:`hsv.bags.units.units_of`.
+        columns: Fields of messages from :mod:`hsv.bags.columns`.
+        units: Units of the fields from :func:`hsv.bags.units.units_of`.
     """
     table: dict[str, NDArray[Any]] = {}
     for name, column in columns.items():

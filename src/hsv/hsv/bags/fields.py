@@ -1,4 +1,4 @@
-"""The fields of message types, as a bag's own definitions state them."""
+"""The fields of message types from parsed message definitions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rosbags.interfaces.typing import FieldDesc, Typesdict
 from rosbags.typesys.store import Typestore
 
 TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
-"""Two fields each, int32 sec and uint32 nanosec, which are worth one number together."""
+"""Types of times: each has int32 sec and uint32 nanosec, which together are one number."""
 _FORMATS = {"bool": "?", "byte": "u1", "char": "u1", "float32": "<f4", "float64": "<f8"} | {
     f"{sign}int{bits}": f"<{code}{bits // 8}" for sign, code in (("", "i"), ("u", "u")) for bits in (8, 16, 32, 64)
 }
@@ -25,24 +25,24 @@ class Field:
     type: str
     """``package/msg/Type`` or the name of a base type."""
     format: str | None
-    """Name of this number type in numpy; None for text and messages."""
+    """numpy format of a number; None for texts and messages."""
     count: Literal["one", "array", "sequence"]
     length: int
     """Number of elements of an array; 0 otherwise."""
 
     @property
     def is_text(self) -> bool:
-        """Whether this is text (of unbounded or bounded length)."""
+        """Whether the field is a text, bounded or unbounded."""
         return self.type == "string"
 
     @property
     def is_time(self) -> bool:
-        """Whether this is a time or a duration."""
+        """Whether the field is a time or a duration."""
         return self.type in TIMES
 
     @property
     def is_message(self) -> bool:
-        """Whether this is a message of its own type."""
+        """Whether the field is a nested message."""
         return "/" in self.type
 
 
@@ -52,7 +52,7 @@ def fields_of(types: Typesdict, message_type: str) -> list[Field]:
 
 
 def as_dict(types: Typesdict, message_type: str, message: object) -> dict[str, Any]:
-    """Return a deserialized message as plain dictionaries, lists and numbers; times in nanoseconds."""
+    """Return a deserialized message as dictionaries, lists and numbers, with times in nanoseconds."""
     return {field.name: _plain(types, field, getattr(message, field.name)) for field in fields_of(types, message_type)}
 
 
@@ -76,7 +76,7 @@ def blank(store: Typestore, message_type: str) -> Any:
 
 
 def nanoseconds(time: Any) -> int:
-    """Return a deserialized Time or Duration as one number."""
+    """Return a deserialized Time or Duration in nanoseconds."""
     return int(time.sec) * 10**9 + int(time.nanosec)
 
 

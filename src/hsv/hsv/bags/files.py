@@ -1,4 +1,4 @@
-"""The files of a bag: which they are, in which order, and what is in them, decompressed where rosbag2 compressed."""
+"""The files of a bag: their names, their order, and their contents, decompressed if rosbag2 compressed them."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from hsv.base.errors import DocumentError, RecordingError
 from hsv.base.files import read_bytes
 
 COMPRESSIONS = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
-"""Beginning of compressed data; neither an MCAP file nor a message in CDR begins like this."""
+"""First bytes of compressed data; MCAP files and messages in CDR begin differently."""
 _MAGIC = 4
 _NAME = re.compile(r".+\.mcap(?:\.zstd|\.zst|\.lz4)?")
 _NUMBER = re.compile(r"_(\d+)\.mcap")
-_MOST_FILES = 100_000
-"""Number from which on that of a file is none of a sequence."""
+_MAX_FILES = 100_000
+"""File numbers from here on are dates or the like, not counters."""
 _PART = 4096
-"""Bytes that are decompressed at a time: what lies before a damage is not lost with it."""
+"""Bytes decompressed at a time, so that data before a damage are kept."""
 
 
 def locked(stream: IO[bytes], *, shared: bool = False) -> bool:
-    """Lock an open file until it is closed; tell whether that was possible, which it is not while it is recorded.
+    """Lock an open file until it is closed; return whether it succeeded. A recorder holds such a lock.
 
-    A file system without locks gives one to everybody. ``shared``: others may have such a lock at the same time.
+    On a file system without locks every attempt succeeds. Several processes can hold a ``shared`` lock.
     """
     try:
         fcntl.flock(stream, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
@@ -40,19 +40,19 @@ def locked(stream: IO[bytes], *, shared: bool = False) -> bool:
 
 
 def being_recorded(path: Path) -> bool:
-    """Tell whether a recorder is writing the file."""
+    """Return whether a recorder is writing the file."""
     with path.open("rb") as stream:
         return not locked(stream, shared=True)
 
 
 def find_files(path: Path) -> tuple[list[Path], list[str]]:
-    """Return the files of a bag in their order, and the names of those that it should have but has not.
+    """Return the files of a bag in their order, and the names of its missing files.
 
     Args:
         path: A bag directory, or one of its files.
 
     Raises:
-        RecordingError: There is none, or no telling which belong together.
+        RecordingError: There is no file, or the directory contains the files of several bags.
     """
     if path.suffix == ".db3" or (path.is_dir() and any(path.glob("*.db3"))):
         raise RecordingError(
@@ -64,9 +64,9 @@ def find_files(path: Path) -> tuple[list[Path], list[str]]:
     if not path.is_dir():
         raise RecordingError(f"{path}: does not exist, expected a bag directory or an MCAP file")
     there = {file.name for file in path.iterdir() if file.is_file() and _NAME.fullmatch(file.name)}
-    # Of a recorder that was killed while it compressed a file, the file itself is the whole one.
+    # A recorder killed while it compressed a file leaves an incomplete compressed file next to the original.
     there -= {name for name in there if not name.endswith(".mcap") and name.rpartition(".")[0] in there}
-    # Old versions of rosbag2 wrote the directory as well.
+    # Old versions of rosbag2 wrote paths with the directory.
     listed = [name for name in (Path(name).name for name in file_names(read_metadata(path))) if _NAME.fullmatch(name)]
     if known := {_stem(name) for name in listed if name in there}:
         there = {name for name in there if _stem(name) in known}
@@ -75,8 +75,8 @@ def find_files(path: Path) -> tuple[list[Path], list[str]]:
         found = f"files *.mcap of {len(stems)} bags" if stems else "no file *.mcap"
         raise RecordingError(f"{path}: holds {found}, expected a bag directory")
     numbered = {_number(name): name for name in there}
-    # A single file that nothing else tells of is the bag, and what is numbered by dates has no gaps: rosbag2 counts.
-    counted = len(numbered) > 1 and max(numbered) < _MOST_FILES
+    # Gaps are known only for files with counters, and not for a single file that the metadata do not list.
+    counted = len(numbered) > 1 and max(numbered) < _MAX_FILES
     gaps = {number: f"{stems.copy().pop()}_{number}.mcap" for number in range(max(numbered) if counted else 0)}
     expected = gaps | ({_number(name): name for name in listed} if known else {})
     missing = [expected[number] for number in sorted(expected.keys() - numbered.keys())]
@@ -93,10 +93,10 @@ def _number(name: str) -> int:
 
 
 def read_file(path: Path) -> bytes:
-    """Return the contents of a file of a bag, as far as it can be decompressed.
+    """Return the contents of a file of a bag up to the first damage in compressed data.
 
     Raises:
-        RecordingError: It cannot be read.
+        RecordingError: The file cannot be read.
     """
     try:
         return decompressed(read_bytes(path))[0]
@@ -105,13 +105,13 @@ def read_file(path: Path) -> bytes:
 
 
 def read_message(data: bytes) -> bytes | None:
-    """Return a message as it was before rosbag2 compressed it, if it did; None if it is damaged."""
+    """Return a message, decompressed if rosbag2 compressed it; None if it is damaged."""
     content, whole = decompressed(data)
     return content if whole else None
 
 
 def decompressed(data: bytes) -> tuple[bytes, bool]:
-    """Return the content of data that may be compressed, up to the first damage, and whether that is all of it."""
+    """Return possibly compressed data, decompressed up to the first damage, and whether they are complete."""
     match COMPRESSIONS.get(data[:_MAGIC]):
         case "zstd":
             stream = zstandard.ZstdDecompressor().decompressobj()

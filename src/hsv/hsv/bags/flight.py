@@ -1,4 +1,4 @@
-"""Extraction of the data for metrics from a bag."""
+"""Data for metrics and fingerprint of a flight from a bag."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MEASURED = (STATE, NOMINAL, COMMAND, ACTUATOR)
 
 
 def labels(bags: Sequence[Bag]) -> list[str]:
-    """Return a distinct name for each of ``bags``: its scenario, with as much of its path as necessary."""
+    """Return a distinct label for each of ``bags``: its scenario, with as much of its path as necessary."""
     scenarios = [bag.custom_data.get("scenario", bag.path.stem) for bag in bags]
     names = scenarios
     for details in (
@@ -46,7 +46,7 @@ def input_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarra
 
 
 def flight_data(bag: Bag) -> FlightData:
-    """Return the flight in ``bag``, of the steps that every topic has.
+    """Return the flight in ``bag`` for the steps contained in every topic.
 
     Raises:
         RecordingError: A topic is missing, or no step is complete.
@@ -69,7 +69,7 @@ def flight_data(bag: Bag) -> FlightData:
 
 
 def flight_fingerprint(bag: Bag) -> str | None:
-    """Return the fingerprint of the flight in ``bag``, ``None`` if it does not hold every step from the first on.
+    """Return the fingerprint of the flight in ``bag``, or ``None`` if steps are missing.
 
     Raises:
         RecordingError: A topic is missing, or no step is complete.

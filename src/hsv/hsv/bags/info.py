@@ -1,4 +1,4 @@
-"""Contents of a bag, as plain data for JSON."""
+"""Contents and events of a bag as plain data for JSON."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from hsv.model.signals import INPUT_NAMES
 
 
 def describe(bag: Bag) -> dict[str, Any]:
-    """Return the contents and events of a bag; a caller may add to it, such as metrics.
+    """Return the contents and events of a bag; callers add to the dictionary, for example metrics.
 
     Returns:
-        ``path``, ``folder``, ``complete``, ``warnings`` (in words), ``start_s``, ``duration_s``, ``messages``,
-        ``topics``, ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None if there is
-        nothing to compare it with), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
-        entry per interval of a channel), ``equipment`` (what of sensors, links, effectors and air is not ideal, SI),
-        ``saturation``, ``tube`` and ``not_covered`` (what of the flight the certificate of its design does not cover,
-        in words); the last six are None without the topic that tells, and the last without parameters. Times are
-        simulated, in seconds; ``end_s`` of what lasts until the end of the bag is None.
+        ``path``, ``folder``, ``complete``, ``warnings`` (texts), ``start_s``, ``duration_s``, ``messages``, ``topics``,
+        ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None without a published value),
+        ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one entry per interval),
+        ``equipment`` (deviations of sensors, links, effectors and air from the ideal, SI), ``saturation``, ``tube`` and
+        ``not_covered`` (texts: properties of the flight outside the certificate of its design). The last six are None
+        if their topic is missing, ``not_covered`` also if parameters are. Times are simulated times in seconds;
+        ``end_s`` is None for an interval that lasts until the end of the bag.
     """
     start, end = bag.span
     fingerprint = _fingerprint(bag)
@@ -75,7 +75,7 @@ def _fingerprint(bag: Bag) -> str | None:
 
 
 def _scenario(bag: Bag) -> Scenario | None:
-    """Return the scenario attached to ``bag``, ``None`` without one that this version can read."""
+    """Return the scenario attached to ``bag``, or ``None`` if there is none that this version can read."""
     try:
         return parse_scenario(bag.text("scenario.toml"), bag.custom_data.get("scenario", ""))
     except HsvError:
@@ -97,7 +97,7 @@ def ending(bag: Bag) -> str:
     """
     status = bag.columns(STATE)["status"]
     if cut_off(bag) and len(status) and bag.times(STATE)[-1] not in complete_stamps(bag):
-        return "broken off"  # the last state may be there, but not what was made of it
+        return "broken off"  # the last state is recorded, but other topics of its step are not
     endings = {bag.constant(STATE, "FINISHED"): "finished", bag.constant(STATE, "DIVERGED"): "diverged"}
     return endings.get(int(status[-1]), "broken off") if len(status) else "broken off"
 
@@ -116,18 +116,18 @@ def _faults(bag: Bag) -> list[dict[str, Any]]:
         entry = {"channel": channel, "type": kind, "parameters": dict(parameters)}
         acting = np.array([key in faults for faults in active])
         if kind in FAULT_KINDS and FAULT_KINDS[kind].side == SENSOR:
-            # Listed in a step are those of sensors in the next, and in the first step those that are there from it on.
+            # A step lists the sensor faults of the next step; the first step also lists those that it has itself.
             acting = np.concatenate((acting[:1], acting[:-1]))
         intervals += [entry | interval for interval in _intervals(columns["header.stamp"], acting)]
     return sorted(intervals, key=lambda interval: interval["start_s"])
 
 
 def parameters_in_words(fault: dict[str, Any], written: Callable[[float, str], str]) -> str:
-    """Return the parameters of a described fault: the quantity of a single one, names and quantities of several.
+    """Return the parameters of a fault as text: the quantity of a single one, names and quantities of several.
 
     Args:
-        fault: Description of the fault.
-        written: Writes a number with its SI unit, which is empty where it has none or the fault is of no known type.
+        fault: Entry of ``faults`` in :func:`describe`.
+        written: Function that formats a number with its SI unit; the unit is empty if there is none or it is unknown.
     """
     given = fault["parameters"]
     try:
@@ -145,23 +145,23 @@ def parameters_in_words(fault: dict[str, Any], written: Callable[[float, str], s
 
 
 def _equipment(bag: Bag) -> dict[str, Any] | None:
-    """Return what is not ideal: errors of measurement, what links held, effectors less what they were told, the air."""
+    """Return the deviations from the ideal: measurement errors, held payloads, effector errors and moving air, SI."""
     try:
         topics = joined(bag, equipment_topics(bag))
     except RecordingError:
         return None
-    told = input_columns(topics[ACTUATOR]) if ACTUATOR in topics else np.empty((0, len(INPUT_NAMES)))
-    away = {name: were - told[:, INPUT_NAMES.index(name)] for name, were in effectors(topics).items()}
+    commanded = input_columns(topics[ACTUATOR]) if ACTUATOR in topics else np.empty((0, len(INPUT_NAMES)))
+    errors = {name: y - commanded[:, INPUT_NAMES.index(name)] for name, y in effectors(topics).items()}
     return {
         "measurement_error_rms": {n: float(np.sqrt(np.mean(e**2))) for n, e in measurement_errors(topics).items()},
         "held_steps": {name: int(steps.sum()) for name, steps in held(topics).items()},
-        "effector_largest_difference": {name: float(np.nanmax(np.abs(way))) for name, way in away.items()},
+        "effector_largest_difference": {name: float(np.nanmax(np.abs(error))) for name, error in errors.items()},
         "air_range": {name: [float(np.nanmin(air)), float(np.nanmax(air))] for name, air in moving_air(topics).items()},
     }
 
 
 def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | None:
-    """Return what no certificate covers, by the parameters and the certificate in the bag, its faults as recorded."""
+    """Return messages about properties that the certificate in the bag does not cover, for the recorded faults."""
     try:
         sections = [ParameterSections.parse(bag.text(name), name) for name in ("design.yaml", "scenario.yaml")]
         values = sections[0].overlaid(sections[1]).of(TUBE_MPC.name)
@@ -169,7 +169,7 @@ def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | N
         flown = [(fault["channel"], fault["type"], fault["parameters"]) for fault in faults or ()]
         return uncovered(values, design_of(values), parse_json(report) if report else None, flown)
     except (HsvError, ValueError, LookupError, TypeError):
-        return None  # what is attached is not of this version, or not whole
+        return None  # the attachments are of another version or incomplete
 
 
 def _saturation(bag: Bag) -> dict[str, Any]:
@@ -197,7 +197,7 @@ def _tube(bag: Bag) -> dict[str, Any]:
 
 
 def _intervals(stamps: NDArray[np.int64], holds: NDArray[np.bool_]) -> list[dict[str, float | None]]:
-    """Return the intervals in which a condition holds: from its first step to the first in which it is over."""
+    """Return the intervals in which a condition ``holds`` (n), each from its first step to the first step after it."""
     edges = np.diff(np.concatenate(([False], holds, [False])).astype(np.int8))
     return [
         {"start_s": float(stamps[first]) / 1e9, "end_s": float(stamps[over]) / 1e9 if over < len(stamps) else None}

@@ -1,7 +1,7 @@
 """Parameters of the nodes' infrastructure: lockstep, pace, recorder and peer emulator.
 
-Those of the components are in :mod:`hsv.graph.node_parameters`. These are kept apart so that a node imports them
-without the components of all other nodes: five nodes start at the same time.
+The parameters of the components are in :mod:`hsv.graph.node_parameters`, which imports the components of all nodes. A
+node needs only this module, so that it starts faster.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ LOCKSTEP_PARAMETERS = (
 """Parameters that every node declares."""
 
 STEP_TIMEOUT = 10.0
-"""Wall time (s) after which silence ends a run, unless something else is said."""
+"""Default wall time (s) after which the plant ends a run because a peer does not answer."""
 
 PACE_PARAMETERS = (
     Parameter(
@@ -35,7 +35,7 @@ PACE_PARAMETERS = (
     Parameter("step_timeout", STEP_TIMEOUT, "wall time to wait for a peer within a step", "s", 0.1, 1e6),
     Parameter("progress", False, "print the step to standard output, for a progress bar"),
 )
-"""Parameters of the plant, which owns simulated time."""
+"""Parameters of the plant that control the pace of simulated time."""
 
 RECORDER_PARAMETERS = (
     Parameter("bag.directory", "", "bag to write, a new directory; empty: bags/run_<UTC>"),
@@ -58,4 +58,4 @@ PEER_EMULATOR_PARAMETERS = (
     Parameter("peer_emulator.directory", "", "bag to write with its outputs, a new directory"),
     Parameter("peer_emulator.timeout", 30.0, "wall time to wait for an answer to a step", "s", 0.1, 1e6),
 )
-"""Parameters of the peer emulator, which takes the place of all other nodes in a replay over DDS."""
+"""Parameters of the peer emulator, which replaces all other nodes in a replay over DDS."""

@@ -1,11 +1,11 @@
 """Messages of the step topics: the layout of their bytes, and the signals of the loop in them.
 
 In one run, the sequences and the ``frame_id`` of a topic have constant lengths. All its messages (XCDR1, little-endian)
-then have the same layout, which follows from the message definition: one numpy structured type, :class:`Structure`. One
-view of the bytes replaces the conversion of a message field by field, in the nodes, in the replay and in the reader.
-Only a list of messages, such as the active faults, is converted by rosbags, and only when its bytes change.
+then have the same layout, which follows from the message definition: one numpy structured type, :class:`Structure`.
+Nodes, replay and reader view the bytes of a message with this type instead of converting it field by field. Only a list
+of messages, such as the active faults, is converted by rosbags, and only when its bytes change.
 
-:data:`hsv.bags.description.CARRIED` declares which field of which message holds which signal.
+:data:`hsv.bags.description.CARRIED` declares the fields that contain the signals.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ if TYPE_CHECKING:
     from hsv.model.faults.table import Fault
 
 FRAME = LEVEL
-"""``frame_id`` of every message of a step: the vehicle-carried frame, in which the state is given."""
+"""``frame_id`` of every message of a step: the vehicle-carried frame of the state."""
 
 ENCAPSULATION = 4
-"""Bytes in front of the message; alignment counts from their end."""
+"""Length of the header of a message in CDR, bytes; the alignment is relative to its end."""
 
 _LITTLE_ENDIAN = b"\x00\x01"
 
@@ -51,36 +51,36 @@ def stamp_of(step: int, period: float) -> tuple[int, int]:
 
 
 def stamp_in(message: bytes) -> int:
-    """Return the simulated time (ns) with which every message of a step begins."""
+    """Return the simulated time (ns) at the beginning of a message of a step."""
     seconds = int.from_bytes(message[4:8], "little", signed=True)
     return seconds * 1_000_000_000 + int.from_bytes(message[8:12], "little")
 
 
 class MessageError(RunError):
-    """Bytes that are not a message of their type, or a type that is not defined as expected."""
+    """Error of bytes that are not a message of the type, or of a type with an unexpected definition."""
 
 
 class Structure:
-    """The layout of a message and of all others of its type whose texts and sequences have the same lengths.
+    """The layout of all messages of a type whose texts and sequences have given lengths.
 
     Attributes:
-        dtype: Structured type of the message behind its encapsulation; its fields are named by their paths, such as
-            ``header.stamp.sec`` or ``state.altitude``. A text has its bytes, the closing zero included.
+        dtype: Structured type of the message after its header; the names of the fields are paths such as
+            ``header.stamp.sec`` or ``state.altitude``. A text includes its closing zero.
         lengths: Offset and value of the length of every text and sequence, by path.
-        size: Number of bytes of :attr:`dtype`.
-        complete: Whether the type describes the whole message. It ends where a list of messages or texts begins.
+        size: Size of :attr:`dtype`, bytes.
+        complete: Whether the type covers the whole message; it ends before a list of messages or texts.
     """
 
     def __init__(self, store: Typesdict, message_type: str, message: bytes) -> None:
-        """Find the layout of ``message``.
+        """Determine the layout of ``message``.
 
         Args:
-            store: Definitions of the type and of those it depends on.
+            store: Definitions of the type and its dependencies.
             message_type: ``package/msg/Type``.
             message: The message in CDR.
 
         Raises:
-            MessageError: It is not little-endian CDR, or shorter than its definition demands.
+            MessageError: The message is not little-endian CDR, or is too short.
         """
         if message[:2] != _LITTLE_ENDIAN:
             raise MessageError(
@@ -120,11 +120,11 @@ class Structure:
         return body.view(self.dtype)[:, 0]
 
     def select(self, chosen: Mapping[str, tuple[str, int]]) -> np.dtype[Any]:
-        """Return a structured type of chosen fields, of the same size.
+        """Return a structured type of the same size with the chosen fields.
 
         Args:
-            chosen: By name, the path of a number, a sequence of numbers or a message of numbers, and how many
-                consecutive numbers from there on make one field; :data:`VARYING` for the whole sequence.
+            chosen: Path and size of each field by its new name. The path leads to a number, a sequence of numbers or a
+                message of numbers; the size is the number of consecutive numbers, :data:`VARYING` for a sequence.
 
         Raises:
             MessageError: The definition has no such field.
@@ -160,7 +160,7 @@ class Structure:
                 if field.format:
                     self._place(path, np.dtype((field.format, (count,))))
                 elif count:
-                    # The sizes of texts and messages in a list differ: the rest has no fixed place.
+                    # Texts and messages in a list differ in size, so that the offsets of the rest are not fixed.
                     self.complete, self.size = False, at
                     self.lengths.pop(path, None)
 
@@ -182,20 +182,20 @@ class Structure:
 
 
 _NEEDED = {signal for block in LOOP for signal in (*block.inputs, *block.delayed, *block.state)} | {types.STATUS}
-"""The signals that are unpacked: those that a block needs, and the status, which is passed on."""
+"""The signals to unpack: the inputs and states of the blocks, and the status, which nodes pass on."""
 
 _SIZES: dict[SignalType, tuple[Callable[[int], bool], str]] = {
     types.FILTER_STATE: (lambda size: size % 2 == 0, "two for each section of the notch filter"),
     types.GAIN: (lambda size: size in (0, N_INPUTS * N_STATES), f"{N_INPUTS * N_STATES}, or none"),
     types.ESTIMATE: (lambda size: size in (0, N_STATES), f"{N_STATES}, or none"),
 }
-"""Signals in sequences: the admitted sizes, and their description for an error message."""
+"""Signals in sequences: test of the size, and description of the admitted sizes for error messages."""
 
 _VALUES: dict[SignalType, Callable[[Signals], Any]] = {
     types.ESTIMATE: lambda signals: () if signals.estimate is signals.measurement else signals.estimate,
     types.GAIN: lambda signals: signals.gain.ravel(),
 }
-"""The numbers of those signals that are not sent as they are."""
+"""Functions that return the numbers to send for a signal, if they differ from its value."""
 
 _TUBE = {
     "level": 1,
@@ -209,18 +209,18 @@ _TUBE = {
     "tube_half_width": VARYING,
     "tau": VARYING,
 }
-"""Attributes of the controller's diagnostics in the fields of the tube status, and their sizes."""
+"""Sizes of the attributes of the controller's diagnostics in the tube status."""
 
 
 class StepMessages:
-    """Packs the signals of a step into messages of one topic, and unpacks them."""
+    """Conversion of the signals of a step to and from the messages of one topic."""
 
     def __init__(self, topic: str, store: Typestore | None = None) -> None:
         """Prepare for a topic.
 
         Args:
             topic: A topic of :data:`hsv.bags.description.TOPICS`.
-            store: Definitions of the messages; None for the installed ones.
+            store: Definitions of the messages; None: the installed ones.
         """
         self.type = TOPICS[topic]
         self._store = store or installed_types(self.type)
@@ -237,26 +237,26 @@ class StepMessages:
         self._sent = sent
         stamp = "clock" if topic == CLOCK else "header.stamp"
         self._front = {path: (path, 1) for path in (f"{stamp}.sec", f"{stamp}.nanosec", "step")[: 2 + bool(carried)]}
-        """What every message of a step begins with; that of the clock has no step."""
+        """Fields at the beginning of every message: stamp and, except for the clock, the step."""
         self._received: Structure | None = None
         self._list = b""
         self._faults: tuple[ActiveFault, ...] = ()
         self._lengths: tuple[object, ...] | None = None
 
     def step(self, message: bytes) -> int:
-        """Return the step of a message.
+        """Return the step number of a message.
 
         Raises:
-            MessageError, SignalError: See :meth:`unpack`.
+            MessageError, SignalError: As for :meth:`unpack`.
         """
         return int(self._numbers(message)[2])
 
     def unpack(self, message: bytes, signals: Signals) -> None:
-        """Set stamp, step and the signals that a block needs; all of them, or none where an error is raised.
+        """Set stamp, step and the needed signals from a message; on an error nothing is set.
 
         Raises:
-            MessageError: It is not a message of the type.
-            SignalError: No block can take a signal in it.
+            MessageError: The bytes are not a message of the type.
+            SignalError: A signal has an invalid size or value.
         """
         seconds, nanoseconds, step, *values = self._numbers(message)
         found = dict(zip(self._needed, values, strict=True))
@@ -268,7 +268,7 @@ class StepMessages:
         vars(signals).update(found)
 
     def pack(self, signals: Signals) -> bytes:
-        """Return the message that holds the signals, padded as DDS sends it."""
+        """Return the message with the signals, padded as over DDS."""
         values = [value(signals) for _, value in self._sent.values()]
         lengths = [len(value) for value, (size, _) in zip(values, self._sent.values(), strict=True) if size == VARYING]
         faults = signals.active_faults if self._has_faults else ()
@@ -280,7 +280,7 @@ class StepMessages:
         return bytes(self._buffer)
 
     def _numbers(self, message: bytes) -> tuple[Any, ...]:
-        """Return seconds, nanoseconds, step, and the needed signals of a message."""
+        """Return seconds, nanoseconds, step and the needed signals of a message."""
         if self._received is None or not self._received.fits(message):
             structure = Structure(self._store.fielddefs, self.type, message)
             for signal, field in self._sequences.items():
@@ -289,7 +289,7 @@ class StepMessages:
                     raise SignalError(signal.name, f"{field}: {size} numbers, expected {words}")
             self._dtype = structure.select(self._front | self._needed)
             self._received = structure
-        # A copy without the encapsulation, in which the numbers are aligned.
+        # A copy without the header aligns the numbers.
         numbers: tuple[Any, ...] = np.frombuffer(message[ENCAPSULATION:], self._dtype, 1).item()
         return numbers
 
@@ -307,7 +307,7 @@ class StepMessages:
         return self._faults
 
     def _allocate(self, lengths: Sequence[int], faults: tuple[ActiveFault, ...]) -> None:
-        """Make a message with sequences of these lengths, and a view of its numbers."""
+        """Allocate a message with sequences of these lengths, and a view of its numbers."""
         message = blank(self._store, self.type)
         if hasattr(message, "header"):
             message.header.frame_id = FRAME
@@ -331,16 +331,16 @@ def _size(signal: SignalType) -> int:
 
 @cache
 def installed_types(message_type: str) -> Typestore:
-    """Return the definition of an installed type and of those it depends on.
+    """Return the definitions of an installed type and its dependencies.
 
     Raises:
-        RecordingError: It is not installed.
+        RecordingError: The type is not installed.
     """
     return message_types([(message_type, definition(message_type))], message_type)
 
 
 def fault_fields(fault: Fault) -> tuple[str, str, list[str], NDArray[np.float64]]:
-    """Return the fields of a message Fault, in their order."""
+    """Return the fields of a message Fault in their order."""
     return fault.channel, fault.type, list(fault.parameters), np.array(list(fault.parameters.values()), np.float64)
 
 
@@ -350,7 +350,7 @@ def fault_in(message: Any) -> Fault:
     Raises:
         ParameterError: An unknown channel, type or parameter, or a value that is not admitted.
     """
-    from hsv.model.faults.table import Fault  # most nodes need no fault
+    from hsv.model.faults.table import Fault  # imported here because most nodes need no faults
 
     names, values = message.parameter_names, message.parameter_values
     if len(names) != len(values):
@@ -359,10 +359,10 @@ def fault_in(message: Any) -> Fault:
 
 
 def active_faults(message: Any) -> tuple[ActiveFault, ...]:
-    """Return the faults in a message Actuator, with their first steps.
+    """Return the faults in a message Actuator with their first steps.
 
     Raises:
-        SignalError: See :func:`fault_in`; or the first steps are not as many, or impossible.
+        SignalError: A fault is invalid (see :func:`fault_in`), or the number or value of the first steps is wrong.
     """
     from hsv.model.faults.schedule import ActiveFault
 

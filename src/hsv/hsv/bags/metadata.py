@@ -1,4 +1,4 @@
-"""Metadata of a bag for rosbag2 (version 9): metadata.yaml, and the same as a record in the MCAP file."""
+"""Metadata of a bag for rosbag2 (version 9): metadata.yaml, and its copy as a record in the MCAP file."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from hsv.base.errors import DocumentError
 from hsv.base.files import parse_yaml, read_text
 
 CUSTOM_DATA = "custom_data"
-"""Name of the MCAP metadata records that hold the custom data; a later record adds to the earlier ones."""
+"""Name of the MCAP metadata records with the custom data; later records add to earlier ones."""
 ROSBAG2 = "rosbag2"
 """Name of the MCAP metadata records of rosbag2."""
 SERIALIZED = "serialized_metadata"
-"""Their key: the text of metadata.yaml without its root."""
+"""Key in the records of rosbag2 for the text of metadata.yaml without its root."""
 FILE_NAME = "metadata.yaml"
 ROOT = "rosbag2_bagfile_information"
 VERSION = 9
 DISTRO = "jazzy"
 EMPTY_BAG_START = 2**63 - 1
-"""Starting time that rosbag2 writes for a bag without messages."""
+"""Starting time (ns) of a bag without messages in rosbag2."""
 
 
 @dataclass
 class Tally:
-    """Number of messages, and the first and last log time in nanoseconds; to be counted up message by message."""
+    """Number of messages, with the first and the last log time (ns)."""
 
     count: int = 0
     start: int = EMPTY_BAG_START
@@ -52,13 +52,13 @@ class Tally:
 
     @property
     def duration(self) -> int:
-        """Nanoseconds from the first message to the last."""
+        """Time from the first to the last message, ns."""
         return max(self.end - self.start, 0)
 
 
 @dataclass(frozen=True)
 class TopicInformation:
-    """A topic as metadata.yaml lists it."""
+    """A topic in metadata.yaml."""
 
     name: str
     type: str
@@ -70,7 +70,7 @@ class TopicInformation:
 
 
 class _Quoted(str):
-    """Text written in double quotes: empty text must not become null, nor a commit such as 12e5 a number."""
+    """Text in double quotes, so that YAML reads neither an empty text as null nor a commit such as 12e5 as a number."""
 
     __slots__ = ()
 
@@ -87,7 +87,7 @@ _Dumper.add_representer(
 def information(
     file: str, tally: Tally, topics: Sequence[TopicInformation], custom: Mapping[str, str], distro: str = DISTRO
 ) -> dict[str, Any]:
-    """Return the metadata of a bag of one file, with every key that rosbag2 demands."""
+    """Return the metadata of a bag with one file, with all keys that rosbag2 requires."""
     start, duration = {"nanoseconds_since_epoch": tally.start}, {"nanoseconds": tally.duration}
     return {
         "version": VERSION,
@@ -108,7 +108,7 @@ def information(
             }
             for topic in topics
         ],
-        # Compression in the sense of rosbag2: of whole files or single messages. MCAP chunks do not count.
+        # Compression by rosbag2 applies to files or single messages, not to the chunks of MCAP.
         "compression_format": _Quoted(""),
         "compression_mode": _Quoted(""),
         "relative_file_paths": [file],
@@ -119,23 +119,23 @@ def information(
 
 
 def record(values: Mapping[str, Any]) -> dict[str, str]:
-    """Return the content of rosbag2's MCAP metadata record."""
+    """Return the content of the MCAP metadata record of rosbag2."""
     return {SERIALIZED: _text(values)}
 
 
 def write_metadata(directory: Path, values: Mapping[str, Any]) -> None:
-    """Write metadata.yaml into a bag directory, atomically."""
+    """Write metadata.yaml into a bag directory atomically."""
     target = directory / FILE_NAME
-    beside = target.with_suffix(".yaml.part")
+    part = target.with_suffix(".yaml.part")
     try:
-        beside.write_text(_text({ROOT: values}), encoding="utf-8")
-        beside.replace(target)
+        part.write_text(_text({ROOT: values}), encoding="utf-8")
+        part.replace(target)
     finally:
-        beside.unlink(missing_ok=True)
+        part.unlink(missing_ok=True)
 
 
 def read_metadata(directory: Path) -> dict[str, Any]:
-    """Return what metadata.yaml says below its root; nothing if it is missing or cannot be read."""
+    """Return the contents of metadata.yaml below its root; empty if the file is missing or cannot be read."""
     try:
         return parsed(read_text(directory / FILE_NAME), ROOT)
     except DocumentError:
@@ -143,7 +143,7 @@ def read_metadata(directory: Path) -> dict[str, Any]:
 
 
 def parsed(text: str, root: str = "") -> dict[str, Any]:
-    """Return the mapping that YAML text holds, below its ``root`` if one is given; an empty one if there is none."""
+    """Return the mapping in a YAML text, below its ``root`` if one is given; empty if there is no mapping."""
     try:
         values = parse_yaml(text)
     except DocumentError:
@@ -154,19 +154,19 @@ def parsed(text: str, root: str = "") -> dict[str, Any]:
 
 
 def custom_data(values: Mapping[str, Any]) -> dict[str, str]:
-    """Return the custom data that metadata hold; those that are none are left out."""
+    """Return the custom data in the metadata; empty if there is no mapping."""
     found = values.get("custom_data")
     return {str(key): str(value) for key, value in found.items()} if isinstance(found, dict) else {}
 
 
 def file_names(values: Mapping[str, Any]) -> list[str]:
-    """Return the files of the bag that metadata name, in their order."""
+    """Return the names of the bag's files in the metadata, in their order."""
     names = values.get("relative_file_paths")
     return [name for name in names if isinstance(name, str)] if isinstance(names, list) else []
 
 
 def message_counts(values: Mapping[str, Any]) -> dict[str, int]:
-    """Return the number of messages by file name that metadata tell of."""
+    """Return the number of messages by file name in the metadata."""
     files = values.get("files")
     entries = [entry for entry in files if isinstance(entry, dict)] if isinstance(files, list) else []
     counts = {str(entry.get("path")): entry.get("message_count") for entry in entries}

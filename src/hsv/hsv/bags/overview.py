@@ -1,6 +1,6 @@
-"""Data for viewers that cannot be computed from a single topic: nominal state, bounds of the tube, active faults.
+"""Data for viewers from several topics: nominal state, bounds of the tube, active faults.
 
-Viewers plot fields and do not add them up; the nominal state is the sum of two, an edge of the tube of four.
+Viewers plot fields but do not add them. The nominal state is the sum of two fields, a bound of the tube of four.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ OVERVIEW_TOPIC = "/hsv/overview"
 OVERVIEW_TYPE = "hsv.Overview"
 
 STATES = STATE_NAMES[:N_RIGID]
-"""Fields of each of the parts, SI."""
+"""Fields of each part, SI."""
 
 PARTS = ("nominal", "lower", "upper")
-"""The edges are there only where there is a tube."""
+"""Parts of the message; the bounds exist only for a flight with a tube."""
 
 FAULTS = "faults"
 NO_FAULT = "none"
@@ -42,10 +42,10 @@ def overview_message(
     """Return the message of a step as JSON.
 
     Args:
-        nominal: Reference and deviation together, the rigid states first, SI.
-        centre: Centre of the set of errors, the rigid states first; empty if the design has none.
-        half_width: Half-width of the set, ordered like ``centre``.
-        faults: Channel and type of those that are active.
+        nominal: Nominal state x_r + x_n, the rigid states first, SI.
+        centre: Centre of the invariant set of errors, the rigid states first; empty if the design has none.
+        half_width: Half-widths of the set, in the order of ``centre``.
+        faults: Channel and type of each active fault.
     """
     nominal = np.asarray(nominal[:N_RIGID], float)
     parts = {"nominal": nominal}
@@ -53,7 +53,7 @@ def overview_message(
         middle, half = (np.asarray(values[:N_RIGID], float) for values in (centre, half_width))
         parts |= {"lower": nominal + middle - half, "upper": nominal + middle + half}
     message: dict[str, Any] = {
-        # JSON has no number that is not finite.
+        # JSON has neither NaN nor infinities.
         part: {name: value for name, value in zip(STATES, values.tolist(), strict=True) if np.isfinite(value)}
         for part, values in parts.items()
     }

@@ -1,4 +1,4 @@
-"""Parameters of all nodes of a graph, in the form of a ROS 2 parameter file: what they share, and what is their own."""
+"""Parameters of all nodes of a graph as in a ROS 2 parameter file: shared values, and values of single nodes."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class ParameterSections:
     shared: dict[str, Any]
     """Values for every node that has the parameter."""
     own: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """Values by node, which override the shared ones."""
+    """Values of single nodes, which override the shared ones."""
 
     @classmethod
     def gathered(cls, values: Mapping[str, Mapping[str, Any]]) -> Self:
-        """Return the parameters of the nodes in ``values``; a value on which all nodes agree is shared."""
+        """Return the parameters of the nodes in ``values``; equal values of all nodes are shared."""
         differing = differences(values)
         shared = {name: value for flat in values.values() for name, value in flat.items() if name not in differing}
         own = {node: {name: flat[name] for name in differing if name in flat} for node, flat in values.items()}
@@ -32,21 +32,21 @@ class ParameterSections:
 
     @classmethod
     def parse(cls, text: str, source: str) -> Self:
-        """Return the contents of the ``text`` of a parameter file.
+        """Return the parameters in the ``text`` of a parameter file.
 
         Raises:
-            DesignError: It is no parameter YAML; the message names ``source``.
+            DesignError: The text is not a parameter file; the message names ``source``.
         """
         sections = parse_sections(text, source)
         shared = sections.pop(_ALL, {})
         return cls(shared, {name.removeprefix("/"): flat for name, flat in sections.items()})
 
     def of(self, node: str) -> dict[str, Any]:
-        """Return the flat parameters of a node; those of other nodes may be among them."""
+        """Return the flat parameters of a node, including shared ones that only other nodes have."""
         return self.shared | self.own.get(node, {})
 
     def only(self, names: Iterable[str]) -> Self:
-        """Return the parameters of these names."""
+        """Return the parameters with these ``names`` only."""
         kept = set(names)
         shared = {name: value for name, value in self.shared.items() if name in kept}
         own = {node: {n: v for n, v in flat.items() if n in kept} for node, flat in self.own.items()}
@@ -58,12 +58,12 @@ class ParameterSections:
         return set(self.shared).union(*self.own.values())
 
     def updated(self, values: Mapping[str, Any]) -> Self:
-        """Return the parameters with these in place, for every node."""
+        """Return the parameters with ``values`` replaced for every node."""
         own = {node: {n: v for n, v in flat.items() if n not in values} for node, flat in self.own.items()}
         return type(self)(self.shared | dict(values), own)
 
     def overlaid(self, other: ParameterSections) -> Self:
-        """Return the parameters with those of ``other`` over them, as of two files given one after the other."""
+        """Return the parameters overridden by those of ``other``, as for two parameter files in this order."""
         below = self.updated(other.shared)
         nodes = below.own.keys() | other.own.keys()
         return type(self)(below.shared, {n: below.own.get(n, {}) | other.own.get(n, {}) for n in nodes})
@@ -71,13 +71,13 @@ class ParameterSections:
     def to_yaml(self) -> str:
         """Return the text of a ROS 2 parameter file."""
         sections = {_ALL: self.shared} | {f"/{node}": flat for node, flat in sorted(self.own.items())}
-        # Dotted names need no nesting: rcl takes them as they are.
+        # rcl accepts dotted names without nesting.
         tree = {name: {"ros__parameters": flat} for name, flat in sections.items() if flat}
         return yaml.safe_dump(tree, sort_keys=False)
 
 
 def differences(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return the parameters that nodes have with different values, each with its value by node."""
+    """Return the parameters with different values in different nodes: their values by node."""
     by_name: dict[str, dict[str, Any]] = {}
     for node, flat in values.items():
         for name, value in flat.items():
@@ -90,9 +90,9 @@ def differences(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, 
 
 
 def disagreements(values: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Say which parameters nodes of one graph have with different values although they need the same.
+    """Return a message for each parameter that must be equal in all nodes of a graph and is not.
 
-    Not ``feedback.tau``, which the controller alone flies with. Of two designs, their digests say enough.
+    ``feedback.tau`` may differ, because only the controller uses it. For different designs only the digests are listed.
     """
     differing = differences(values)
     differing.pop(TAU.name, None)

@@ -1,4 +1,4 @@
-"""Reading a bag that hsv or ``ros2 bag`` wrote: of one file or several, compressed or not, whole or damaged."""
+"""Read a bag of hsv or ``ros2 bag`` with one file or several, compressed or not, complete or damaged."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ from hsv.base.errors import RecordingError
 _OURS = "/hsv/"
 """Common prefix of this project's topics, unless they are remapped."""
 _USUAL = {resolved(role): kind for role, kind in TYPES.items()}
-"""Types of the topics of a graph by the names that they have unless they are moved or remapped."""
+"""Types of the topics of a graph by their names without namespace and remapping."""
 _STAMP_START, _STAMP_END = 4, 12
-"""Range of bytes of the stamp in the messages of a step: seconds and nanoseconds, four bytes each."""
+"""Bytes of the stamp in the messages of a step: seconds and nanoseconds, four bytes each."""
 _BIG_ENDIAN = b"\x00\x00"
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedTopic:
-    """A topic as found in a bag."""
+    """A topic of a bag with its number of messages."""
 
     name: str
     type: str
@@ -57,7 +57,7 @@ class RecordedTopic:
 
 @dataclass
 class _Recorded:
-    """A topic in the files of a bag; its channels differ at most in their quality of service."""
+    """A topic in the files of a bag; its channels may differ in their quality of service only."""
 
     channel: Channel
     schema: Schema
@@ -67,16 +67,16 @@ class _Recorded:
 
 @dataclass
 class Loss:
-    """Losses of a bag, as far as its files tell."""
+    """Known losses of a bag."""
 
     files: list[str] = field(default_factory=list)
-    """Files that the bag should have."""
+    """Names of the missing files."""
     damages: list[tuple[Path, Damage]] = field(default_factory=list)
     messages: int = 0
-    """Messages that were recorded and cannot be read."""
+    """Number of recorded messages that cannot be read."""
     attachments: int = 0
     counted: bool = True
-    """Whether the numbers are known, not only the least that they can be."""
+    """Whether the numbers are exact; otherwise they are lower bounds."""
 
     def __bool__(self) -> bool:
         return bool(self.files or self.damages or self.messages or self.attachments)
@@ -85,38 +85,37 @@ class Loss:
 class Bag:
     """A recorded run: its topics, messages, attachments and custom data.
 
-    Times are simulated ones, in nanoseconds: of the step topics the stamp that every message begins with, whenever it
-    was received; of the others that of the last step before them. Damage is skipped and told in :attr:`loss`.
+    All times are simulated times in nanoseconds. The time of a message of a step topic is its stamp; the time of
+    another message is the stamp of the last step received before it. Damages are skipped and listed in :attr:`loss`.
 
-    A topic is asked for by its name in the bag, ``/veh1/hsv/state``, or by its role in the graph, ``hsv/state``.
+    Methods accept the name of a topic in the bag, such as ``/veh1/hsv/state``, or its role, such as ``hsv/state``.
 
     Args:
         path: A bag directory, or a file in it.
 
     Raises:
-        RecordingError: If there is no such bag, it is no MCAP file, nothing of it can be read, or it is not of this
-            project.
+        RecordingError: The bag does not exist, is not an MCAP file, cannot be read at all, or is not of this project.
     """
 
     def __init__(self, path: Path | str) -> None:
         given = Path(path)
         self.files, missing = find_files(given)
-        """The files of the bag, in their order."""
+        """The files of the bag in their order."""
         self.path = self.files[0] if len(self.files) == 1 and not missing else given
-        """The file, or the directory of several."""
+        """The file, or the directory of several files."""
         self.folder = self.files[0].parent
         """The bag directory."""
         self.complete = not missing
-        """Whether the writer closed every file; a killed writer leaves one that is truncated."""
+        """Whether the writer closed every file; a killed writer leaves a truncated file."""
         self.loss = Loss(files=missing)
         self.attachments: dict[str, bytes] = {}
         self.media_types: dict[str, str] = {}
         """Media type of each attachment."""
         self.custom_data: dict[str, str] = {}
         self.distro = DISTRO
-        """The distribution of ROS 2 that it was recorded with."""
+        """ROS 2 distribution of the recorder."""
         self.roles: dict[str, str] = {}
-        """Names of the topics by their role in the graph, as :mod:`hsv.bags.description` has it."""
+        """Names of the topics by their role, see :mod:`hsv.bags.description`."""
         self.namespace = ROOT
         """Namespace of the graph."""
         self._topics: dict[str, _Recorded] = {}
@@ -126,7 +125,7 @@ class Bag:
 
     @property
     def topics(self) -> dict[str, RecordedTopic]:
-        """The topics by name, those without messages included."""
+        """The topics by name, including topics without messages."""
         return {
             name: RecordedTopic(
                 name,
@@ -138,20 +137,20 @@ class Bag:
         }
 
     def name_of(self, role: str) -> str:
-        """Return the name of the topic that plays ``role``, or that it would have if it were in the bag."""
+        """Return the name of the topic in ``role``, or its default name if it is not in the bag."""
         return self.roles.get(role) or resolved(role, self.namespace)
 
     @cached_property
     def span(self) -> tuple[int, int]:
-        """First and last time in the bag in nanoseconds; zeros if it holds no message."""
+        """First and last time in the bag, ns; zeros without messages."""
         times = [(int(times.min()), int(times.max())) for times in map(self.times, self._topics) if len(times)]
         return (min(first for first, _ in times), max(last for _, last in times)) if times else (0, 0)
 
     def times(self, topic: str) -> NDArray[np.int64]:
-        """Return the simulated times of the messages of a topic, shape (n,), in nanoseconds.
+        """Return the simulated times (n,) of the messages of a topic, ns.
 
         Raises:
-            RecordingError: If the topic is not in the bag, or a message of a step is too short to have a stamp.
+            RecordingError: The topic is not in the bag, or a message of a step is too short for a stamp.
         """
         recorded, name = self._of(topic), self.name_of(topic)
         if name in self._step_topics:
@@ -159,23 +158,22 @@ class Bag:
         log_times = np.array(recorded.log_times, np.int64)
         received, stamps = self._clock
         if np.array_equal(received, stamps):
-            return log_times  # of a recorder that goes by simulated time itself
+            return log_times  # the recorder used simulated time
         before = np.searchsorted(received, log_times, side="right") - 1
         return np.asarray(stamps[np.maximum(before, 0)])
 
     def messages(self, topic: str) -> list[tuple[int, bytes]]:
-        """Return the messages of a topic as recorded: simulated time in nanoseconds and CDR with its header."""
+        """Return simulated time (ns) and CDR with its header of each recorded message of a topic."""
         return list(zip(self.times(topic).tolist(), self._of(topic).messages, strict=True))
 
     def columns(self, topic: str) -> Columns:
-        """Return all messages of a topic, decoded, one array per field.
+        """Return all decoded messages of a topic, one array per field; the result is cached.
 
         Returns:
-            Arrays with the messages along the first axis, by field path; see :mod:`hsv.bags.columns`. They are
-            decoded once and then cached.
+            Arrays with the messages along the first axis, by field path; see :mod:`hsv.bags.columns`.
 
         Raises:
-            RecordingError: If the topic is not in the bag or a message does not fit its definition.
+            RecordingError: The topic is not in the bag, or a message does not fit its definition.
         """
         name = self.name_of(topic)
         if name not in self._columns:
@@ -187,18 +185,18 @@ class Bag:
         return units_of(self.definition(topic), self.types.fielddefs, self.topics[self.name_of(topic)].type)
 
     def decode(self, topic: str) -> Iterator[tuple[int, Any]]:
-        """Yield time in nanoseconds and message of a topic, deserialized one by one.
+        """Yield time (ns) and deserialized message of each message of a topic.
 
         Raises:
-            RecordingError: As :meth:`columns`.
+            RecordingError: As for :meth:`columns`.
         """
         return self.track(topic).decode()
 
     def track(self, topic: str) -> Track:
-        """Return the messages of a topic with what decodes them.
+        """Return the messages of a topic with their definitions.
 
         Raises:
-            RecordingError: If the topic is not in the bag.
+            RecordingError: The topic is not in the bag, or its definition cannot be used.
         """
         recorded, name = self._of(topic), self.name_of(topic)
         if (kind := recorded.schema.name) not in self.types.fielddefs:
@@ -209,7 +207,7 @@ class Bag:
         """Return an attachment as text.
 
         Raises:
-            RecordingError: If it is not in the bag or no text.
+            RecordingError: The attachment is not in the bag or is not text.
         """
         if name not in self.attachments:
             raise RecordingError(f"{self.path}: no attachment {name}, expected a bag recorded by hsv run")
@@ -219,22 +217,22 @@ class Bag:
             raise RecordingError(f"{self.path}: attachment {name}: {error}, expected text") from None
 
     def definition(self, topic: str) -> str:
-        """Return the definition of a topic's type as recorded, its dependencies included."""
+        """Return the recorded definition of a topic's type, including its dependencies."""
         return self._text(self._of(topic).schema)
 
     def qos(self, topic: str) -> Qos:
-        """Return the quality of service with which a topic was offered; the default if the bag does not tell."""
+        """Return the offered quality of service of a topic; the default if it is not recorded."""
         return Qos.from_yaml(self._of(topic).channel.metadata.get("offered_qos_profiles", ""))
 
     def constants(self, topic: str) -> dict[str, ConstValue]:
-        """Return the constants that the type of a topic defines, as recorded in the bag."""
+        """Return the constants in the recorded definition of a topic's type."""
         return {name: value for name, _, value in self.types.fielddefs[self._of(topic).schema.name][0]}
 
     def constant(self, topic: str, name: str) -> ConstValue:
-        """Return a constant that the type of a topic defines.
+        """Return a constant in the recorded definition of a topic's type.
 
         Raises:
-            RecordingError: It defines none of this name.
+            RecordingError: The definition has no constant of this name.
         """
         found = self.constants(topic)
         if name not in found:
@@ -243,7 +241,7 @@ class Bag:
 
     @cached_property
     def types(self) -> Typestore:
-        """The message types as the bag's own definitions state them."""
+        """The message types by the definitions in the bag."""
         ours: dict[str, str] = {}
         others: dict[str, str] = {}
         for topic, recorded in self._topics.items():
@@ -265,7 +263,7 @@ class Bag:
         raise RecordingError(f"{self.path}: no topic {name}, only {', '.join(sorted(self.topics))}")
 
     def _stamps(self, topic: str, messages: list[bytes]) -> NDArray[np.int64]:
-        """Return the stamps that the messages of a step topic begin with, right behind the header of the CDR."""
+        """Return the stamps (n,) of the messages of a step topic, ns; they follow the header of the CDR."""
         if any(len(message) < _STAMP_END for message in messages):
             raise RecordingError(f"{self.path}: topic {topic}: a message of less than {_STAMP_END} bytes")
         order = ">" if messages and messages[0].startswith(_BIG_ENDIAN) else "<"
@@ -279,7 +277,7 @@ class Bag:
 
     @cached_property
     def _clock(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Log times at which steps were received, ascending, and the latest stamp received until then."""
+        """Log times (n,) of all messages of steps, ascending, and the latest stamp (n,) up to each of them, ns."""
         steps = sorted(self._step_topics)
         received = np.concatenate([np.array([], np.int64), *(self._topics[topic].log_times for topic in steps)])
         stamps = np.concatenate([np.array([], np.int64), *(self.times(topic) for topic in steps)])
@@ -293,7 +291,7 @@ class Bag:
         for file in self.files:
             data = read_file(file)
             scan = Scan(data)
-            # Of several files, one that is nothing any more is a damage.
+            # In a bag of several files an unreadable file is a damage, not an error.
             if len(self.files) == 1 and not data:
                 raise RecordingError(f"{file}: is empty, expected an MCAP file")
             if len(self.files) == 1 and not scan.is_mcap:
@@ -319,7 +317,7 @@ class Bag:
         unpack, size = MESSAGE_HEADER.unpack_from, MESSAGE_HEADER.size
         schemas: dict[int, Schema] = {}
         channels: dict[int, Channel] = {}
-        # Channels of one topic share their lists, in the order of the file.
+        # Channels of one topic share lists, in the order of the file.
         lists: dict[int, tuple[list[int], list[bytes]]] = {}
         attachments = 0
         rosbag2: dict[str, Any] = {}
@@ -327,7 +325,7 @@ class Bag:
             match opcode:
                 case Opcode.MESSAGE:
                     channel_id, _, time, _ = unpack(body)
-                    if channel_id not in lists:  # its channel is lost, or stands in the summary only
+                    if channel_id not in lists:  # its channel is lost, or only in the summary
                         lists[channel_id] = [], []
                     times, messages = lists[channel_id]
                     times.append(time)
@@ -362,7 +360,7 @@ class Bag:
             except RecordingError:
                 if not scan.damages:
                     raise
-                del channels[channel.id]  # its definition is lost, or not what it was
+                del channels[channel.id]  # its definition is lost or damaged
         read = 0
         for topic, number in {channel.topic: channel.id for channel in channels.values()}.items():
             found = [(time, read_message(data)) for time, data in zip(*lists[number], strict=True)]
@@ -375,7 +373,7 @@ class Bag:
         return read, orphans, attachments, rosbag2
 
     def _declare(self, channel: Channel, schema: Schema | None) -> None:
-        """Take up the topic of a channel; one of somebody else's whose messages cannot be decoded is left out."""
+        """Add the topic of a channel; foreign topics whose messages cannot be decoded are skipped."""
         name = channel.topic
         decodable = schema is not None and (schema.encoding, channel.message_encoding) == ("ros2msg", "cdr")
         if not decodable and not _is_ours(name):

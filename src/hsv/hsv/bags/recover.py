@@ -1,4 +1,4 @@
-"""Making a proper bag of what a killed writer, or a damaged disk, has left."""
+"""Recovery of truncated or damaged bags, as left by a killed writer or a damaged disk."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _PROFILES = "offered_qos_profiles"
 """Key of the quality of service in the metadata of a channel."""
 
 RECOVERED = {"recovered": "true"}
-"""Custom data of a recovered bag: its end is not the end of the run."""
+"""Custom data that mark a recovered bag, whose end may not be the end of the run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,29 +45,29 @@ class Recovery:
     """Result of a recovery."""
 
     bag: Bag
-    """The bag as it was found."""
+    """The original bag."""
     path: Path
-    """The bag directory that was written; that of the old bag where nothing was to be done."""
+    """Directory of the new bag, or of the original if it was complete."""
     messages: int
-    """Number of messages kept."""
+    """Number of messages in the result."""
     changed: bool
-    """False if the bag was whole already."""
+    """Whether a new bag was written."""
 
 
 def recover(path: Path | str, target: Path | None = None) -> Recovery:
-    """Write a new bag with everything whole of a bag that is truncated or damaged; the old one is not modified.
+    """Write a new bag with all intact data of a truncated or damaged bag; the original is not modified.
 
-    The new one is of one file, with summary, indexes and metadata.yaml. Of a bag that is whole, nothing is written.
+    The new bag has one file with summary and indexes, and metadata.yaml. A complete bag is not copied.
 
     Args:
         path: A bag directory, or a file in it.
-        target: The new bag directory; default: beside the old one, named after it with ``_recovered``.
+        target: The new bag directory; default: the original's name with ``_recovered``, in the same folder.
 
     Raises:
-        RecordingError: If its recorder still runs, nothing of the bag can be read (see
+        RecordingError: The recorder of the bag still runs, nothing of the bag can be read (see
             :class:`hsv.bags.reader.Bag`), the target exists, or there is no space left.
     """
-    with _nobody_writing(find_files(Path(path))[0]):
+    with _exclusively(find_files(Path(path))[0]):
         bag = Bag(path)
         messages = sum(topic.count for topic in bag.topics.values())
         if bag.complete and not bag.loss and _has_its_metadata(bag, messages):
@@ -93,29 +93,28 @@ def recover(path: Path | str, target: Path | None = None) -> Recovery:
 
 
 def finalise(directory: Path) -> None:
-    """Finish the bag of a killed recorder in its own place: nothing whole of it is lost, and no damage is in it.
+    """Complete the bag of a killed recorder in place.
 
-    A new file is written beside the old one and takes its place when it is whole; a finalisation that is itself
-    interrupted leaves the bag as it was.
+    The new file replaces the old one only when it is complete, so that an interrupted call leaves the bag unchanged.
 
     Raises:
-        RecordingError: If its recorder still runs, nothing of the bag can be read, it is damaged, or there is no space
-            left.
+        RecordingError: The recorder of the bag still runs, nothing of the bag can be read, the bag is damaged, or there
+            is no space left.
     """
-    with _nobody_writing(find_files(directory)[0]):
+    with _exclusively(find_files(directory)[0]):
         bag = Bag(directory)
         if bag.loss:
             raise RecordingError(f"{bag.path}: is damaged, hsv recover makes a new bag of what is whole")
         (mcap,) = bag.files
-        beside = mcap.with_suffix(".mcap.part")
+        part = mcap.with_suffix(".mcap.part")
         try:
-            values = _rewrite(bag, beside, mcap.name)
-            beside.replace(mcap)
+            values = _rewrite(bag, part, mcap.name)
+            part.replace(mcap)
             write_metadata(directory, values)
         except OSError as error:
             raise RecordingError(f"{mcap}: cannot be repaired: {error.strerror}") from None
         finally:
-            beside.unlink(missing_ok=True)
+            part.unlink(missing_ok=True)
 
 
 def _has_its_metadata(bag: Bag, messages: int) -> bool:
@@ -130,7 +129,8 @@ def _has_its_metadata(bag: Bag, messages: int) -> bool:
 
 
 @contextmanager
-def _nobody_writing(files: list[Path]) -> Iterator[None]:
+def _exclusively(files: list[Path]) -> Iterator[None]:
+    """Hold the locks of ``files``, which their recorder holds while it runs."""
     with ExitStack() as stack:
         for file in files:
             try:
@@ -143,7 +143,7 @@ def _nobody_writing(files: list[Path]) -> Iterator[None]:
 
 
 def _rewrite(bag: Bag, path: Path, name: str = "") -> dict[str, Any]:
-    """Write everything whole of ``bag`` to one file, which will have ``name``; return the metadata of the new bag."""
+    """Write the intact data of ``bag`` to the file ``path``; return the metadata, which call it ``name``."""
     custom = bag.custom_data | RECOVERED
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=CHUNK_BYTES)
@@ -161,7 +161,7 @@ def _rewrite(bag: Bag, path: Path, name: str = "") -> dict[str, Any]:
 
 
 class _Copy:
-    """Copies files one after the other into one; equal schemas and channels become one."""
+    """A copy of several files into one, with equal schemas and channels merged."""
 
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
@@ -175,7 +175,7 @@ class _Copy:
         found = list(Scan(data).records())
         schemas: dict[int, Schema] = {}
         numbers: dict[int, tuple[int, Tally]] = {}
-        # Definitions first: where the beginning is damaged, they stand at the end only.
+        # Read definitions first, because in a file with a damaged beginning they are at the end.
         for schema in (Schema.read(content(body)) for opcode, body in found if opcode == Opcode.SCHEMA):
             schemas.setdefault(schema.id, schema)  # the first has the checksum of its chunk
         for channel in (Channel.read(content(body)) for opcode, body in found if opcode == Opcode.CHANNEL):
@@ -202,7 +202,7 @@ class _Copy:
                         self._writer.add_metadata(metadata.name, metadata.metadata)
 
     def tallied(self) -> tuple[Tally, list[TopicInformation]]:
-        """Return what metadata.yaml says of the messages and topics copied."""
+        """Return the tally of the copied messages and the copied topics for metadata.yaml."""
         topics = [
             TopicInformation(
                 name,

@@ -1,7 +1,7 @@
-"""Walking through the records of an MCAP file, damaged ones included.
+"""Scan of the records of an MCAP file that continues after damages.
 
-The readers of the ``mcap`` package end at the first damage. This walk reads everything before it, and goes on with the
-next chunk, attachment or end of data behind it. The contents of records, decompression and checksums are the package's.
+The readers of the ``mcap`` package end at the first damage. This scan continues with the next chunk, attachment or end
+of data. The package decodes the records, decompresses chunks and checks checksums.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdError
 
 _FRAME = struct.Struct("<BQ")
-"""Opcode and length in front of a record."""
+"""Opcode and length at the start of a record."""
 MESSAGE_HEADER = struct.Struct("<HIQQ")
 """Channel id, sequence, log time and publish time at the start of a message record; the data follow."""
 _INDEX_HEADER = struct.Struct("<HI")
 _INDEX_ENTRY = 16
 _CHECKSUM = struct.Struct("<I")
 
-# A chunk, an attachment or an end of data, with a length below 2^40.
+# The start of a chunk, an attachment or an end of data with a length below 2^40.
 _CANDIDATE = re.compile(rb"(?=[\x06\x09\x0f].{5}\x00{3})", re.DOTALL)
 
 _DAMAGE = (EndOfFile, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, OverflowError, MemoryError)
-"""Exceptions of the package for records whose lengths, texts or checksums are wrong."""
+"""Exceptions of the package for wrong lengths, texts or checksums."""
 
 _RECORDS = {
     Opcode.HEADER: kinds.Header,
@@ -51,60 +51,60 @@ _RECORDS = {
     Opcode.SUMMARY_OFFSET: kinds.SummaryOffset,
     Opcode.DATA_END: kinds.DataEnd,
 }
-"""Records that the package reads whole; they are consistent if their fields fill them exactly."""
+"""Record types that the package parses; a record is consistent if its fields fill it exactly."""
 
 
 @dataclass(frozen=True)
 class Damage:
-    """A stretch of a file that cannot be read."""
+    """A damaged part of a file."""
 
     offset: int
-    """Byte at which it begins."""
+    """First byte."""
     length: int
-    """Bytes."""
+    """Length in bytes."""
     what: str
-    """Description of the damaged record, as far as it is known."""
+    """Description of the damaged record."""
 
     def __str__(self) -> str:
         return f"{self.what} at byte {self.offset}"
 
 
 def content(body: memoryview) -> ReadDataStream:
-    """Return the body of a record as the stream that the ``read`` functions of ``mcap.records`` take."""
+    """Return the body of a record as a stream for the ``read`` functions of ``mcap.records``."""
     return ReadDataStream(BytesIO(body))
 
 
 class Scan:
-    """One walk through the records of a file; its other findings are complete when the walk is.
+    """A scan of the records of a file; the attributes are complete after :meth:`records` is exhausted.
 
     Args:
-        data: The whole file.
+        data: Contents of the file.
     """
 
     def __init__(self, data: bytes) -> None:
         self.damages: list[Damage] = []
-        """Damage before the last intact record."""
+        """Damages before the last intact record."""
         self.closed = False
-        """Whether the writer closed the file: its footer is there."""
+        """Whether the file has a footer, which the writer adds at its end."""
         self.statistics: kinds.Statistics | None = None
-        """Statistics of the writer, if its summary is intact."""
+        """Statistics of the writer, if the summary is intact."""
         self.indexed = 0
-        """Messages that the indexes behind the chunks tell of."""
+        """Number of messages in the indexes of the chunks."""
         self._data = memoryview(data)
         self._chunks: set[int] = set()
-        """Digests of the chunks read: a block that was written twice is read once."""
+        """Digests of the chunks so far, so that a duplicated chunk is read once."""
 
     @property
     def is_mcap(self) -> bool:
-        """Whether the file is one: it begins as such, or its beginning is damaged and a record follows."""
+        """Whether the data are an MCAP file: they begin like one, or contain a record after a damaged beginning."""
         magic = MCAP0_MAGIC
         return self._data[: len(magic)] == magic[: len(self._data)] or self._next(0) is not None
 
     def records(self) -> Iterator[tuple[int, memoryview]]:
-        """Yield opcode and body of every whole record but indexes, those inside chunks in place of their chunk.
+        """Yield opcode and body of every intact record except indexes; chunks are replaced by their records.
 
-        What does not fit its checksum, or is no record, is left out and noted in :attr:`damages`; a record that is cut
-        off at the end of the file, as a killed writer leaves it, is left out as well.
+        Data with a wrong checksum, or without a valid record, are skipped and added to :attr:`damages`. A record cut
+        off at the end of the file, as left by a killed writer, is skipped as well.
         """
         position = len(MCAP0_MAGIC)
         if self._data[:position] != MCAP0_MAGIC:
@@ -128,7 +128,7 @@ class Scan:
                     damages = len(self.damages)
                     if new:
                         yield from self._unpacked(position, body)
-                    if len(self.damages) > damages:  # a whole chunk may stand in a doubled part of this one
+                    if len(self.damages) > damages:  # an intact chunk may begin inside a damaged one
                         end = min(self._next(position + 1) or end, end)
                 case Opcode.MESSAGE_INDEX:
                     self.indexed += new * ((len(body) - _INDEX_HEADER.size) // _INDEX_ENTRY)
@@ -150,7 +150,7 @@ class Scan:
             position = end
 
     def _end(self, position: int) -> int | None:
-        """Return where the record at ``position`` ends; None if there is none, or one that contradicts itself."""
+        """Return the end of the record at ``position``; None if there is no consistent record."""
         if not self._may_begin(position) or position + _FRAME.size > len(self._data):
             return None
         opcode, length = _FRAME.unpack_from(self._data, position)
@@ -159,7 +159,7 @@ class Scan:
         match opcode:
             case Opcode.MESSAGE:
                 fits = length >= MESSAGE_HEADER.size and self._may_begin(start + length)
-            case _ if opcode > Opcode.DATA_END:  # somebody's own, to be passed over
+            case _ if opcode > Opcode.DATA_END:  # a private record, to be skipped
                 fits = self._may_begin(start + length)
             case Opcode.MESSAGE_INDEX:
                 entries = length - _INDEX_HEADER.size
@@ -169,19 +169,19 @@ class Scan:
         return start + int(length) if fits else None
 
     def _may_begin(self, position: int) -> bool:
-        """Return whether a record, or the end of the file, may be at ``position``."""
+        """Return whether a record, or the end of the file, is possible at ``position``."""
         if position + _FRAME.size > len(self._data):
             return True
         opcode, length = _FRAME.unpack_from(self._data, position)
         return bool(opcode and position + _FRAME.size + length <= len(self._data))
 
     def _next(self, position: int) -> int | None:
-        """Return where the next whole chunk, attachment or end of data begins, None if none does."""
+        """Return the start of the next intact chunk, attachment or end of data, or None."""
         candidates = (match.start() for match in _CANDIDATE.finditer(self._data, position))
         return next((at for at in candidates if self._end(at) is not None), None)
 
     def _unpacked(self, offset: int, body: memoryview) -> Iterator[tuple[int, memoryview]]:
-        """Yield the records of a chunk: all or none, or without a checksum those before the first damage."""
+        """Yield the records of a chunk: all or none, or up to the first damage in a chunk without a checksum."""
         try:
             stream, length = get_chunk_data_stream(kinds.Chunk.read(content(body)), validate_crc=True)
             data = memoryview(stream.read(length))
@@ -201,7 +201,7 @@ class Scan:
             position = end
         if position < len(data):
             self.damages.append(Damage(offset, len(body), "part of a chunk"))
-            found = found[:-1]  # whose end may be damaged
+            found = found[:-1]  # the last one may be damaged
         yield from found
 
 
@@ -215,6 +215,6 @@ def _is_filled(kind: Any, body: memoryview) -> bool:
 
 
 def _fits_checksum(data: memoryview, record: memoryview) -> bool:
-    """Return whether ``data`` fits the checksum at the end of ``record``; zero: the writer did not compute one."""
+    """Return whether ``data`` fits the checksum at the end of ``record``; zero means no checksum."""
     (expected,) = _CHECKSUM.unpack(record[-_CHECKSUM.size :])
     return expected in (0, zlib.crc32(data[: -_CHECKSUM.size]))

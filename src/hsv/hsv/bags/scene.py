@@ -1,4 +1,4 @@
-"""A bag with pictures: an MCAP file with its messages and, beside them, what a viewer draws the vehicle from."""
+"""Copies of bags for viewers: an MCAP file with the messages of a bag, the scene of the vehicle and an overview."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from hsv.model.airframe.scene import RATE, SCENE_TOPIC, TRANSFORMS_TOPIC, frame_
 from hsv.model.signals import INPUT_NAMES, STATE_NAMES
 
 Message = tuple[int, str, bytes]
-"""Time in nanoseconds, topic, data."""
+"""Time (ns), topic and data."""
 
 
 def scene_path(bag: Bag) -> Path:
-    """Return where the file of ``bag`` lies unless somebody wants it elsewhere: in a folder of the bag's own."""
+    """Return the default path of the viewer file of ``bag``, in a folder inside the bag directory."""
     return bag.folder / "scene" / f"{bag.path.stem}_scene.mcap"
 
 
 def scene_of(bag: Bag) -> Path:
-    """Return the file of ``bag`` with pictures, written now unless there is one that is no older than the bag.
+    """Return the viewer file of ``bag``; write it if it is missing or older than the bag.
 
     Raises:
         RecordingError: See :func:`write_scene`.
@@ -45,12 +45,12 @@ def scene_of(bag: Bag) -> Path:
 
 
 def write_scene(bag: Bag, target: Path, exaggeration: float | None = None) -> None:
-    """Write ``target``: the messages and attachments of ``bag``, and the vehicle as a Foxglove scene with its frames.
+    """Write ``target`` with the messages and attachments of ``bag``, and the vehicle as a Foxglove scene with frames.
 
     Args:
         bag: A flight.
         target: New MCAP file.
-        exaggeration: Factor on the bending; default: that of the airframe.
+        exaggeration: Factor on the bending; default: the value of the airframe.
 
     Raises:
         RecordingError: The bag holds no flight, or the file exists or cannot be written.
@@ -77,7 +77,7 @@ def write_scene(bag: Bag, target: Path, exaggeration: float | None = None) -> No
 
 
 def _channels(writer: Writer, bag: Bag) -> dict[str, int]:
-    """Register every topic; return the channels by the name of the topic."""
+    """Register every topic; return the channel numbers by topic."""
     channels, schemas = {}, {}
     for name, topic in bag.topics.items():
         if topic.type not in schemas:
@@ -94,15 +94,15 @@ def _channels(writer: Writer, bag: Bag) -> dict[str, int]:
 
 
 def _pictures(bag: Bag, exaggeration: float | None) -> list[Message]:
-    """Return what is added, in the order of time."""
+    """Return the added messages, scene, frames and overview, in order of time."""
     topics = dict.fromkeys((STATE, ACTUATOR, NOMINAL, *equipment_topics(bag)))
     if TUBE_STATUS in bag.roles:
         topics[TUBE_STATUS] = None
     columns = joined(bag, list(topics))
     stamps = columns[STATE]["header.stamp"].tolist()
     inputs = dict(zip(INPUT_NAMES, input_columns(columns[ACTUATOR]).T, strict=True))
-    for name, were in effectors(columns).items():
-        inputs[name] = np.where(np.isfinite(were), were, inputs[name])
+    for name, positions in effectors(columns).items():
+        inputs[name] = np.where(np.isfinite(positions), positions, inputs[name])
     states = dict(zip(STATE_NAMES, state_columns(columns[STATE]).T, strict=True))
     drawn = np.stack([(states | inputs)[name] for name in Sample._fields], axis=1)
     nominal = state_columns(columns[NOMINAL], "reference.") + state_columns(columns[NOMINAL], "deviation.")

@@ -1,4 +1,4 @@
-"""Steps for which the topics of a bag have messages, and rows of the same step."""
+"""Recorded steps of a bag: joined topics, expected and complete steps, irregularities."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from hsv.base.errors import RecordingError
 
 
 def cut_off(bag: Bag) -> bool:
-    """Whether the last messages may be missing: the recorder was killed, even if the bag was completed since."""
+    """Return whether the last messages may be missing, because the recorder was killed."""
     return not bag.complete or RECOVERED.items() <= bag.custom_data.items()
 
 
 def joined(bag: Bag, topics: Sequence[str]) -> dict[str, Columns]:
-    """Return the columns of ``topics`` row by row of the same step: the steps that all of them have, in order.
+    """Return the columns of ``topics`` for the steps that all of them have, with equal steps row by row.
 
     Raises:
-        RecordingError: A topic is missing or carries no step, or there is no step that all have.
+        RecordingError: A topic is missing or has no step numbers, or no step is in all topics.
     """
     columns = {topic: bag.columns(topic) for topic in topics}
     steps = [found["step"] for found in columns.values()]
@@ -42,10 +42,10 @@ def joined(bag: Bag, topics: Sequence[str]) -> dict[str, Columns]:
 
 
 def expected_stamps(bag: Bag) -> NDArray[np.int64]:
-    """Return the stamps, in nanoseconds, of all steps that the bag should hold.
+    """Return the stamps (ns) of all steps that a complete bag contains.
 
-    They are those that the plant announced on /hsv/run, up to the state that it called the last. Of a bag without an
-    announcement they end with the last step that any topic has.
+    These are the steps that the plant announced on /hsv/run, up to the last state of the flight. Without an
+    announcement they end with the last recorded step.
 
     Raises:
         RecordingError: A message does not fit its definition.
@@ -62,7 +62,7 @@ def expected_stamps(bag: Bag) -> NDArray[np.int64]:
 
 
 def _announced(bag: Bag) -> tuple[float, int] | None:
-    """Return period and last step of the run as the plant announced it, None where it is not in the bag."""
+    """Return period (s) and last step of the announced run, or None without a recorded announcement."""
     columns = bag.columns(RUN) if RUN in bag.roles else Columns()
     if not {"period", "last_step"} <= columns.keys() or not len(columns["period"]):
         return None
@@ -70,7 +70,7 @@ def _announced(bag: Bag) -> tuple[float, int] | None:
 
 
 def _numbered(bag: Bag) -> tuple[float, int] | None:
-    """Return the period, and the last step, that the recorded steps tell by their number."""
+    """Return period (s) and last step from the numbers of the recorded steps, or None."""
     last: tuple[float, int] | None = None
     for topic, stamps in _stamps(bag).items():
         steps = bag.columns(topic).get("step", np.array([], np.uint64))
@@ -84,7 +84,7 @@ def _stamps(bag: Bag) -> dict[str, NDArray[np.int64]]:
 
 
 def complete_stamps(bag: Bag) -> NDArray[np.int64]:
-    """Return the stamps of the steps of which the bag has every step topic that it has at all."""
+    """Return the stamps (ns) of the complete steps, which are recorded on all step topics of the bag."""
     stamps = list(_stamps(bag).values())
     common = np.unique(stamps[0]) if stamps else np.array([], np.int64)
     for stamp in stamps:
@@ -93,7 +93,7 @@ def complete_stamps(bag: Bag) -> NDArray[np.int64]:
 
 
 def lost_seconds(bag: Bag) -> float:
-    """Return the simulated time of the steps that are missing in the bag, or have not all of its topics.
+    """Return the simulated time (s) of the steps that are missing or incomplete in the bag.
 
     Raises:
         RecordingError: A message does not fit its definition.
@@ -106,9 +106,9 @@ def lost_seconds(bag: Bag) -> float:
 
 
 def irregularities(bag: Bag) -> list[str]:
-    """Say which steps are missing, on all topics or on some, or twice or out of order; nothing of a whole bag.
+    """Return messages about steps that are missing on all or some topics, repeated, or out of order.
 
-    Of a bag that is truncated, the steps count that all topics have reached.
+    In a truncated bag only the steps that all topics have reached are examined.
 
     Raises:
         RecordingError: A message does not fit its definition.
@@ -129,7 +129,7 @@ def irregularities(bag: Bag) -> list[str]:
     if len(nowhere):
         first = f"the first at t = {nowhere[0] * 1e-9:.2f} s"
         words.append(f"lacks {len(nowhere)} of {len(every)} steps on all topics, {first}")
-    # Topics that are recorded together lack the same.
+    # Group the topics that lack the same steps.
     lacking: dict[tuple[int, ...], list[str]] = {}
     for topic, stamp in stamps.items():
         if len(missing := np.setdiff1d(found, stamp)):

@@ -11,7 +11,7 @@ from hsv.base.errors import DocumentError
 from hsv.base.files import parse_yaml
 
 INFINITE = 2**63 - 1
-"""An endless duration in nanoseconds; rendered as ROS 2 does: sec 9223372036, nsec 854775807."""
+"""Infinite duration, ns; ROS 2 writes sec 9223372036, nsec 854775807."""
 
 
 def _duration(nanoseconds: int) -> dict[str, int]:
@@ -21,13 +21,13 @@ def _duration(nanoseconds: int) -> dict[str, int]:
 
 @dataclass(frozen=True, slots=True)
 class Qos:
-    """A quality-of-service profile in the words of rosbag2; the durations in nanoseconds."""
+    """A quality-of-service profile with the terms of rosbag2; durations in nanoseconds."""
 
     history: str = "keep_last"
     depth: int = 10
     reliability: str = "reliable"
     durability: str = "volatile"
-    """``transient_local`` for latched topics; a player must offer them with the same durability."""
+    """``transient_local`` for latched topics, which a player must offer with the same durability."""
     deadline: int = INFINITE
     lifespan: int = INFINITE
     liveliness: str = "automatic"
@@ -35,7 +35,7 @@ class Qos:
     avoid_ros_namespace_conventions: bool = False
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the nine keys that rosbag2 demands of a profile."""
+        """Return the nine keys of a profile in rosbag2."""
         return {
             "history": self.history,
             "depth": self.depth,
@@ -50,7 +50,7 @@ class Qos:
 
     @classmethod
     def from_yaml(cls, text: str) -> Qos:
-        """Return the first profile of the text that :meth:`as_yaml` makes, with defaults for missing entries."""
+        """Return the first profile in a text as from :meth:`as_yaml`, with defaults for missing entries."""
         profiles = readable_profiles(text) or [{}]
         given = {key: value for key, value in profiles[0].items() if key in cls.__dataclass_fields__}
         for key, value in given.items():
@@ -59,12 +59,12 @@ class Qos:
         return cls(**given)
 
     def as_yaml(self) -> str:
-        """Return the profile as the list of one profile that the metadata of an MCAP channel carries as text."""
+        """Return the profile as the YAML list in the metadata of an MCAP channel."""
         return yaml.safe_dump([self.as_dict()], sort_keys=False)
 
 
 def readable_profiles(text: str) -> list[dict[str, Any]]:
-    """Return the profiles in the metadata of a channel, with defaults for damaged entries."""
+    """Return the profiles in the metadata of a channel, with defaults for damaged entries; empty if unreadable."""
     try:
         profiles = parse_yaml(text)
     except DocumentError:
@@ -76,7 +76,7 @@ def readable_profiles(text: str) -> list[dict[str, Any]]:
 
 
 def repaired_profiles(text: str) -> str:
-    """Return the ``text`` of profiles, repaired if it is damaged; empty if nothing of it is left."""
+    """Return the ``text`` of profiles, repaired if it is damaged; empty if it cannot be repaired."""
     profiles = readable_profiles(text)
     if not profiles:
         return ""
@@ -106,7 +106,7 @@ class Topic:
     type: str
     """``package/msg/Type``."""
     definition: str
-    """The .msg text with its dependencies; see :func:`hsv.bags.definitions.definition`."""
+    """Message definition with its dependencies; see :func:`hsv.bags.definitions.definition`."""
     type_hash: str
-    """``RIHS01_`` and 64 hexadecimal digits, or empty where it is not known."""
+    """``RIHS01_`` and 64 hexadecimal digits; empty if unknown."""
     qos: Qos

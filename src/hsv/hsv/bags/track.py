@@ -1,4 +1,4 @@
-"""The messages of one topic, from a bag or made in a replay."""
+"""The messages of one topic, from a bag or from a replay."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from hsv.base.errors import RecordingError, SignalError
 
 @contextmanager
 def expecting_fields(source: object) -> Iterator[None]:
-    """Convert the error of a message whose definition lacks a field, or that no block can take.
+    """Convert errors of a message with a missing field or an invalid signal to RecordingErrors.
 
     Raises:
-        RecordingError: It names ``source``, the type or the topic of the message, and the field.
+        RecordingError: The error with ``source``, the type or topic of the message, and the field.
     """
     try:
         yield
@@ -39,17 +39,17 @@ def expecting_fields(source: object) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Track:
-    """Messages of one topic in their order."""
+    """The messages of one topic in their order."""
 
     topic: str
     type: str
     """``package/msg/Type``."""
     types: Typestore
-    """Definitions of the type and of those it depends on."""
+    """Definitions of the type and its dependencies."""
     times: list[int]
-    """Simulated times in nanoseconds."""
+    """Simulated times, ns."""
     data: list[bytes]
-    """CDR with its header of four bytes."""
+    """Messages in CDR with the header of four bytes."""
     source: str = ""
     """Source of the messages, for error messages."""
 
@@ -58,13 +58,13 @@ class Track:
         return self.rows(range(min(count, len(self.data))))
 
     def rows(self, rows: Iterable[int]) -> Track:
-        """Return these messages."""
+        """Return the messages in the given ``rows``."""
         chosen = [(self.times[row], self.data[row]) for row in rows]
         times, data = [time for time, _ in chosen], [message for _, message in chosen]
         return Track(self.topic, self.type, self.types, times, data, self.source)
 
     def columns(self) -> Columns:
-        """Return all messages decoded, one array per field; see :mod:`hsv.bags.columns`.
+        """Return all decoded messages, one array per field; see :mod:`hsv.bags.columns`.
 
         Raises:
             RecordingError: A message does not fit its definition.
@@ -75,10 +75,10 @@ class Track:
         return columns_one_by_one(types, self.type, [message for _, message in self.decode()], where)
 
     def decode(self) -> Iterator[tuple[int, Any]]:
-        """Yield time in nanoseconds and message, deserialized one by one.
+        """Yield time (ns) and deserialized message of each message.
 
         Raises:
-            RecordingError: See :meth:`columns`.
+            RecordingError: A message does not fit its definition.
         """
         for time, message in zip(self.times, self.data, strict=True):
             try:

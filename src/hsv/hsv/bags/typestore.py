@@ -1,4 +1,4 @@
-"""The message types of a bag, made from the definitions that it carries."""
+"""The message types of a bag from its recorded definitions."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from hsv.base.errors import RecordingError
 def message_types(
     definitions: Sequence[tuple[str, str]], source: str, optional: Sequence[tuple[str, str]] = ()
 ) -> Typestore:
-    """Return the types of ``definitions``, complete: none refers to a type that is not there.
+    """Return the message types of ``definitions``, with all their dependencies.
 
     Args:
-        definitions: Name and text of each, in the ``ros2msg`` format of MCAP.
+        definitions: Name and text of each type, in the ``ros2msg`` format of MCAP.
         source: Source of the definitions, for error messages.
-        optional: More of them; what cannot be used of these is left out.
+        optional: Further definitions; unusable ones are skipped.
 
     Raises:
         RecordingError: A definition cannot be parsed, contradicts another, or refers to an unknown type or to itself.
@@ -45,7 +45,7 @@ def _register(store: Typestore, name: str, text: str, where: str) -> None:
     except TypesysError as error:
         raise RecordingError(f"{where}: {str(error).splitlines()[0]}") from None
     except Exception as error:
-        # The library parses more than it can compile: a list as a constant, or one that is infinite.
+        # The library fails to compile some definitions that it parses, such as those with a list as a constant.
         raise RecordingError(f"{where}: cannot be used ({type(error).__name__})") from None
 
 

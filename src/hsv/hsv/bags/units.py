@@ -1,8 +1,8 @@
-"""Units of the fields of a recorded topic, read from the comments of its message definition.
+"""Units of the fields of a recorded topic, from the comments of its message definition.
 
-A comment begins with the unit (``m/s``), or with the units of the elements of an array in turn (``rad, rad s: ...``);
-``then`` sets off those that repeat (``m, m/s, then rad, rad s: ...``). ``-`` stands for no unit. A comment that begins
-with anything else names none.
+A comment begins with a unit (``m/s``), or with the units of the elements of an array, which repeat (``rad, rad s:
+...``). The units after ``then`` repeat for all further elements (``m, m/s, then rad, rad s: ...``). ``-`` means no
+unit. Any other beginning means that the unit is unknown.
 """
 
 from __future__ import annotations
@@ -17,20 +17,23 @@ from hsv.bags.fields import fields_of
 
 KNOWN = ("-", "s", "m", "m/s", "rad", "rad/s", "rad s", "kg^0.5 m", "kg^0.5 m/s", "N", "N m", "Pa")
 NANOSECONDS = "ns"
-"""Times and durations are exported as one number in this unit."""
+"""Unit of times and durations, which are exported as one number."""
 
 _FIELD = re.compile(r"^\s*[\w/]+(?:\[[^\]]*\])?(?:<=\d+)?\s+(?P<name>\w+)\s*(?:#\s*(?P<comment>.*))?$")
 
 
 @dataclass(frozen=True)
 class Units:
-    """Units of the elements of a field: the ``first`` ones, then the ``others`` in turn; a number is one element."""
+    """Units of the elements of a field: those of the ``first`` elements, then the ``others``, repeated.
+
+    A number is a single element.
+    """
 
     first: tuple[str, ...] = ()
     others: tuple[str, ...] = ()
 
     def of(self, index: int = 0) -> str:
-        """Return the unit of an element, empty where none is known or it has none."""
+        """Return the unit of an element; empty if it has none or it is unknown."""
         if index < len(self.first):
             unit = self.first[index]
         elif self.others:
@@ -40,7 +43,7 @@ class Units:
         return "" if unit == "-" else unit
 
     def together(self, size: int) -> str:
-        """Return the units of ``size`` elements with commas between, or the one that all share."""
+        """Return the units of ``size`` elements, separated by commas, or their common unit."""
         named = [self.of(index) for index in range(size)]
         return ", ".join(named[:1] if len(set(named)) == 1 else named)
 
@@ -49,8 +52,8 @@ def units_of(definition: str, types: Typesdict, message_type: str) -> dict[str, 
     """Return the units of every field of a type, by field path as in :mod:`hsv.bags.columns`.
 
     Args:
-        definition: The recorded definition with its dependencies.
-        types: The same, parsed.
+        definition: Recorded definition with its dependencies.
+        types: Parsed definition.
         message_type: ``package/msg/Type``.
     """
     comments = _comments(definition, message_type)
@@ -71,7 +74,7 @@ def units_of(definition: str, types: Typesdict, message_type: str) -> dict[str, 
 
 
 def parse_units(comment: str) -> Units:
-    """Return the units with which a comment begins."""
+    """Return the units at the beginning of a comment."""
     head = comment.partition(":")[0]
     first, then, others = head.partition("then ")
     if then:

@@ -1,4 +1,4 @@
-"""Writing a bag: an MCAP file with the layout of rosbag2 (ROS 2 Jazzy) and, at the end, its metadata.yaml."""
+"""Write a bag: an MCAP file with the layout of rosbag2 (ROS 2 Jazzy) and, at the end, its metadata.yaml."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from hsv.bags.topic import Topic
 from hsv.base.errors import RecordingError
 
 CHUNK_BYTES = 16 * 1024
-"""Uncompressed size of a chunk: some seven steps of the loop, all that is lost when the writer is killed."""
+"""Uncompressed size of a chunk, bytes: about seven steps of the loop, which are lost if the writer is killed."""
 _RECORD_OVERHEAD = 31
-"""Bytes of an MCAP message record around its data."""
+"""Size of an MCAP message record without its data, bytes."""
 
 
 def mcap_path(directory: Path) -> Path:
@@ -33,20 +33,19 @@ def mcap_path(directory: Path) -> Path:
 
 
 class BagWriter:
-    """Writes one bag directory.
+    """The writer of one bag directory.
 
-    Every finished chunk is handed to the operating system at once, so that a killed process loses the chunk in
-    progress and nothing else; :func:`hsv.bags.recover.recover` then makes a proper bag of the rest. Until then
-    the file is locked, so that nobody takes it for one whose writer was killed.
+    Every finished chunk is passed to the operating system at once, so that a killed process loses only the current
+    chunk; :func:`hsv.bags.recover.recover` completes such a bag. The file is locked while the writer is open, which
+    distinguishes it from a truncated one.
 
     Args:
-        directory: The bag directory, ``<name>/`` with ``<name>_0.mcap``; new, or empty.
-        topics: The topics known from the start.
-        custom_data: What is known of the run before it starts (run id, seed, commit, design hash); kept by a killed run
-            too.
+        directory: The bag directory, ``<name>/`` with ``<name>_0.mcap``; new or empty.
+        topics: The topics known at the start.
+        custom_data: Data of the run known at the start (run id, seed, commit, design hash).
 
     Raises:
-        RecordingError: If the directory holds something already or cannot be made.
+        RecordingError: The directory is not empty or cannot be created.
     """
 
     def __init__(
@@ -64,7 +63,7 @@ class BagWriter:
         except OSError as error:
             raise RecordingError(f"bag directory {directory}: cannot be made: {error.strerror}") from None
         locked(self._stream)
-        # Chunks are ended by flush() here, because the writer's own limit leaves them in the buffer of the stream.
+        # Chunks are ended by flush() below: the limit of the library would leave them in the buffer of the stream.
         self._writer = Writer(self._stream, chunk_size=2**31, compression=CompressionType.ZSTD)
         self._writer.start(profile="ros2")
         self._schemas: dict[tuple[str, str], int] = {}
@@ -78,10 +77,10 @@ class BagWriter:
             self.add_topic(topic)
 
     def add_topic(self, topic: Topic) -> None:
-        """Add a topic; also in flight, before its first message.
+        """Add a topic at any time before its first message.
 
         Raises:
-            RecordingError: If the bag has a topic of this name.
+            RecordingError: The bag has a topic of this name.
         """
         if topic.name in self._channels:
             raise RecordingError(f"topic {topic.name}: is in the bag already, expected a new name")
@@ -98,7 +97,7 @@ class BagWriter:
         self._tallies[topic.name] = Tally()
 
     def __contains__(self, topic: str) -> bool:
-        """Whether messages of this topic can be written."""
+        """Return whether the bag has this topic."""
         return topic in self._channels
 
     def write(self, topic: str, time_ns: int, data: bytes) -> None:
@@ -106,11 +105,11 @@ class BagWriter:
 
         Args:
             topic: Name of an added topic.
-            time_ns: Simulated time in nanoseconds, kept as log time and as publish time.
+            time_ns: Simulated time (ns), written as log time and as publish time.
             data: The message in CDR with its header of four bytes.
 
         Raises:
-            RecordingError: If the topic was not added or the file cannot be written (no space left).
+            RecordingError: The topic was not added, or the file cannot be written (no space left).
         """
         try:
             channel = self._channels[topic]
@@ -123,13 +122,13 @@ class BagWriter:
             self.flush()
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
-        """Add an attachment. It is on disk at once: attach before the first message, so that a killed run has it."""
+        """Add an attachment, which is written at once; attach before the first message, so that a killed run has it."""
         with self._writing():
             self._writer.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
             self._stream.flush()
 
     def flush(self) -> None:
-        """End the current chunk and hand it to the operating system: its data survive the end of this process."""
+        """End the current chunk and pass it to the operating system, so that it survives the end of this process."""
         with self._writing():
             self._writer.flush()
         self._pending = 0
@@ -138,7 +137,7 @@ class BagWriter:
         """Finish the file and write metadata.yaml.
 
         Args:
-            custom_data: What is known only at the end (outcome, wall time); added to that given at the start.
+            custom_data: Data known only at the end (outcome, wall time), added to the earlier ones.
         """
         self.add_custom_data(custom_data or {})
         topics = [
@@ -153,7 +152,7 @@ class BagWriter:
             write_metadata(self.directory, values)
 
     def add_custom_data(self, custom_data: Mapping[str, str]) -> None:
-        """Add to the metadata of the run, replacing earlier values."""
+        """Add custom data of the run, replacing earlier values."""
         if custom_data:
             self._custom_data |= custom_data
             with self._writing():
