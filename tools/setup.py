@@ -17,7 +17,6 @@ import subprocess
 import sys
 import sysconfig
 import time
-from contextlib import suppress
 from importlib.metadata import Distribution
 from importlib.util import find_spec
 from pathlib import Path
@@ -119,11 +118,12 @@ def make_environment(route: str, env: dict[str, str]) -> None:
 
 def install(title: str, route: str, files: list[str], env: dict[str, str]) -> None:
     """Install what the files require by uv, or by pip where there is no uv or it fails."""
-    files = [f"--requirement={name}" for name in files]
-    wanted = [f"--constraint={ROUTES[route][0]}", "--no-build-isolation", *files]
-    with suppress(SetupError):
+    wanted = [f"--constraint={ROUTES[route][0]}", "--no-build-isolation", *(f"--requirement={name}" for name in files)]
+    try:
         if (uv := VENV / "bin" / "uv").exists():
             return Step(title, [str(uv), "pip", "install", "--python", PYTHON, "--system-certs", *wanted], env).end()
+    except SetupError as error:
+        print(f"{error}; pip installs them instead", flush=True)
     Step(f"{title}, by pip", [PYTHON, "-m", "pip", "install", "--use-pep517", *wanted], env).end()
 
 
@@ -189,8 +189,8 @@ def set_up(route: str, env: dict[str, str]) -> None:
     """Take every step that is not complete."""
     constraints, files = ROUTES[route]
     pins = (ROOT / constraints).read_text()
-    identity = f"{route} {BASE} {sys.version} {ROOT}"
-    contents = "\n".join([identity, pins, *((ROOT / name).read_text() for name in files)])  # env.sh reads the route
+    identity = f"{route} {BASE} {sys.version} {ROOT}"  # env.sh reads the route
+    contents = "\n".join([identity, pins, *(re.sub(r"\s*#.*", "", (ROOT / name).read_text()) for name in files)])
     installed = read(VENV / "hsv-setup") == contents
     folders = [path.parent for base in ("src", "ros_ws/src") for path in (ROOT / base).glob("*/package.xml")]
     keys = {folder.name: package_key(folder, identity, pins) for folder in sorted(folders)}
