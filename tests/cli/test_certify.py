@@ -8,6 +8,7 @@ from hsv.control.checks import load_subject
 BASELINE = Path(__file__).parents[2] / "offline_design" / "baseline.yaml"
 
 
+@pytest.mark.long
 def test_a_design_is_certified_as_it_was_and_with_a_small_gust(hsv):
     certificate = load_subject(BASELINE).certificate["tube"]
     alone, gust = hsv("certify", str(BASELINE), "--gust", "0.5 ft/s", "--json").json["verdicts"]

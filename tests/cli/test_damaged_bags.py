@@ -19,7 +19,7 @@ from hsv.base.errors import RecordingError
 Hsv = Callable[..., Any]
 REFERENCES = Path(__file__).parents[2] / "bags" / "reference"
 QUICK = 4
-LONG = 200
+LONG = 60
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,11 @@
 import numpy as np
 import pytest
-from core_calls import command_faults
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from hsv.base.errors import ParameterError
-from hsv.model.faults.injector import FAULT_PARAMETERS, FaultInjector
+from hsv.model.faults.injector import FaultInjector
 from hsv.model.faults.schedule import ActiveFault, ScheduledFault
 from hsv.model.faults.table import COMMAND as COMMAND_SIDE
 from hsv.model.faults.table import FAULT_KINDS, Fault
@@ -31,14 +30,6 @@ def active(*rows):
 
 def actuator(injector, step, command=COMMAND):
     return injector.step(step, command).actuator
-
-
-def test_without_faults_the_command_passes_bit_for_bit():
-    injector = FaultInjector()
-    for step in range(5):
-        result = injector.step(step, COMMAND)
-        assert_array_equal(result.actuator, COMMAND)
-        assert result.active == ()
 
 
 def test_result_does_not_alias_the_command():
@@ -84,12 +75,6 @@ def test_the_time_of_a_step_is_that_step(k, period):
     assert first_step(k * period, period) == k
 
 
-def test_schedule_begins_at_its_step_and_stays():
-    injector = injector_of((loss(0.9), 3))
-    flown = [actuator(injector, step)[1] for step in range(6)]
-    assert flown == [0.2, 0.2, 0.2, 0.9 * 0.2, 0.9 * 0.2, 0.9 * 0.2]
-
-
 def test_faults_of_a_channel_act_together():
     injector = injector_of((loss(0.9), 0), (loss(0.5), 2), (loss(0.8, FUEL), 2))
     assert injector.step(1, COMMAND).active == active((loss(0.9), 0))
@@ -128,25 +113,6 @@ def test_one_kind_can_be_cleared():
         injector.clear(ELEVATOR, "melted")
 
 
-def test_two_faults_that_are_the_same_keep_their_memories_when_another_comes():
-    delay = Fault.of(ELEVATOR, "delay", {"steps": 3})
-    without, changed = (injector_of((delay, 2), (delay, 2)) for _ in range(2))
-    for step in range(20):
-        if step == 10:
-            changed.inject(loss(0.9, FUEL))
-        command = np.array([0.4, 0.01 * step])
-        assert actuator(changed, step, command)[1] == actuator(without, step, command)[1]
-
-
-def test_clearing_one_channel_leaves_the_other():
-    injector = injector_of((loss(0.9), 0), (loss(0.8, FUEL), 0))
-    injector.step(0, COMMAND)
-    assert injector.clear(ELEVATOR) == 1
-    result = injector.step(1, COMMAND)
-    assert_array_equal(result.actuator, [0.8 * 0.4, 0.2])
-    assert result.active == active((loss(0.8, FUEL), 0))
-
-
 def test_clearing_all_heals_everything_but_not_what_is_still_to_come():
     injector = injector_of((loss(0.9), 0), (loss(0.8, FUEL), 0), (loss(0.5), 5))
     injector.step(0, COMMAND)
@@ -165,13 +131,6 @@ def test_reset_returns_to_the_schedule():
     assert_array_equal(actuator(injector, 2), [0.4, 0.9 * 0.2])
 
 
-def test_the_core_does_the_same_as_the_object():
-    injector = injector_of((loss(0.9), 2), (loss(0.5), 4), (loss(0.8, FUEL), 1))
-    rows = injector.rows((COMMAND_SIDE,))
-    for step in range(6):
-        assert_array_equal(command_faults(rows, step, 0, COMMAND), actuator(injector, step))
-
-
 def test_schedule_from_parameters():
     injector = FaultInjector.from_parameters(
         {
@@ -184,34 +143,6 @@ def test_schedule_from_parameters():
     )
     slow = Fault.of(FUEL, "loss_of_effectiveness", {"effectiveness": 0.8, "ramp_time": 1.0})
     assert [row[:2] for row in injector.scheduled] == [(loss(0.9), 5000), (slow, 1)]
-
-
-def test_defaults_are_no_fault():
-    assert FaultInjector.from_parameters({p.name: p.default for p in FAULT_PARAMETERS}).scheduled == ()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("rudder", "loss_of_effectiveness", {"effectiveness": 0.9}), "fault.channel = 'rudder': expected one of fuel"),
-        ((ELEVATOR, "melted", {}), "fault.type = 'melted': expected one of loss_of_effectiveness"),
-        (
-            (ELEVATOR, "loss_of_effectiveness", {"effectiveness": 1.1}),
-            "fault.effectiveness = 1.1: expected double from",
-        ),
-        ((ELEVATOR, "loss_of_effectiveness", {"effectiveness": float("nan")}), "fault.effectiveness = nan: expected"),
-        ((ELEVATOR, "loss_of_effectiveness", {}), "fault.effectiveness: missing, expected effectiveness"),
-        (
-            (ELEVATOR, "float", {"alignment": 0.5, "size": 1.0}),
-            "fault.size: unknown parameter, expected one of alignment, ",
-        ),
-        (("pitch_rate", "lock_in_place", {}), "fault.channel = 'pitch_rate': expected one of fuel_equivalence_ratio"),
-    ],
-)
-def test_an_impossible_fault_is_refused_by_name(arguments, message):
-    with pytest.raises(ParameterError) as caught:
-        Fault.of(*arguments)
-    assert str(caught.value).startswith(message)
 
 
 @pytest.mark.parametrize("text", ["0.9", "effectiveness", "effectiveness=much", "=0.9x"])
