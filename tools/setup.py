@@ -44,12 +44,17 @@ class SetupError(Exception):
 
 def clean_environment(route: str) -> dict[str, str]:
     """Return the variables without what a sourced env.sh, make or pip's settings for other places would change."""
-    # With the wheels, nothing else may supply ROS packages.
-    dropped = DROPPED + SEARCHED if route == "wheels" else DROPPED
+    dropped = DROPPED + SEARCHED if route == "wheels" else DROPPED  # the wheels alone supply ROS packages
     env = {name: value for name, value in os.environ.items() if name not in dropped}
     for name in {"PATH", *SEARCHED} & {*env}:
         env[name] = ":".join(entry for entry in env[name].split(":") if not f"{entry}/".startswith(f"{ROOT}/"))
     return env
+
+
+def sourced_distribution() -> str:
+    """Return the sourced ROS distribution, or ``wheels``; official images set ROS_DISTRO without sourcing anything."""
+    env = clean_environment("jazzy")
+    return (env.get("AMENT_PREFIX_PATH") and env.get("ROS_DISTRO")) or "wheels"
 
 
 def missing(route: str, env: dict[str, str]) -> dict[str, str]:
@@ -107,8 +112,7 @@ def make_environment(route: str, env: dict[str, str]) -> None:
     options = ["--clear", *(["--system-site-packages"] if route == "jazzy" else [])]
     Step("Environment", [BASE, "-m", "venv", *options, str(VENV)], env).end()
     if route == "wheels":
-        # uv takes a fifth of pip's time, but does not know the index that pip's settings may name. empy, which is
-        # built from its source, needs the pinned setuptools first.
+        # uv does not know the index of pip's settings. empy, built from source, needs the pinned setuptools first.
         settings = subprocess.run([PYTHON, "-m", "pip", "config", "list"], env=env, capture_output=True, text=True)
         wanted = ["setuptools"] if re.search(r"\.(index-url|no-index)=", settings.stdout) else ["setuptools", "uv"]
         Step("Installer", [PYTHON, "-m", "pip", "install", "--constraint", ROUTES[route][0], *wanted], env).end()
@@ -140,10 +144,7 @@ def relocate() -> None:
 
 
 def package_key(folder: Path, identity: str, pins: str) -> str:
-    """Return a hash of all that makes a build of a package necessary.
-
-    A Python package is links to its sources: what setup.py reads, the core and the names of data files count.
-    """
+    """Return a hash of what a build depends on: of a Python package, setup.py, the core and the names of data files."""
     is_python = (folder / "setup.py").exists()
     parts = [identity, *([] if is_python else re.findall(r"(?m)^(?:ros-|numpy=).*", pins))]
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
@@ -219,13 +220,6 @@ def set_up(route: str, env: dict[str, str]) -> None:
                 (INSTALL / name / "hsv-setup").write_text(keys[name])
 
 
-def sourced_distribution() -> str:
-    """Return the sourced ROS distribution, or ``wheels``; official images set ROS_DISTRO without sourcing anything."""
-    prefixes = map(Path, filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)))
-    sourced = any(not prefix.is_relative_to(ROOT) for prefix in prefixes)
-    return (sourced and os.environ.get("ROS_DISTRO")) or "wheels"
-
-
 def main() -> int:
     """Set up, one process at a time; return the exit code."""
     start, route = time.monotonic(), sourced_distribution()
@@ -244,8 +238,7 @@ def main() -> int:
             fcntl.flock(lock, fcntl.LOCK_EX)
         set_up(route, clean_environment(route))
     except SetupError as error:
-        print(f"make setup: {error}", file=sys.stderr)
-        return 1
+        sys.exit(f"make setup: {error}")
     except KeyboardInterrupt:
         print("\nmake setup: interrupted; run it again to go on", file=sys.stderr)
         return 130

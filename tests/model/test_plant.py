@@ -34,6 +34,20 @@ def test_reset_repeats_the_flight_bit_for_bit():
     assert_array_equal(first, second)
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"sensors.set": "fine"},
+        {"actuator.elevator_deflection.set": "elevator_50"},
+        {"wind.forward": 3.0},
+        {"link.measurement.delay": 1.0},
+    ],
+)
+def test_it_is_ideal_only_with_ideal_equipment_and_still_air(changes):
+    assert plant().is_ideal(())
+    assert not plant(**changes).is_ideal(())
+
+
 def test_finishes_after_its_duration():
     bench = plant(duration=0.06)
     assert bench.reset().status is FlightStatus.RUNNING
