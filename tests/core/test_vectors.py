@@ -11,6 +11,7 @@ import hashlib
 import json
 from dataclasses import fields, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ from hsv.core.arithmetic import (
     tangent,
     uniforms,
 )
-from hsv.design.disturbance import Record, decompose
+from hsv.design.disturbance import decompose
 from hsv.design.error_system import tube_errors
 from hsv.flight.responses import along_filter, lag_response
 from hsv.flight.scenario import load_scenario
@@ -384,8 +385,10 @@ def sequences(z: Golden) -> None:
     polytope = design("baseline").polytope
     notch = discretise([NotchSection(15.0, 0.02, 15.0, 0.5), NotchSection(19.5, 0.05, 20.0, 0.6)], PERIOD)
     actuators = SampledActuators(*(z[f"designs.actuators.{field}"] for field in "ABCD"))
-    record = Record(x, x_n, np.zeros_like(u), u, u, x_r, u_r, defect)
-    z.check("disturbance.signals", np.hstack(decompose(polytope, notch, inverse, remaining, record, u, lost, through)))
+    flight: Any = SimpleNamespace(
+        history=SimpleNamespace(state=x, deviation=x_n), reference=x_r, reference_input=u_r, defect=defect
+    )
+    z.check("disturbance.signals", np.hstack(decompose(polytope, notch, inverse, remaining, flight, u, lost, through)))
     z.check("actuated.respond", np.hstack(respond(actuators, u - u_r)))
     z.check("error_system.tube_errors", tube_errors(x, x_n, x_r, notch, actuators, u - u_r))
     z.check("error_system.lag_response", np.hstack(lag_response(polytope, gain, notch, actuators, x[:, :2], lag)))

@@ -9,10 +9,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import DesignError
-from hsv.design.disturbance import DisturbanceSet
+from hsv.design.disturbance import ChannelModel, DisturbanceSet
 from hsv.design.inputs import ActuatorInputs, parse_inputs
-from hsv.design.region import Region, record
-from hsv.design.tube_problem import channel_model, tube_problem
+from hsv.design.region import Region
+from hsv.design.tube_problem import tube_problem
 
 NAMES = ("fuel_10", "elevator_50")
 
@@ -32,10 +32,9 @@ def flight(design, subject):
 
 def test_the_error_system_predicts_the_error_of_a_flight_with_actuators(flight, design, subject):
     """From one step to the next, states of filter and actuators included; the lag of the plan is taken out before."""
-    model = channel_model(design, subject.vehicle)
-    recorded = record(flight)
-    errors, _ = model.errors(recorded)
-    channels = model.signals(recorded).channels
+    model = ChannelModel(design, subject.vehicle)
+    errors, _ = model.errors(flight)
+    channels = model.signals(flight).channels
     ones = DisturbanceSet(-np.ones(7), np.ones(7))
     size = np.abs(errors).max(axis=0)
     for k in (1, 60, 700, 5001, 5090):
@@ -61,7 +60,7 @@ def test_a_controller_sees_the_states_before_those_of_the_actuators(design, subj
 
 
 def test_the_feedback_to_the_lag_dies_out_between_two_gains_of_the_plan(flight, design, subject):
-    _, feedback = channel_model(design, subject.vehicle).errors(record(flight))
+    _, feedback = ChannelModel(design, subject.vehicle).errors(flight)
     assert 0.001 < np.abs(feedback[:200, 1]).max() < 0.02
     # A second before the fault the plan has long settled.
     assert np.abs(feedback[4900:5000, 1]).max() < 1e-3 * np.abs(feedback[:, 1]).max()

@@ -10,13 +10,13 @@ from numpy.testing import assert_allclose
 from hsv.base.errors import DesignError
 from hsv.design.adjustable import design_adjustable, relaxed_bound, room_at_one
 from hsv.design.certified import load_certified
+from hsv.design.disturbance import ChannelModel
 from hsv.design.error_system import error_system
+from hsv.design.feedback import common_lyapunov
 from hsv.design.inputs import read_inputs, with_tau
-from hsv.design.lyapunov import common_lyapunov
-from hsv.design.region import incomplete_share, region_parameters
+from hsv.design.region import incomplete_share
 from hsv.design.tightening import TightenedInputs
-from hsv.design.tube_problem import channel_model
-from hsv.flight.corners import corners
+from hsv.flight.corners import corners, region_parameters
 from hsv.model.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
@@ -34,7 +34,9 @@ def stored(subject):
 
 def test_incomplete_fault_and_bounds_are_scaled_by_the_factor(subject):
     assert incomplete_share(subject.inputs) == 0.8
-    assert region_parameters(subject.inputs, 0.8)["fault.parameters"] == ["effectiveness=0.92"]
+    assert region_parameters(subject.certificate["inputs"], subject.vehicle, 0.8)["fault.parameters"] == [
+        "effectiveness=0.92"
+    ]
     bounds = load_vehicle().uncertainty
     assert_allclose([abs(change) for change in corners(bounds, 0.8)[1].values()], [0.8 * b for b in bounds.values()])
     assert incomplete_share(with_tau(subject.inputs, [0.8, 0.7, 1.0, 1.0, 0.9])) == 1.0
@@ -42,7 +44,7 @@ def test_incomplete_fault_and_bounds_are_scaled_by_the_factor(subject):
 
 def test_set_is_invariant_under_every_factor_that_is_certified(subject):
     found = subject.invariant_set()
-    design, model = subject.design, channel_model(subject.design, subject.vehicle)
+    design, model = subject.design, ChannelModel(subject.design, subject.vehicle)
     # The inequality is linear in vertices and multipliers: between the two factors those between theirs prove it.
     least, one = np.split(found.multipliers, 2)
     for tau, multipliers in ((0.8, least), (0.87, 0.65 * least + 0.35 * one), (1.0, one)):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hsv.design.disturbance import DisturbanceSet, inflated
+from hsv.design.disturbance import ChannelModel, DisturbanceSet, widened
 from hsv.design.error_system import tube_errors
-from hsv.design.region import Region, record
-from hsv.design.tube_problem import channel_model, tube_problem
+from hsv.design.region import Region
+from hsv.design.tube_problem import tube_problem
 from hsv.model.vehicle import load_vehicle
 
 
@@ -20,8 +20,8 @@ def flight(subject):
 
 
 def test_channels_rebuild_the_disturbance_of_the_rigid_states(flight, subject):
-    model = channel_model(subject.design, subject.vehicle)
-    signals = model.signals(record(flight))
+    model = ChannelModel(subject.design, subject.vehicle)
+    signals = model.signals(flight)
     a, lost, rest = signals.channels[:, :3], signals.channels[:, 3], signals.channels[:, 5:]
     for k in (0, 100, 4999, 5000, 5150):
         x = flight.history.state[k]
@@ -33,7 +33,7 @@ def test_channels_rebuild_the_disturbance_of_the_rigid_states(flight, subject):
 
 
 def test_the_fault_is_one_tenth_of_the_total_elevator(flight, subject):
-    lost = channel_model(subject.design, subject.vehicle).signals(record(flight)).channels[:, 3]
+    lost = ChannelModel(subject.design, subject.vehicle).signals(flight).channels[:, 3]
     assert np.all(lost[:5000] == 0.0)
     assert_allclose(lost[5000:], -0.1 * flight.history.command[5000:-1, 1], rtol=1e-12)
 
@@ -41,9 +41,9 @@ def test_the_fault_is_one_tenth_of_the_total_elevator(flight, subject):
 def test_the_error_system_predicts_the_error_of_a_flight(flight, subject):
     """One step of the convex combination of vertices from the true error gives the next one, notch states included."""
     design = subject.design
-    model = channel_model(design, load_vehicle())
+    model = ChannelModel(design, load_vehicle())
     errors = tube_errors(flight.history.state, flight.history.deviation, flight.reference, model.notch)
-    channels = model.signals(record(flight)).channels
+    channels = model.signals(flight).channels
     ones = DisturbanceSet(-np.ones(7), np.ones(7))
     for k in (1, 60, 700, 5001, 5100):
         h, v = flight.history.state[k, :2]
@@ -56,7 +56,8 @@ def test_the_error_system_predicts_the_error_of_a_flight(flight, subject):
 
 
 def test_membership_names_channel_and_step():
-    bounds = inflated(np.array([-1.0] * 3 + [-0.2] + [-1.0] * 3), np.array([2.0] * 3 + [0.0] + [1.0] * 3), 1.1)
+    low, high = np.array([-1.0] * 3 + [-0.2] + [-1.0] * 3), np.array([2.0] * 3 + [0.0] + [1.0] * 3)
+    bounds = DisturbanceSet(*widened(low, high, 1.1))
     channels = np.zeros((5, 7))
     assert bounds.membership(channels).ratio == 0.0
     channels[3, 1] = 3.3

@@ -4,8 +4,7 @@ from numpy.testing import assert_allclose
 
 from hsv.base.errors import DesignError
 from hsv.design.baseline import disturbance_columns
-from hsv.design.feedback import feedback_gain
-from hsv.design.lyapunov import lyapunov_residuals
+from hsv.design.feedback import feedback_gain, lyapunov_residuals
 
 FOOT = 0.3048
 

@@ -35,7 +35,7 @@ def test_tensor_product_has_the_paper_s_vertices_and_meets_its_accuracy(model):
 
 
 def test_weights_are_non_negative_between_all_samples(model):
-    for samples in (model.altitude_samples, model.velocity_samples):
+    for samples in (model.found.samples[0], model.found.samples[1]):
         assert smallest_weight(*samples) >= -1e-9
         assert np.abs(samples[1].sum(axis=1) - 1.0).max() <= 1e-9
 
@@ -58,7 +58,7 @@ def test_a_coarser_tolerance_keeps_six_vertices(inputs):
 
 def test_grid_is_the_simple_and_less_accurate_alternative(inputs):
     model = design_model(with_representation(inputs, representation="grid"), load_vehicle())
-    assert model.interpolation == "linear"
+    assert model.found.interpolation == "linear"
     assert model.report["vertices"] == [4, 5]
     assert 1e-6 < model.report["accuracy"]["relative_frobenius_error"] < 1e-4
 

@@ -4,10 +4,11 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from hsv.design.results import DESIGNS
+DESIGNS = sorted(path.stem for path in Path(__file__).parents[2].glob("offline_design/*.toml"))
 
 AGREED = 1e-4
 """In scaled coordinates; `hsv design --check` itself asks for ten times less."""

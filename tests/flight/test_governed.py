@@ -6,8 +6,8 @@ from flights import components
 
 from hsv.control.design import find_design, read_design
 from hsv.design.inputs import find_inputs, read_inputs
-from hsv.design.region import region_parameters
 from hsv.flight.closed_loop import fly
+from hsv.flight.corners import region_parameters
 from hsv.flight.governed import governed
 from hsv.flight.scenario import load_scenario
 
@@ -47,7 +47,7 @@ def test_the_plan_is_inside_the_tightened_inputs_and_the_governor_takes_it_as_it
 
 
 def test_the_design_measures_its_disturbances_along_this_reference():
-    declared = region_parameters(read_inputs(find_inputs("governed")))
+    declared = region_parameters((inputs := read_inputs(find_inputs("governed"))).model_dump(), inputs.flown_vehicle)
     flown = load_scenario("case1_governed").parameters()
     names = [name for name in declared if name.startswith("reference.")]
     assert "reference.blend" in names

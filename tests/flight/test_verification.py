@@ -11,8 +11,8 @@ from hsv.control.checks import Subject, load_subject
 from hsv.control.design import find_design
 from hsv.control.verification import Tube
 from hsv.design.certified import load_certified
-from hsv.design.region import Region, record
-from hsv.design.tube_problem import channel_model
+from hsv.design.disturbance import ChannelModel
+from hsv.design.region import Region
 from hsv.flight.closed_loop import fly
 from hsv.flight.random_sequences import random_sequences
 from hsv.flight.scenario import load_scenario, parse_scenario, scenario_text
@@ -40,11 +40,11 @@ def test_disturbances_and_errors_are_those_of_the_design(name):
     flight = fly(region(subject, subject.design, share).perturbed({"mass": 0.05}))
     theirs = Region(subject.design, subject.inputs, share).fly({"mass": 0.05})
     assert np.array_equal(flight.history.signals, theirs.history.signals)
-    found, model = disturbances(subject, flight), channel_model(subject.design, subject.vehicle)
-    error, lag = model.errors(record(theirs))
+    found, model = disturbances(subject, flight), ChannelModel(subject.design, subject.vehicle)
+    error, lag = model.errors(theirs)
     assert_allclose(found.error, error, rtol=0.0, atol=1e-9 * np.abs(error).max())
     assert_allclose(found.lag, lag, rtol=0.0, atol=1e-12)
-    channels = model.signals(record(theirs)).channels
+    channels = model.signals(theirs).channels
     size = np.maximum(np.abs(channels).max(axis=0), 1e-12)
     assert_allclose(found.channels / size, channels / size, rtol=0.0, atol=1e-5)
 

@@ -6,33 +6,27 @@ import numpy as np
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.flight import comparison
-from hsv.flight.assembly import assemble_flight
+from hsv.flight.assembly import assemble, assemble_flight, flight_parameters
 from hsv.flight.closed_loop import fly
-from hsv.flight.comparison import settling_times
 from hsv.flight.corners import corners
 from hsv.flight.governed import governed
-from hsv.flight.scenario import parse_scenario
-from hsv.model.dynamics import advance
+from hsv.flight.metrics import flight_metrics
+from hsv.flight.scenario import load_scenario, parse_scenario
+from hsv.model.dynamics import advance, transitions
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.limits import optimum
-from hsv_paper.limits.optimum import (
-    INPUT_SCALE,
-    STATE_SCALE,
-    curvatures,
-    defects,
-    finer,
-    solve,
-    transitions,
-)
-from hsv_paper.limits.recovery import (
+from hsv_paper.limits.optimum import INPUT_SCALE, STATE_SCALE, curvatures
+from hsv_paper.limits.problems import (
     PERIOD,
     at_trim,
     envelope_points,
     held_periods,
     recovery,
     static_limit,
+    straight,
+    time_bound,
+    transfer,
     turning_limit,
 )
 from hsv_paper.limits.replay import fly_optimum
@@ -44,8 +38,8 @@ from hsv_paper.limits.study import (
     fastest_transfer,
     least_survived,
     needed_effectiveness,
+    settling_times,
 )
-from hsv_paper.limits.transfer import straight, time_bound, transfer
 from hsv_paper.linear_loop import START, TARGET
 from hsv_paper.study import Scope
 
@@ -53,6 +47,7 @@ ROOT = Path(__file__).parents[2]
 ENVELOPE = load_vehicle()
 VEHICLE = ENVELOPE.coupled("paper_like")
 HORIZON = 8.0
+LEAST_TIME = 10.01
 
 
 def disturbed(count, seed=1):
@@ -108,7 +103,7 @@ def test_curvature_is_the_change_of_the_derivatives():
 
 def test_a_finer_mesh_keeps_states_and_inputs():
     point = straight(transfer(VEHICLE, 10, settling=False), 12.0)
-    fine = finer(point, 3)
+    fine = point.finer(3)
     assert np.array_equal(fine.state[::3], point.state)
     assert np.array_equal(fine.input[1::3], point.input)
     assert fine.state[0, :2] == pytest.approx(START) and fine.state[-1, :2] == pytest.approx(TARGET)
@@ -118,10 +113,10 @@ def test_a_finer_mesh_keeps_states_and_inputs():
 def test_the_deepest_fault_known_after_a_fifth_of_a_second():
     """The optimum is where full elevator without fuel just turns the nose: to the resolution of the bisection."""
     problem = recovery(VEHICLE, ENVELOPE, 0.2, HORIZON)
-    found = solve(problem, at_trim(problem), 1e-4)
+    found = problem.solve(at_trim(problem), 1e-4)
     assert found.scalar == pytest.approx(turning_limit(VEHICLE, 0.2), abs=2e-4)
-    assert np.abs(defects(problem, found)).max() < optimum.DEFECT
-    low, high = problem.inputs.at(found.scalar)
+    assert np.abs(problem.defects(found)).max() < optimum.DEFECT
+    low, high = problem.inputs + found.scalar * problem.inputs_slope
     assert np.all(found.input >= low - 1e-8) and np.all(found.input <= high + 1e-8)
 
     held, kept = np.array(held_periods(HORIZON)), round(0.2 / PERIOD)
@@ -139,7 +134,7 @@ def test_an_iteration_that_ends_early_is_refused(monkeypatch):
     monkeypatch.setattr(optimum, "_ITERATIONS", 2)
     problem = recovery(VEHICLE, ENVELOPE, 0.2, 2.0)
     with pytest.raises(DesignError, match="optimal control: after 2 iterations the largest defect"):
-        solve(problem, at_trim(problem))
+        problem.solve(at_trim(problem))
 
 
 def test_static_limits_are_those_of_trims():
@@ -171,16 +166,16 @@ def test_the_fastest_transfers_of_the_page():
     assert np.array_equal(rest.flown.replayed(), rest.flown.state)
     assert rest.time * 0.9 < time_bound(VEHICLE) < rest.time
     other = transfer(VEHICLE, 50, settling=False)
-    assert solve(other, straight(other, 30.0), 1e-4).scalar == pytest.approx(rest.time, rel=2e-3)
+    assert other.solve(straight(other, 30.0), 1e-4).scalar == pytest.approx(rest.time, rel=2e-3)
 
     settled = fastest_transfer(VEHICLE, PERIODS, settling=True)
     assert settled.time == pytest.approx(10.0125, abs=2e-3)
-    assert round(settled.time, 2) == comparison.LEAST_TIME
+    assert round(settled.time, 2) == LEAST_TIME
     inside = settled.flown.state[settled.flown.time >= settled.time - 1e-9, :2]
     step = np.subtract(TARGET, START)
     assert np.all(np.abs(inside - TARGET) <= 0.02 * np.abs(step) * (1.0 + 1e-6))
     longer = transfer(VEHICLE, 50, settling=True, rest=0.8)
-    assert solve(longer, straight(longer, 15.0), 1e-4).scalar == pytest.approx(settled.time, rel=2e-3)
+    assert longer.solve(straight(longer, 15.0), 1e-4).scalar == pytest.approx(settled.time, rel=2e-3)
 
 
 @pytest.mark.long
@@ -211,10 +206,30 @@ def test_the_limits_of_all_corners():
     assert found.effectiveness == pytest.approx(max(turning), abs=2e-4)
 
 
-def test_the_comparison_has_the_least_time_of_the_page():
-    page_of_limits = (ROOT / "docs" / "study" / "limits.md").read_text(encoding="utf-8")
-    assert f"{comparison.LEAST_TIME} s" in page_of_limits
-    assert f"{comparison.LEAST_TIME} s" in (ROOT / "docs" / "comparison.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("page", ["study/limits.md", "comparison.md"])
+def test_a_page_has_the_least_time(page):
+    assert f"{LEAST_TIME} s" in (ROOT / "docs" / page).read_text(encoding="utf-8")
+
+
+def flown(scenario, **changes):
+    return fly(assemble({**flight_parameters(load_scenario(scenario)), **changes})).data()
+
+
+def test_settling_times_of_a_step_are_the_metrics():
+    flight = flown("case1")
+    metrics = flight_metrics(flight)
+    assert settling_times(flight) == pytest.approx(
+        [metrics["altitude_settling_time"], metrics["velocity_settling_time"]]
+    )
+
+
+def test_settling_times_of_a_ramp_count_from_its_beginning():
+    """As docs/governor.md prints them."""
+    assert settling_times(flown("case1_governed")) == pytest.approx([29.0, 28.8], abs=0.05)
+
+
+def test_a_flight_that_is_too_short_has_not_settled():
+    assert np.array_equal(settling_times(flown("case1", duration=50.0)) < np.inf, [True, False])
 
 
 def test_the_page_has_what_the_controllers_reach():

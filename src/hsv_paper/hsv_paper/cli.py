@@ -42,21 +42,18 @@ def main() -> None:
 def figures(
     only: Annotated[list[int] | None, typer.Option(help="Draw only this figure of the paper; can be repeated.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page of each figure.")] = Path("figures"),
-    flights: FlightsOption = _FLIGHTS,
     json: JsonOption = False,
 ) -> None:
     """Draw the paper's figures from this project's designs and flights, for comparison with the paper's.
 
-    The flights are runs of the graph, recorded to bags. The bags are reused as long as nothing they depend on changes,
-    including the nodes and their messages. Without the nodes, the flights are computed in this process, with the same
-    numbers.
+    The flights are computed in this process; those of the nodes, hsv run NAME, have the same numbers bit for bit.
 
     Example: hsv-paper figures --only 9 --only 11 --out figures
     """
     import matplotlib
 
     from hsv_paper.figures import FIGURES
-    from hsv_paper.flights import Flights, graph_is_there
+    from hsv_paper.flights import Flights
     from hsv_paper.plots import RC, save
 
     for number in only or ():
@@ -64,17 +61,10 @@ def figures(
             raise QuantityError(f"only = {number}: expected one of {', '.join(map(str, FIGURES))}")
     chosen = [figure for number, figure in FIGURES.items() if not only or number in only]
     check_folder(out, "out")
-    check_folder(flights, "flights")
-    graph = graph_is_there()
-    flown = len({scenario for figure in chosen for scenario in figure.scenarios})
-    if flown and graph:
-        errors.print(f"{flown} flights of the nodes, about {20 * flown} s, less with those kept in {flights}")
-    elif flown:
-        errors.print("no built ROS workspace is sourced: flown in this process, with the same numbers bit for bit")
     out.mkdir(parents=True, exist_ok=True)
     written = {}
     with stages() as progress, matplotlib.rc_context(RC):
-        source = Flights(flights, progress, graph=graph)
+        source = Flights(out)
         for done, figure in enumerate(chosen):
             progress("figures", done, len(chosen))
             drawing = figure.draw(source)

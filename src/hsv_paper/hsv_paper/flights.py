@@ -1,22 +1,18 @@
-"""The flights of the paper's study, flown once and kept: single ones, and those of many vehicles with their measures.
+"""The flights of the paper's study: single ones, and those of many vehicles with their measures, flown once and kept.
 
-Everything that is kept carries a digest of all it depends on in its name.
+A kept table has a digest of all it depends on in its name.
 """
 
 from __future__ import annotations
 
 import json
-import shutil
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from tempfile import mkdtemp
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from hsv.bags.description import COMPOSED
-from hsv.base.errors import RecordingError, RunError
 from hsv.base.processes import Progress
 from hsv.flight.assembly import assemble, flight_parameters
 from hsv.flight.closed_loop import fly
@@ -25,15 +21,14 @@ from hsv.flight.flight import Flight
 from hsv.flight.metrics import FlightData, flight_metrics
 from hsv.flight.scenario import load_scenario
 from hsv.flight.side_by_side import TubeLevels, fly_perturbed
-from hsv.flight.sources import DIGITS, code_digest, digest_of, drop_older, flight_digest, kept, measuring_code
-from hsv.graph.flight import fly_graph
-from hsv.graph.launcher import executable
-from hsv.graph.preparation import RunOptions, prepare
+from hsv.flight.sources import DIGITS, code_digest, digest_of, drop_older
 from hsv.model.plant import FlightStatus
 from hsv_paper.designs import design
 
 Table = dict[str, np.ndarray]
 """Columns (flights) by measure, the nominal vehicle first; NaN where a flight does not define the measure."""
+
+Result = TypeVar("Result")
 
 AFTER = 20.0
 """Seconds after the fault over which errors are averaged."""
@@ -57,19 +52,10 @@ class Point:
 
 
 class Flights:
-    """Flies scenarios once, as runs of the graph or in this process: the numbers are the same, bit for bit.
+    """Flies scenarios once, and keeps the tables of sweeps in a ``folder``."""
 
-    A run of the graph takes its time, so its bag is kept. All nodes run in one process, which gives the same bytes as
-    separate processes.
-    """
-
-    def __init__(
-        self, folder: Path, progress: Progress = lambda what, done, total: None, *, graph: bool = False
-    ) -> None:
-        """Keep bags and tables in ``folder``; ``graph``: fly single flights with the nodes."""
-        self._folder = folder
-        self._graph = graph
-        self._progress = progress
+    def __init__(self, folder: Path, progress: Progress = lambda what, done, total: None) -> None:
+        self._folder, self._progress = folder, progress
         self._flown: dict[str, FlightData] = {}
 
     def __getitem__(self, scenario: str) -> FlightData:
@@ -77,10 +63,9 @@ class Flights:
 
         Raises:
             ScenarioError, DesignError, ParameterError: A scenario or design is wrong; the message names it.
-            RunError: A node failed.
         """
         if scenario not in self._flown:
-            self._flown[scenario] = self._from_graph(scenario) if self._graph else in_process(scenario)
+            self._flown[scenario] = fly(assemble(flight_parameters(load_scenario(scenario)))).data()
         return self._flown[scenario]
 
     def tables(self, name: str, points: Sequence[Point], *, keep: bool = True) -> list[Table]:
@@ -103,50 +88,8 @@ class Flights:
             return flown()
         asked = [[dict(point.values), [dict(corner) for corner in point.over]] for point in points]
         text = json.dumps([asked, _half_width()], sort_keys=True, default=np.ndarray.tolist)
-        digest = digest_of([text.encode(), code_digest().encode(), *measuring_code(__name__)])
-        path = self._folder / f"{name.replace(' ', '_')}_{digest[:DIGITS]}.npz"
-        return kept(path, flown, _save, _load)
-
-    def _from_graph(self, scenario: str) -> FlightData:
-        from hsv.bags.flight import flight_data
-        from hsv.bags.reader import Bag
-
-        self._folder.mkdir(parents=True, exist_ok=True)
-        bag = self._folder / f"{scenario}_{flight_digest(scenario, graph=True)[:DIGITS]}"
-        if bag.is_dir():
-            try:
-                recorded = Bag(bag)
-                if recorded.complete:
-                    return flight_data(recorded)
-            except RecordingError:
-                pass  # an interrupted run is flown again
-            shutil.rmtree(bag)
-        # Recorded in a temporary folder and moved when it is complete.
-        workplace = Path(mkdtemp(prefix=f".{bag.name}_", dir=self._folder))
-        try:
-            prepared = prepare(scenario, RunOptions(composed=True), bag=workplace / bag.name)
-            fly_graph(prepared, on_step=lambda step: self._progress(f"flying {scenario}", step, prepared.steps))
-            (workplace / bag.name).rename(bag)
-            drop_older(bag)
-        finally:
-            shutil.rmtree(workplace)
-        return flight_data(Bag(bag))
-
-
-def graph_is_there() -> bool:
-    """Return whether the node processes are built and sourced, so that flights can be runs of the graph."""
-    try:
-        executable(COMPOSED)
-    except RunError:
-        return False
-    return True
-
-
-def in_process(scenario: str) -> FlightData:
-    """Return the flight of a shipped scenario, computed in this process."""
-    flight = fly(assemble(flight_parameters(load_scenario(scenario)))).data()
-    # The stamps of a bag are integer nanoseconds.
-    return replace(flight, time=np.round(flight.time * 1e9) * 1e-9)
+        digest = digest_of([text.encode(), code_digest().encode(), Path(__file__).read_bytes()])
+        return kept(self._folder / f"{name.replace(' ', '_')}_{digest[:DIGITS]}.npz", flown, _save, _load)
 
 
 def fly_over(point: Point, progress: Any = lambda done: None) -> Table:
@@ -197,6 +140,24 @@ def flight_measures(flight: FlightData) -> dict[str, float]:
         decay = values[f"{name}_decay_time"]
         values[f"{name}_settling_time"] = decay if decay < since[-1] - LAST else np.inf
     return values
+
+
+def kept(
+    path: Path, make: Callable[[], Result], save: Callable[[Path, Result], None], load: Callable[[Path], Result]
+) -> Result:
+    """Return the contents of the file ``path``, whose name ends in a digest; compute and store them if it is missing.
+
+    The file is written atomically; files with another digest are removed.
+    """
+    if path.is_file():
+        return load(path)
+    made = make()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    new = path.with_name(f".{path.name}")
+    save(new, made)
+    new.rename(path)
+    drop_older(path)
+    return made
 
 
 def _half_width() -> np.ndarray:

@@ -3,9 +3,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hsv.design.certified import load_certified
+from hsv.design.certified import Plan, load_certified
 from hsv.design.disturbance import DisturbanceSet
-from hsv.design.hardware.plan import Plan
 from hsv.design.tube_problem import tube_problem
 
 

@@ -1,10 +1,73 @@
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from hsv.base.errors import DesignError
 from hsv.control.design import find_design
-from hsv.design.certified import load_certified
+from hsv.design.certified import Plan, load_certified
 from hsv.design.hardware import verdict
+from hsv.design.hardware.verdict import Reach, Verdict, reaches
+from hsv.model.actuators import SUBSTEPS
+from hsv.model.lpv.actuated import actuator_system
+from hsv.model.signals import INPUT_NAMES
+from hsv.model.trim import trim
+
+
+def test_no_error_in_the_set_moves_actuators_farther_or_faster(realistic):
+    """Random errors on the edge of the set and disturbances at their bounds, and the error that is worst for the rate.
+
+    Actuators by the exponential of their equations in continuous time.
+    """
+    design, found, plan = realistic.design, realistic.invariant_set(), Plan.of(realistic)
+    fuel, elevator = sorted(reaches(found, design, plan), key=lambda reach: INPUT_NAMES.index(reach.channel))
+    actuators = design.actuator_sets
+    A, B, C, _ = actuator_system(actuators)
+    a = len(A)
+    flown, commands = plan.actuators(design)
+    at_rest = trim(realistic.vehicle.decoupled, *plan.flight.history.state[0, :2]).input
+    system, disturbance = found.problem.system, found.problem.disturbance
+    generator = np.random.default_rng(1)
+    factor = np.linalg.cholesky(found.Q)
+    rate_state = system.names.index("elevator_deflection_rate") - len(system.names) + a
+    lost = np.zeros((2, len(disturbance.lower)))
+    lost[1, 3] = 1.0
+    whole = np.block([[A, B], [np.zeros((2, a + 2))]])
+    maps = [expm(whole * substep * design.period / SUBSTEPS)[:a] for substep in range(1, SUBSTEPS + 1)]
+    largest = 0.0
+    for number in range(400):
+        k = int(generator.integers(len(flown)))
+        v = generator.standard_normal(len(found.Q))
+        e = found.centre + factor @ (v / np.linalg.norm(v))
+        if number % 2:
+            worst = np.zeros(len(found.Q))
+            worst[-a + rate_state] = 1.0
+            e = found.centre + found.Q @ worst / np.sqrt(worst @ found.Q @ worst)
+        d = np.where(generator.random(len(disturbance.lower)) < 0.5, disturbance.lower, disturbance.upper)
+        held = commands[k] + system.F @ e + (system.F_d + lost) @ d
+        for over in maps:
+            moved = over @ np.r_[flown[k] + e[-a:], held]
+            position, rate = C @ moved + at_rest, A @ moved + B @ held
+            for i, reach in enumerate((fuel, elevator)):
+                assert reach.lowest <= position[i] <= reach.highest
+            assert abs(rate[rate_state - 1]) <= elevator.rate
+            largest = max(largest, abs(rate[rate_state - 1]))
+    assert largest > 0.5 * elevator.rate
+
+
+def test_limits_that_are_reached_take_the_certificate_away():
+    far = Reach("elevator_deflection", -0.1, 0.3, 5.0, 0.35, 6.0)
+    verdict = Verdict("all", "", np.ones(5), np.ones(2), np.ones((2, 2)), np.ones((2, 2)), 0.5, (far,))
+    assert far.inactive and verdict.certified and verdict.limited().certified
+    for near in (Reach(far.channel, -0.1, 0.36, 5.0, 0.35, 6.0), Reach(far.channel, -0.1, 0.3, 6.1, 0.35, 6.0)):
+        assert not near.inactive
+        limited = Verdict("all", "", np.ones(5), np.ones(2), np.ones((2, 2)), np.ones((2, 2)), 0.5, (near,)).limited()
+        assert not limited.certified and "beyond it by" in limited.said()
+    assert Reach("fuel_equivalence_ratio", 0.0, 0.8, 3.0, np.inf, np.inf).as_dict()["stop"] is None
+
+
+def test_a_flight_that_starts_outside_the_set_is_not_certified():
+    verdict = Verdict("all", "", np.ones(5), np.ones(2), np.ones((2, 2)), np.ones((2, 2)), 1.2)
+    assert not verdict.certified and verdict.said() == "flights may start outside the set, at level 1.2"
 
 
 def test_where_no_set_is_found_the_reason_is_that_of_the_search(subject, monkeypatch):

@@ -11,8 +11,8 @@ from hsv.design.certified import load_certified
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import ErrorSystem
 from hsv.design.sets.counter_example import counter_examples
-from hsv.design.sets.problem import TubeProblem
 from hsv.design.sets.star_norms import StarNorms, star_norms
+from hsv.design.tube_problem import TubeProblem
 from hsv.model.signals import N_RIGID
 
 

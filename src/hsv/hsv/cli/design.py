@@ -440,7 +440,7 @@ def certify(
     """
     from hsv.control.design import find_design
     from hsv.design.certified import load_certified
-    from hsv.design.hardware.declared import declared, declared_actuators, described
+    from hsv.design.hardware.models import declared, declared_actuators, described
     from hsv.design.hardware.verdict import certified_with
     from hsv.flight.assembly import uncovered_of
     from hsv.flight.scenario import load_scenario

@@ -17,7 +17,7 @@ from hsv.base.errors import DesignError, DocumentError, ParameterError, did_you_
 from hsv.base.files import parse_json, parse_yaml, read_text
 from hsv.base.parameters import Parameter, validate
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS, NotchSection, discretise, flown_sections
-from hsv.model.actuators import ACTUATOR_SETS
+from hsv.model.actuators import ACTUATOR_SETS, ActuatorSet
 from hsv.model.lpv.polytope import INTERPOLATIONS, Polytope, axis_weights
 from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES, STATE_NAMES, first_step
 
@@ -310,6 +310,11 @@ class ControlDesign:
         tau = certified(TAU.check(values), self.tau_minimum)
         _check_stable(TAU.name, self.polytope, self.adjusted_gain(tau))
         return replace(self, tau=tau)
+
+    @property
+    def actuator_sets(self) -> tuple[ActuatorSet, ...]:
+        """The actuators that the design knows."""
+        return tuple(ACTUATOR_SETS[name] for name in self.actuators)
 
     @property
     def digest(self) -> str:

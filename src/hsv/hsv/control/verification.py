@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise, product
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -39,7 +39,6 @@ from hsv.control.checks import (
 from hsv.control.design import ControlDesign, find_certificate, read_certificate
 from hsv.control.notch_filter import continuous, discretise, series
 from hsv.control.tolerances import ROUNDING
-from hsv.model.actuators import ACTUATOR_SETS
 from hsv.model.lpv.actuated import actuator_names, sampled_actuators
 from hsv.model.lpv.linearisation import (
     Filter,
@@ -47,13 +46,14 @@ from hsv.model.lpv.linearisation import (
     extended_state,
     from_true_rate,
     linearise,
-    linearise_extended,
     zero_order_hold,
 )
-from hsv.model.lpv.polytope import Polytope
 from hsv.model.signals import INPUT_NAMES, N_INPUTS, N_RIGID, N_STATES, PITCH_RATE, STATE_NAMES
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from hsv.model.lpv.polytopic import PolytopicModel
 
 CHANNELS = {
     "acceleration": "m/s^2",
@@ -80,12 +80,6 @@ STEERING = (
     "inputs.tightening",
 )
 """Inputs that only steer the search for a design; the checks of the result do not depend on them."""
-
-_POINTS = 46
-"""Number of altitudes, and of velocities, at which the model is compared with the vehicle; they lie off the samples."""
-
-_FREQUENCIES = np.logspace(-2.0, 2.0, 200)
-"""Frequencies of the Bode plots, rad/s, as in figure 2 of the paper."""
 
 _LONGEST = 10_000
 """Maximum length of a counter-example, steps."""
@@ -187,91 +181,47 @@ def solver_checks(subject: Subject) -> Checks:
 # --- polytopic model, (10)-(12), (45) --------------------------------------------------------------------------------
 
 
-class Model(NamedTuple):
-    """The recomputed polytopic model.
-
-    ``whole`` includes the states of the notch filter if the design's model has them; ``polytope`` has the nine states
-    of the vehicle. ``exact`` returns discrete A and B at an altitude (m) and a velocity (m/s).
-    """
-
-    whole: Polytope
-    polytope: Polytope
-    samples: Sequence[tuple[np.ndarray, np.ndarray]]
-    singular_values: Sequence[np.ndarray]
-    exact: Callable[[float, float], tuple[np.ndarray, np.ndarray]]
-    scales: tuple[np.ndarray, np.ndarray]
-
-
 def notch_in_series(design: ControlDesign) -> Filter:
     """Return the notch filter (38) of ``design`` in continuous time (39)."""
     return Filter(*series(continuous(design.notch)))
 
 
-def recomputed_model(subject: Subject) -> Model:
-    """Recompute the polytopic model of the vehicle (10)-(12), or of vehicle and notch filter (45), in a few seconds."""
-    from hsv.model.lpv.linearisation import grid_polytope, sample
-    from hsv.model.lpv.tensor_product import tensor_product
+def recomputed_model(subject: Subject) -> tuple[PolytopicModel, tuple[np.ndarray, np.ndarray]]:
+    """Recompute the model of the vehicle (10)-(12), or of vehicle and notch filter (45), and its scales, in seconds."""
+    from hsv.model.lpv.polytopic import polytopic_model
 
-    inputs, vehicle, notch = subject.certificate["inputs"]["model"], subject.vehicle, notch_in_series(subject.design)
-    product, period, extended = inputs["tensor_product"], inputs["period"], inputs["system"] == "ECM"
-    continuous_time = (
-        partial(linearise_extended, vehicle.decoupled, notch) if extended else partial(linearise, vehicle.decoupled)
-    )
+    inputs, extended = subject.certificate["inputs"]["model"], subject.stated("inputs.model.system") == "ECM"
+    product, of_grid = inputs["tensor_product"], inputs["representation"] == "grid"
     states = sizes(product["state_scale"], STATE_NAMES)
     if extended:
         filters = sizes(product["filter_scale"], ("state_1", "state_2"))
         states = np.concatenate((states, *[filters] * len(subject.design.notch)))
     scales = states, sizes(product["input_scale"], INPUT_NAMES)
-    of_grid = inputs["representation"] == "grid"
     of_axis = ("inputs.model.grid.{}_vertices" if of_grid else "inputs.model.tensor_product.{}_samples").format
-    counts = [subject.count(of_axis(axis), 100) for axis in ("altitude", "velocity")]
-    axes = np.linspace(*vehicle.altitude_range, counts[0]), np.linspace(*vehicle.velocity_range, counts[1])
-    samples: list[tuple[np.ndarray, np.ndarray]] = [(axis, np.eye(len(axis))) for axis in axes]
-    values: Sequence[np.ndarray] = ()
-    if of_grid:
-        whole = grid_polytope(continuous_time, *axes, period)
-    else:
-        options = product["tolerance"], product["functions"]
-        found = tensor_product(*sample(continuous_time, *axes, period), *axes, *scales, *options)
-        whole, samples, values = found.polytope, [found.altitude_samples, found.velocity_samples], found.singular_values
-    polytope = whole
-    if extended:
-        # x' = T x replaces the filtered pitch rate by the true one, so that the filter does not act on the vehicle.
-        T = from_true_rate(notch)
-        A, B = np.linalg.solve(T, whole.A @ T), np.linalg.solve(T, whole.B)
-        vehicle_only = slice(N_STATES)
-        polytope = Polytope(A[:, vehicle_only, vehicle_only], B[:, vehicle_only], whole.altitude, whole.velocity)
-
-    def exact(altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
-        return zero_order_hold(*continuous_time(altitude, velocity), period)
-
-    return Model(whole, polytope, samples, values, exact, scales)
+    counts = subject.count(of_axis("altitude"), 100), subject.count(of_axis("velocity"), 100)
+    notch = notch_in_series(subject.design) if extended else None
+    tensor = None if of_grid else (product["tolerance"], product["functions"])
+    return polytopic_model(subject.vehicle, notch, inputs["period"], counts, scales, tensor), scales
 
 
 def model_checks(subject: Subject) -> Checks:
     """Compare vertices, weights and accuracy of the model with values recomputed from the vehicle parameters."""
-    from hsv.model.lpv.accuracy import model_accuracy, off_grid
-
-    design, model, inputs = subject.design, recomputed_model(subject), subject.certificate["inputs"]["model"]
+    design, inputs, (model, scales) = subject.design, subject.certificate["inputs"]["model"], recomputed_model(subject)
     shown = "{} from the vehicle".format
     yield parameter(subject, "model.a", design.polytope.A, model.polytope.A, shown("model.a"))
     yield parameter(subject, "model.b", design.polytope.B, model.polytope.B, shown("model.b"))
-    expected = "linear" if inputs["representation"] == "grid" else "cubic"
-    yield Check("scheduling.interpolation", design.interpolation, repr(expected), design.interpolation == expected)
+    found, expected = design.interpolation, model.interpolation
+    yield Check("scheduling.interpolation", found, repr(expected), found == expected)
     given = design.altitude_samples, design.velocity_samples
-    for axis, flown, found in zip(("altitude", "velocity"), given, model.samples, strict=True):
-        yield parameter(subject, f"scheduling.{axis}.breakpoints", flown[0], found[0])
-        yield parameter(subject, f"scheduling.{axis}.weights", flown[1], found[1])
+    for axis, flown, sampled in zip(("altitude", "velocity"), given, model.samples, strict=True):
+        yield parameter(subject, f"scheduling.{axis}.breakpoints", flown[0], sampled[0])
+        yield parameter(subject, f"scheduling.{axis}.weights", flown[1], sampled[1])
     yield equal(subject, "model.representation", inputs["representation"])
-    yield recomputed(subject, "model.vertices", [samples.shape[1] for _, samples in model.samples], "copied")
+    yield recomputed(subject, "model.vertices", [weights.shape[1] for _, weights in model.samples], "copied")
     shown_values = [values[:8] for values in model.singular_values]
     yield recomputed(subject, "model.singular_values", shown_values, "singular values")
     judged = design.polytope if inputs["system"] == "DM" else model.whole
-    altitudes, velocities = subject.vehicle.altitude_range, subject.vehicle.velocity_range
-    points = off_grid(*altitudes, _POINTS), off_grid(*velocities, _POINTS)
-    frequencies = _FREQUENCIES[0.99 * np.pi / design.period > _FREQUENCIES]
-    accuracy = model_accuracy(judged, model.exact, *points, *model.scales, frequencies, design.period)
-    for name, value in accuracy.report().items():
+    for name, value in model.accuracy(judged, scales).report().items():
         kind = {"points": "copied", "smallest_weight": "weights", "weight_sum_error": "sums"}.get(name, "accuracy")
         yield recomputed(subject, f"model.accuracy.{name}", value, kind)
 
@@ -457,7 +407,7 @@ def error_system(design: ControlDesign, vehicle: Vehicle, tau: np.ndarray, effec
     """
     period, polytope = design.period, design.polytope
     A_s, B_s, C_s, D_s = series(discretise(design.notch, period))
-    actuators = [ACTUATOR_SETS[name] for name in design.actuators]
+    actuators = design.actuator_sets
     a = sampled_actuators(actuators, period)
     r, x, s, n = len(polytope.A), N_RIGID, len(A_s), len(a.A)
     filters, positions = slice(x, x + s), slice(x + s, x + s + n)
@@ -793,7 +743,7 @@ def _full_state_checks(subject: Subject) -> Checks:
     The full-state F' cancels the notch filter.
     """
     design, field, notch = subject.design, "adjustable.full_state", notch_in_series(subject.design)
-    gain, whole = np.array(subject.stated(f"{field}.gain")), recomputed_model(subject).whole
+    gain, whole = np.array(subject.stated(f"{field}.gain")), recomputed_model(subject)[0].whole
     kept = [*range(N_RIGID), *range(N_STATES, N_STATES + len(notch.B))]
     loops = whole.A[:, kept][:, :, kept] + whole.B[:, kept] @ gain
     yield recomputed(subject, f"{field}.spectral_radii", radii(loops), "spectral radii")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,27 +23,19 @@ from hsv.design.baseline import (
     versions,
     with_family,
 )
-from hsv.design.disturbance import DisturbanceSet
+from hsv.design.disturbance import ChannelModel, DisturbanceSet
 from hsv.design.error_system import error_system
+from hsv.design.feedback import CommonLyapunov, common_lyapunov
 from hsv.design.full_state import full_state_report
 from hsv.design.inputs import AdjustableInputs, DesignInputs
-from hsv.design.lyapunov import CommonLyapunov, common_lyapunov
 from hsv.design.region import Region, incomplete_share
 from hsv.design.sets.invariant_set import InvariantSet
 from hsv.design.tightening import TightenedInputs, tighten
 from hsv.design.tube import MeasuredSet, Tube, design_tube, flights_in_tube, flights_report, measured_set
-from hsv.design.tube_problem import bounding_factors, channel_model, tube_problem
+from hsv.design.tube_problem import bounding_factors, tube_problem
 from hsv.model.signals import N_RIGID
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
-
-
-@dataclass(frozen=True)
-class AdjustableSets:
-    """Z for W at tau = 1, and Z' for W' at the factor in use, from which the relaxed bounds of K' follow."""
-
-    complete: MeasuredSet
-    incomplete: MeasuredSet
 
 
 def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) -> DesignResult:
@@ -69,10 +61,14 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
     full = full_state_report(inputs, design, gains.model.whole, columns)
     tell("common Lyapunov function", 2, 2)
 
-    sets = _sets(design, inputs, tell)
+    # Z for W at tau = 1, and Z' for W' at the factor in use, from which the relaxed bounds of K' follow.
+    one = replace(design, tau=np.ones(N_RIGID), tau_minimum=np.ones(N_RIGID))
+    at_one: Progress = lambda stage, *done: tell(f"{stage}, tau = 1", *done)  # noqa: E731
+    complete = measured_set(one, Region(one, inputs, 1.0), inputs, at_one)
+    incomplete = measured_set(design, Region(design, inputs, incomplete_share(inputs)), inputs, tell)
     target = inputs.nominal.target
     trimmed = trim(vehicle.decoupled, target.altitude, target.velocity).input
-    bound = relaxed_bound(inputs.nominal.input_bound.array(), trimmed, sets.complete.bounds, sets.incomplete.bounds)
+    bound = relaxed_bound(inputs.nominal.input_bound.array(), trimmed, complete.bounds, incomplete.bounds)
     problem = nominal_problem(inputs, design.polytope, bound)
     family = nominal_family(inputs, problem, tell)
     single = nominal_gain(problem, initial_deviation(inputs))
@@ -91,7 +87,7 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
         "versions": versions(),
         "tube": tube.report,
         "adjustable": {
-            **_report(design, inputs, lyapunov, sets, tube),
+            **_report(design, inputs, lyapunov, (complete, incomplete), tube),
             "full_state": full,
             "input_bound": bound.tolist(),
             "single_gain": single.report(),
@@ -100,15 +96,6 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
         "parameters_sha256": flown.to_parameters()["design.hash"],
     }
     return DesignResult(flown, gains.model, report)
-
-
-def _sets(design: ControlDesign, inputs: DesignInputs, progress: Progress) -> AdjustableSets:
-    one = replace(design, tau=np.ones(N_RIGID), tau_minimum=np.ones(N_RIGID))
-    share = incomplete_share(inputs)
-    return AdjustableSets(
-        measured_set(one, Region(one, inputs, 1.0), inputs, lambda stage, *done: progress(f"{stage}, tau = 1", *done)),
-        measured_set(design, Region(design, inputs, share), inputs, progress),
-    )
 
 
 def _checked(inputs: DesignInputs) -> AdjustableInputs:
@@ -125,26 +112,27 @@ def _checked(inputs: DesignInputs) -> AdjustableInputs:
 
 
 def _report(
-    design: ControlDesign, inputs: DesignInputs, lyapunov: CommonLyapunov, sets: AdjustableSets, tube: Tube
+    design: ControlDesign,
+    inputs: DesignInputs,
+    lyapunov: CommonLyapunov,
+    sets: tuple[MeasuredSet, MeasuredSet],
+    tube: Tube,
 ) -> dict[str, Any]:
     share = incomplete_share(inputs)
     beyond = tube.report["flights"]
     if share < 1.0:
         full = Region(design, inputs, 1.0)
-        beyond = flights_report(
-            flights_in_tube(
-                channel_model(design, inputs.flown_vehicle), full, tube.found, lambda stage, done, total: None
-            )
-        )
+        model = ChannelModel(design, inputs.flown_vehicle)
+        beyond = flights_report(flights_in_tube(model, full, tube.found, lambda *_: None))
     tau = np.append(design.tau, [design.tau[-1]] * (len(tube.found.half_width) - N_RIGID))
-    complete = sets.complete.report()
+    complete, incomplete = (each.report() for each in sets)
     return {
         "tau": design.tau.tolist(),
         "tau_minimum": design.tau_minimum.tolist(),
         "share": share,
         "lyapunov": lyapunov.report(),
         "complete": complete,
-        "incomplete": sets.incomplete.report(),
+        "incomplete": incomplete,
         "scaled_half_width": (tau * np.array(complete["invariant_set"]["half_width"])).tolist(),
         "complete_fault": beyond,
     }
@@ -155,7 +143,7 @@ def certified_loops(design: ControlDesign, vehicle: Vehicle, effectiveness: floa
 
     Vertices x tube factors (the smallest, 1) x elevator effectiveness (1, ``effectiveness``).
     """
-    polytope, model = design.polytope, channel_model(design, vehicle)
+    polytope, model = design.polytope, ChannelModel(design, vehicle)
 
     def loop(factor: np.ndarray, share: float) -> np.ndarray:
         gain = design.feedback_gain[:, :N_RIGID] * factor

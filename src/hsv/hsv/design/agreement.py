@@ -54,8 +54,7 @@ def _largest(parameter: str, given: float | list[float], written: float | list[f
     if size.ndim > 1:
         shape = size.shape if value.size == size.size else (-1, *size.shape)
         value, expected = value.reshape(shape), expected.reshape(shape)
-    scaled = np.abs(value - expected) / np.maximum(np.abs(expected), size if expected.ndim else size[0])
-    scaled = np.where(np.isnan(scaled), np.inf, scaled)
-    worst = np.unravel_index(int(np.argmax(scaled)), scaled.shape)
-    index = tuple(int(i) for i in worst)
-    return Deviation(parameter, float(scaled[worst]), index, float(value[worst]), float(expected[worst]))
+    size = np.maximum(np.abs(expected), size if expected.ndim else size[0])
+    scaled = np.nan_to_num(np.abs(value - expected) / size, nan=np.inf, posinf=np.inf)
+    index = tuple(map(int, np.unravel_index(int(np.argmax(scaled)), scaled.shape)))
+    return Deviation(parameter, float(scaled[index]), index, float(value[index]), float(expected[index]))

@@ -1,18 +1,35 @@
-"""A certified design, read back from its two files with its inputs and its invariant set."""
+"""A certified design, read back from its two files, and the flight of its nominal vehicle."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hsv.control.checks import Subject, load_subject
-from hsv.design.disturbance import DisturbanceSet
+from hsv.control.design import ControlDesign
+from hsv.design.disturbance import (
+    ACCELERATED,
+    CHANNELS,
+    REMAINING,
+    ChannelModel,
+    DisturbanceSet,
+    acceleration_channels,
+    scheduled,
+    widened,
+)
 from hsv.design.inputs import DesignInputs, inputs_from_report
+from hsv.design.region import Region, incomplete_share, measure
 from hsv.design.sets.invariant_set import InvariantSet
 from hsv.design.tube_problem import tube_problem
+from hsv.flight.flight import Flight
+from hsv.model.lpv.actuated import respond, sampled_actuators
+from hsv.model.signals import N_RIGID
 
 
 @dataclass(frozen=True)
@@ -48,3 +65,89 @@ def load_certified(path: Path) -> CertifiedDesign:
         DesignError: A file that is missing or malformed.
     """
     return CertifiedDesign(**vars(load_subject(path)))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The plan of the nominal vehicle's ``flight`` (k rows); its bounds are inflated like those of the design."""
+
+    subject: CertifiedDesign
+    flight: Flight
+
+    @classmethod
+    def of(cls, subject: CertifiedDesign) -> Plan:
+        """Fly the nominal vehicle over the declared region of ``subject``."""
+        inputs = subject.inputs
+        return cls(subject, Region(subject.design, inputs, incomplete_share(inputs)).fly({}))
+
+    @property
+    def states(self) -> np.ndarray:
+        """x_r + x_n (k, 5)."""
+        return np.asarray((self.flight.reference + self.flight.history.deviation)[:, :N_RIGID])
+
+    @property
+    def inflation(self) -> float:
+        """Inflation of bounds."""
+        return float(self.subject.inputs.disturbance.inflation)
+
+    @property
+    def half_width(self) -> np.ndarray:
+        """Half-widths (5) of the rigid states in the certified set."""
+        return np.array(self.subject.certificate["tube"]["invariant_set"]["half_width"][:N_RIGID])
+
+    def largest(self) -> np.ndarray:
+        """Return the largest magnitude (5) of the rigid states."""
+        return np.asarray(self.inflation * np.abs(self.states).max(axis=0))
+
+    def change(self, steps: np.ndarray) -> np.ndarray:
+        """Return the largest change of each rigid state (5) over the given number of steps (5)."""
+        pairs = [(self.states[n:, i], self.states[: len(self.states) - n, i]) for i, n in enumerate(steps)]
+        return np.array([self.inflation * np.abs(later - before).max() for later, before in pairs])
+
+    def scheduling(self, errors: np.ndarray) -> np.ndarray:
+        """Return the widening (7) of the structured set that errors (2) of altitude and velocity cause.
+
+        The nominal model is scheduled with the measurement, so its prediction of x_n is off by
+        [A(p + error) - A(p)] x_n + [B(p + error) - B(p)] u_n. Both ends of both errors are looked at.
+        """
+        polytope, h = self.subject.design.polytope, self.flight.history
+        points = h.state[:, :2]
+        here = scheduled(polytope, points)
+        signs = product((-1.0, 1.0), repeat=2)
+        ends = np.array([scheduled(polytope, points + np.multiply(each, errors)) for each in signs])
+        rows = np.column_stack((h.deviation, h.nominal_input))
+        off = np.einsum("skij,kj->ski", ends - here, rows)[..., :N_RIGID]
+        columns = acceleration_channels(self.subject.vehicle, self.subject.design.period)
+        accelerations = off[..., ACCELERATED] @ np.linalg.inv(columns[ACCELERATED]).T
+        remains = off[..., REMAINING] - accelerations @ columns[REMAINING].T
+        largest = np.zeros(len(CHANNELS))
+        largest[:3], largest[5:] = np.abs(accelerations).max(axis=(0, 1)), np.abs(remains).max(axis=(0, 1))
+        return self.inflation * largest
+
+    def remeasured(self, equipment: Mapping[str, Any]) -> np.ndarray:
+        """Return by how much flights with ``equipment``, flat parameters of sensors, leave the structured set (7).
+
+        Noise moves the elevator, and the model does not explain all of the response. The rest is measured as the set
+        is: in flights of the nominal vehicle and 32 corners, inflated.
+
+        Raises:
+            DesignError: A flight is lost or limited.
+        """
+        subject, inputs = self.subject, self.subject.inputs
+        region = Region(subject.design, inputs, incomplete_share(inputs), equipment)
+        model = ChannelModel(subject.design, subject.vehicle)
+        found = measure(region, model, region.screening()).channels
+        bounds = subject.disturbance
+        lower, upper = widened(found.lower, found.upper, self.inflation)
+        return np.maximum(np.maximum(bounds.lower - lower, upper - bounds.upper), 0.0)
+
+    def actuators(self, design: ControlDesign) -> tuple[np.ndarray, np.ndarray]:
+        """Return the states (k, a) of the actuators that ``design`` knows as the plan and its lag move them, no error.
+
+        And the commands (k, 2) that move them: the plan's, and the feedback to its lag.
+        """
+        model = ChannelModel(design, self.subject.vehicle)
+        commands = self.flight.plan - model.at_rest(self.flight)
+        driven = respond(sampled_actuators(design.actuator_sets, design.period), commands)[0]
+        late, feedback = model.lag(self.flight)
+        return driven + late[:, -driven.shape[1] :], commands + feedback

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,10 @@ from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
 from hsv.design.inputs import InvariantSetInputs
 from hsv.design.sets.counter_example import counter_examples
-from hsv.design.sets.ellipsoid import ellipsoid
-from hsv.design.sets.invariant_set import InvariantSet
-from hsv.design.sets.problem import TubeProblem, mean_size
+from hsv.design.sets.invariant_set import InvariantSet, ellipsoid
 from hsv.design.sets.star_norms import star_norms
 from hsv.design.tightening import tighten
+from hsv.design.tube_problem import TubeProblem
 from hsv.model.signals import N_RIGID
 
 
@@ -56,18 +55,22 @@ def compare_sets(design: ControlDesign, problem: TubeProblem, inputs: InvariantS
     try:
         found = ellipsoid(problem, scale, inputs.input_scale.array(), inputs.contraction)
         rows.append(_row("ellipsoid", found, design, scale))
-        rows.append(_row("star norms", found.narrowed(star_norms(problem, found.centre)), design, scale))
+        rows.append(_row("star norms", replace(found, star_norms=star_norms(problem, found.centre)), design, scale))
     except DesignError as error:
         rows.append(Row(("ellipsoid", "star norms")[len(rows)], str(error)))
     driven = counter_examples(problem).half_range
-    return [*rows, Row("counter-examples", "", driven[:N_RIGID], driven[N_RIGID:], mean_size(driven, scale))]
+    return [*rows, Row("counter-examples", "", driven[:N_RIGID], driven[N_RIGID:], _mean_size(driven, scale))]
 
 
 def _row(name: str, found: InvariantSet, design: ControlDesign, scale: np.ndarray) -> Row:
     found.certify()
-    size = mean_size(found.half_width, scale)
+    size = _mean_size(found.half_width, scale)
     try:
         bounds = tighten(found, design.input_minimum, design.input_maximum)
     except DesignError as error:
         return Row(name, str(error), found.half_width, found.feedback, size)
     return Row(name, "", found.half_width, found.feedback, size, bounds.lower, bounds.upper)
+
+
+def _mean_size(half_width: np.ndarray, scale: np.ndarray) -> float:
+    return float(np.exp(np.mean(np.log(half_width[: len(scale)] / scale))))

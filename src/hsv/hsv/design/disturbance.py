@@ -18,16 +18,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsv.control.notch_filter import NotchData
+from hsv.control.design import ControlDesign
+from hsv.control.notch_filter import NotchData, discretise
 from hsv.control.optimisation import outward
 from hsv.core import doubles, lib
 from hsv.design.error_system import tube_errors
+from hsv.flight.flight import Flight
 from hsv.flight.responses import along_filter, lag_response
-from hsv.model.lpv.actuated import SampledActuators, respond
+from hsv.model.lpv.actuated import SampledActuators, respond, sampled_actuators
 from hsv.model.lpv.linearisation import linearise, zero_order_hold
 from hsv.model.lpv.polytope import Polytope
 from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
@@ -55,38 +58,16 @@ CHANNELS = (
 """Order of the columns of G in :class:`hsv.design.error_system.ErrorSystem`."""
 
 _FILTERED_NOMINAL = 4
-_ACCELERATED = [1, 2, 4]
-_REMAINING = [0, 3]
+ACCELERATED, REMAINING = [1, 2, 4], [0, 3]
+"""Rigid states that the three accelerations act on, and those in which a residual remains."""
 
 
 def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
     """Return the effect (5, 3) on the rigid states of unit accelerations held over ``period`` (s), at mid-envelope."""
     A, _ = linearise(vehicle.decoupled, *vehicle.centre)
     unit = np.zeros((N_RIGID, 3))
-    unit[_ACCELERATED, [0, 1, 2]] = 1.0
+    unit[ACCELERATED, [0, 1, 2]] = 1.0
     return zero_order_hold(A[:N_RIGID, :N_RIGID], unit, period)[1]
-
-
-@dataclass(frozen=True)
-class Record:
-    """History of a flight for the test of membership.
-
-    Rows k = 0 ... n of x, x_n (9), u_n, command, actuator, x_r, u_r, d_r (9).
-    """
-
-    state: np.ndarray
-    deviation: np.ndarray
-    nominal_input: np.ndarray
-    command: np.ndarray
-    actuator: np.ndarray
-    reference: np.ndarray
-    reference_input: np.ndarray
-    defect: np.ndarray
-
-    @property
-    def plan(self) -> np.ndarray:
-        """u_n + u_r (n + 1, 2)."""
-        return self.nominal_input + self.reference_input
 
 
 class Signals(NamedTuple):
@@ -104,52 +85,69 @@ class Signals(NamedTuple):
 
 @dataclass(frozen=True)
 class ChannelModel:
-    """Decomposition of Delta into channels: reference model, filter, acceleration columns (5, 3).
+    """Decomposition of Delta into the channels of ``design``, which is for ``vehicle``.
 
-    ``filtered``: the nominal pitch rate is filtered as the measured one is, and its channel is nothing. ``gain`` (2, 5)
-    and ``vehicle`` tell what the lag of the plan does where there are ``actuators``.
+    Where the nominal pitch rate is filtered as the measured one is, its channel is zero.
     """
 
-    polytope: Polytope
-    notch: NotchData
-    columns: np.ndarray
-    gain: np.ndarray
+    design: ControlDesign
     vehicle: Vehicle
-    filtered: bool = False
-    actuators: SampledActuators | None = None
 
-    def signals(self, record: Record) -> Signals:
+    @cached_property
+    def notch(self) -> NotchData:
+        """The discrete filter."""
+        return discretise(self.design.notch, self.design.period)
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """Effect (5, 3) of the accelerations over a period."""
+        return acceleration_channels(self.vehicle, self.design.period)
+
+    @cached_property
+    def actuators(self) -> SampledActuators | None:
+        """The actuators that the design knows."""
+        known = self.design.actuator_sets
+        return sampled_actuators(known, self.design.period) if known else None
+
+    def signals(self, flight: Flight) -> Signals:
         """Return the disturbances f, w and Delta that acted in a flight (paper eq. 13, eq. 16, eq. 18)."""
-        commanded, lost = record.command, record.actuator[:, 1] - record.command[:, 1]
+        h = flight.history
+        commanded, lost = h.command, h.actuator[:, 1] - h.command[:, 1]
         through = lost
         if self.actuators is not None:
-            at_rest = self._at_rest(record)
-            commanded = at_rest + respond(self.actuators, record.command - at_rest)[1]
+            at_rest = self.at_rest(flight)
+            commanded = at_rest + respond(self.actuators, h.command - at_rest)[1]
             through = respond(self.actuators, np.stack((np.zeros_like(lost), lost), axis=1))[1][:, 1]
-        inverse, remaining = np.linalg.inv(self.columns[_ACCELERATED]), self.columns[_REMAINING]
-        signals = decompose(self.polytope, self.notch, inverse, remaining, record, commanded, lost, through)
-        if self.filtered:
+        inverse, remaining = np.linalg.inv(self.columns[ACCELERATED]), self.columns[REMAINING]
+        signals = decompose(self.design.polytope, self.notch, inverse, remaining, flight, commanded, lost, through)
+        if self.design.filtered:
             signals.channels[:, _FILTERED_NOMINAL] = 0.0
         return signals
 
-    def errors(self, record: Record) -> tuple[np.ndarray, np.ndarray]:
+    def errors(self, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
         """Return the error in the tube (n + 1, states), and the feedback (n + 1, 2) to the lag of the plan.
 
         The latter is none without actuators; the former is e less the effect of that lag.
         """
+        h = flight.history
         if self.actuators is None:
-            e = tube_errors(record.state, record.deviation, record.reference, self.notch)
-            return e, np.zeros_like(record.command)
-        plan, at_rest = record.plan, self._at_rest(record)
-        beyond = record.actuator - plan
-        e = tube_errors(record.state, record.deviation, record.reference, self.notch, self.actuators, beyond)
-        lag = at_rest + respond(self.actuators, plan - at_rest)[1] - plan
-        late, feedback = lag_response(self.polytope, self.gain, self.notch, self.actuators, record.state[:, :2], lag)
+            return tube_errors(h.state, h.deviation, flight.reference, self.notch), np.zeros_like(h.command)
+        beyond = h.actuator - flight.plan
+        e = tube_errors(h.state, h.deviation, flight.reference, self.notch, self.actuators, beyond)
+        late, feedback = self.lag(flight)
         return e - late, feedback
 
-    def _at_rest(self, record: Record) -> np.ndarray:
+    def lag(self, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
+        """Return the effect of the lag of the plan on e (n + 1, states) and on the feedback (n + 1, 2)."""
+        assert self.actuators is not None
+        at_rest, design = self.at_rest(flight), self.design
+        lag = at_rest + respond(self.actuators, flight.plan - at_rest)[1] - flight.plan
+        gain, scheduled_at = design.adjusted_gain(design.tau)[:, :N_RIGID], flight.history.state[:, :2]
+        return lag_response(design.polytope, gain, self.notch, self.actuators, scheduled_at, lag)
+
+    def at_rest(self, flight: Flight) -> np.ndarray:
         """Return where actuators rest before the flight (2): in the trim that it starts in."""
-        return trim(self.vehicle.decoupled, record.state[0, 0], record.state[0, 1]).input
+        return trim(self.vehicle.decoupled, *flight.history.state[0, :2]).input
 
 
 def decompose(
@@ -157,7 +155,7 @@ def decompose(
     notch: NotchData,
     inverse: np.ndarray,
     remaining: np.ndarray,
-    record: Record,
+    flight: Flight,
     command: np.ndarray,
     lost: np.ndarray,
     through: np.ndarray,
@@ -169,31 +167,32 @@ def decompose(
         notch: The discrete filter.
         inverse: (3, 3) from the rates that accelerations change to the accelerations.
         remaining: (2, 3) effect of the accelerations on altitude and pitch angle.
-        record: n + 1 rows.
+        flight: n + 1 rows.
         command: (n + 1, 2) commanded input, or where the actuators are on average.
         lost: (n + 1) lost elevator.
         through: (n + 1) what of it comes through the actuators.
     """
-    x, x_r, n = record.state[:-1], record.reference[:-1], len(record.state) - 1
-    S = scheduled(polytope, x[:, :2])
+    h, x_r, n = flight.history, flight.reference[:-1], len(flight.history.state) - 1
+    S = scheduled(polytope, h.state[:-1, :2])
     # State and input less the reference: the vector that [A(p), B(p)] multiplies.
-    moved = np.hstack((x - x_r, (command - record.reference_input)[:-1]))
-    predicted = record.reference[1:] + record.defect[:-1]
+    moved = np.hstack((h.state[:-1] - x_r, (command - flight.reference_input)[:-1]))
+    # Begun with x - x_r, the sum would keep the millionth of the residuals that it loses; one design would change.
+    predicted = flight.reference[1:] + flight.defect[:-1]
     for j in range(N_STATES + N_INPUTS):
         predicted += S[:, :, j] * moved[:, j, None]
-    delta = record.state[1:] - predicted
+    delta = h.state[1:] - predicted
     fault = S[:, :, -1] * through[:-1, None]
     rest = delta - fault
     channels = np.zeros((n, len(CHANNELS)))
-    for j, row in enumerate(_ACCELERATED):
+    for j, row in enumerate(ACCELERATED):
         channels[:, :3] += inverse[:, j] * rest[:, row, None]
     channels[:, 3] = lost[:-1]
-    planned = (record.deviation[:-1] + x_r)[:, PITCH_RATE]
+    planned = (h.deviation[:-1] + x_r)[:, PITCH_RATE]
     channels[:, _FILTERED_NOMINAL] = along_filter(notch, planned)[0] - planned
-    explained = np.zeros((n, len(_REMAINING)))
+    explained = np.zeros((n, len(REMAINING)))
     for j in range(3):
         explained += remaining[:, j] * channels[:, j, None]
-    channels[:, 5:] = rest[:, _REMAINING] - explained
+    channels[:, 5:] = rest[:, REMAINING] - explained
     return Signals(channels, delta, fault)
 
 
@@ -207,12 +206,11 @@ def scheduled(polytope: Polytope, points: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Membership:
-    """Worst ratio of a disturbance to its bound (at most 1: inside), its channel, step, and value (SI)."""
+    """Worst ratio of a disturbance to its bound (at most 1: inside), its channel and step."""
 
     ratio: float
     channel: str
     step: int
-    value: float
 
     @property
     def inside(self) -> bool:
@@ -254,9 +252,7 @@ class DisturbanceSet:
         np.divide(channels, bounds, out=ratios, where=bounds != 0.0)
         ratios[channels == 0.0] = 0.0
         step, channel = np.unravel_index(int(np.argmax(ratios)), ratios.shape)
-        return Membership(
-            float(ratios[step, channel]), CHANNELS[channel].name, int(step), float(channels[step, channel])
-        )
+        return Membership(float(ratios[step, channel]), CHANNELS[channel].name, int(step))
 
     def report(self) -> dict[str, Any]:
         """Return the bounds by channel, for JSON."""
@@ -269,11 +265,6 @@ class DisturbanceSet:
     def from_report(cls, report: Mapping[str, Any]) -> DisturbanceSet:
         """Return the set that :meth:`report` wrote."""
         return cls(*(np.array([report[c.name][side] for c in CHANNELS], float) for side in ("lower", "upper")))
-
-
-def inflated(lower: np.ndarray, upper: np.ndarray, factor: float) -> DisturbanceSet:
-    """Return the set between ``lower`` and ``upper`` (7), widened to hold zero, times ``factor``, rounded outwards."""
-    return DisturbanceSet(*widened(lower, upper, factor))
 
 
 def widened(lower: np.ndarray, upper: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
@@ -297,4 +288,4 @@ class Extremes:
 
     def structured(self, inflation: float) -> DisturbanceSet:
         """Return the structured set that these extremes of its channels give."""
-        return inflated(self.lower, self.upper, inflation)
+        return DisturbanceSet(*widened(self.lower, self.upper, inflation))

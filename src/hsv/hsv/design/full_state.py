@@ -18,15 +18,17 @@ from hsv.design.feedback import feedback_gain
 from hsv.design.inputs import DesignInputs
 from hsv.model.lpv.linearisation import Filter, extended_jacobian, extended_state, from_true_rate, zero_order_hold
 from hsv.model.lpv.polytope import Polytope
-from hsv.model.signals import N_RIGID, N_STATES, PITCH_RATE
+from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
 from hsv.model.trim import trim
-from hsv.model.vehicle import Vehicle
 
 
 def full_state_report(
     inputs: DesignInputs, design: ControlDesign, whole: Polytope, columns: np.ndarray
 ) -> dict[str, Any]:
     """Return the full-state and the structured gain, and the effect of each on the coupled vehicle, for JSON.
+
+    ``largest_real_part``: the rightmost pole (1/s) of the sampled loop around the coupled ECM in the target's trim, by
+    gain and set of inertial coupling; the tube factor is 1.
 
     Args:
         inputs: Scales and target of the design.
@@ -49,44 +51,23 @@ def full_state_report(
         inputs.error_scale(),
         inputs.feedback.input_scale.array(),
     )
-    target = inputs.nominal.target
     on_true_rate = found.F @ from_true_rate(notch)[np.ix_(kept, kept)]
+    gains = {"structured": design.feedback_gain[:, :N_RIGID], "full_state": found.F}
+    poles: dict[str, dict[str, float]] = {name: {} for name in gains}
+    for coupling in inputs.flown_vehicle.couplings:
+        coupled = inputs.flown_vehicle.coupled(coupling)
+        level = trim(coupled, inputs.nominal.target.altitude, inputs.nominal.target.velocity)
+        jacobian = extended_jacobian(extended_state(level.state, notch), level.input, coupled, notch, False)
+        A, B = zero_order_hold(*jacobian, design.period)
+        for name, gain in gains.items():
+            F = np.zeros((N_INPUTS, len(A)))
+            F[:, kept[: gain.shape[1]]] = gain
+            radius = float(np.abs(np.linalg.eigvals(A + B @ F)).max())
+            poles[name][coupling] = float(np.log(radius) / design.period)
     return {
         "gain": found.F.tolist(),
         "spectral_radii": found.radii.tolist(),
         "elevator_on_pitch_rate": float(on_true_rate[1, PITCH_RATE]),
         "structured_elevator_on_pitch_rate": float(design.feedback_gain[1, PITCH_RATE]),
-        "largest_real_part": largest_real_parts(
-            design, inputs.flown_vehicle, found.F, (target.altitude, target.velocity)
-        ),
+        "largest_real_part": poles,
     }
-
-
-def largest_real_parts(
-    design: ControlDesign, vehicle: Vehicle, full: np.ndarray, point: tuple[float, float]
-) -> dict[str, dict[str, float]]:
-    """Return the rightmost pole (1/s) of the sampled loop around the coupled ECM at a trim.
-
-    Args:
-        design: Design with the structured gain F', flown with the tube factor 1.
-        vehicle: Vehicle of the design.
-        full: (2, 5 + k) the full-state gain on rigid states and filter.
-        point: Altitude (m) and velocity (m/s) of the trim.
-
-    Returns:
-        By gain, ``"structured"`` and ``"full_state"``, and set of inertial coupling.
-    """
-    notch = Filter(*series(continuous(design.notch)))
-    found: dict[str, dict[str, float]] = {"structured": {}, "full_state": {}}
-    for coupling in vehicle.couplings:
-        coupled = vehicle.coupled(coupling)
-        level = trim(coupled, *point)
-        A, B = extended_jacobian(extended_state(level.state, notch), level.input, coupled, notch, False)
-        A, B = zero_order_hold(A, B, design.period)
-        structured, whole = np.zeros((2, len(A))), np.zeros((2, len(A)))
-        structured[:, :N_RIGID] = design.feedback_gain[:, :N_RIGID]
-        whole[:, :N_RIGID], whole[:, N_STATES:] = full[:, :N_RIGID], full[:, N_RIGID:]
-        for name, gain in (("structured", structured), ("full_state", whole)):
-            radius = float(np.abs(np.linalg.eigvals(A + B @ gain)).max())
-            found[name][coupling] = float(np.log(radius) / design.period)
-    return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -39,10 +39,6 @@ def _quantity(unit: str) -> BeforeValidator:
     return BeforeValidator(parse)
 
 
-def _listed(value: Any) -> Any:
-    return value if isinstance(value, list) else [value]
-
-
 Number = Annotated[float, _quantity("1")]
 Length = Annotated[float, _quantity("m")]
 Speed = Annotated[float, _quantity("m/s")]
@@ -59,6 +55,9 @@ Positive = Field(gt=0.0)
 
 class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+_Model = TypeVar("_Model", bound=_Table)
 
 
 class _Sizes(_Table):
@@ -244,7 +243,9 @@ class TighteningInputs(_Table):
 class AdjustableInputs(_Table):
     """The adjustable factor (paper section 4.3): one value, or one for each of the five rigid states."""
 
-    tau: Annotated[list[Number], BeforeValidator(_listed)] = Field(min_length=1)
+    tau: Annotated[list[Number], BeforeValidator(lambda tau: tau if isinstance(tau, list) else [tau])] = Field(
+        min_length=1
+    )
 
     @field_validator("tau")
     @classmethod
@@ -349,22 +350,19 @@ def parse_inputs(table: dict[str, Any]) -> DesignInputs:
     Raises:
         DesignError: A field that is missing, unknown or has a wrong value; the message names it.
     """
-    try:
-        return DesignInputs.model_validate(table)
-    except ValidationError as error:
-        raise DesignError(_first_line(error, table)) from error
+    return _validated(DesignInputs, table)
 
 
 def inputs_from_report(table: dict[str, Any]) -> DesignInputs:
-    """Return the design inputs that ``DesignInputs.model_dump`` wrote: plain numbers, SI.
+    """Return the design inputs that ``DesignInputs.model_dump`` wrote: plain numbers, SI; errors as above."""
+    return _validated(DesignInputs, table, "inputs: ", _SI)
 
-    Raises:
-        DesignError: A field that is missing, unknown or has a wrong value.
-    """
+
+def _validated(model: type[_Model], table: dict[str, Any], prefix: str = "", context: str = "") -> _Model:
     try:
-        return DesignInputs.model_validate(table, context=_SI)
+        return model.model_validate(table, context=context)
     except ValidationError as error:
-        raise DesignError(f"inputs: {_first_line(error, table)}") from error
+        raise DesignError(prefix + _first_line(error, table)) from error
 
 
 def read_inputs(path: Path) -> DesignInputs:
@@ -400,10 +398,7 @@ def with_tau(inputs: DesignInputs, tau: list[float]) -> DesignInputs:
     """
     if inputs.adjustable is None:
         raise DesignError(f"design {inputs.name!r}: tau = {tau} given, expected a design with an [adjustable] table")
-    try:
-        return inputs.model_copy(update={"adjustable": AdjustableInputs(tau=tau)})
-    except ValidationError as error:
-        raise DesignError(_first_line(error, {"tau": tau})) from error
+    return inputs.model_copy(update={"adjustable": _validated(AdjustableInputs, {"tau": tau})})
 
 
 def find_inputs(name: str) -> Path:

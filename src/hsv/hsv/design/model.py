@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,50 +12,25 @@ from hsv.base.errors import DesignError
 from hsv.control.notch_filter import NotchSection, continuous, series
 from hsv.control.optimisation import VERTEX_DIGITS, rounded
 from hsv.design.inputs import ModelInputs
-from hsv.model.lpv.accuracy import model_accuracy, off_grid
-from hsv.model.lpv.linearisation import (
-    Filter,
-    Linearised,
-    from_true_rate,
-    grid_polytope,
-    linearise,
-    linearise_extended,
-    sample,
-    zero_order_hold,
-)
+from hsv.model.lpv import polytopic
+from hsv.model.lpv.linearisation import Filter
 from hsv.model.lpv.polytope import Polytope
-from hsv.model.lpv.tensor_product import tensor_product
 from hsv.model.signals import N_STATES
 from hsv.model.vehicle import Vehicle
-
-_POINTS = 46
-"""Altitudes, and velocities, at which the model is compared with the vehicle."""
-
-_FREQUENCIES = np.logspace(-2.0, 2.0, 200)
-"""rad/s, those of the paper's figure 2; those above the Nyquist frequency are left out."""
 
 
 @dataclass(frozen=True)
 class DesignModel:
-    """The model with its weights as a design file keeps them, and the evidence for it (ready for JSON).
+    """The model as it was found, its vertices as a design file keeps them, and the evidence for it (ready for JSON).
 
-    ``polytope``: nine states, as it flies. ``whole``: as it was found; for the ECM with the filtered pitch rate in
-    place of the true one, and the filter's states after the nine.
+    ``polytope``: nine states, as it flies. ``whole``: the same; for the ECM with the filtered pitch rate in place of
+    the true one, and the filter's states after the nine.
     """
 
+    found: polytopic.PolytopicModel
     polytope: Polytope
     whole: Polytope
-    interpolation: str
-    altitude_samples: tuple[np.ndarray, np.ndarray]
-    velocity_samples: tuple[np.ndarray, np.ndarray]
     report: dict[str, Any]
-
-
-def linearised(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[NotchSection]) -> Linearised:
-    """Return the continuous-time model that ``inputs`` ask for, as a function of altitude (m) and velocity (m/s)."""
-    if inputs.system == "DM":
-        return partial(linearise, vehicle.decoupled)
-    return partial(linearise_extended, vehicle.decoupled, Filter(*series(continuous(notch))))
 
 
 def state_scale(inputs: ModelInputs, notch: Sequence[NotchSection]) -> np.ndarray:
@@ -84,56 +58,28 @@ def polytopic_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[Notch
     Raises:
         DesignError: Too few samples for the tolerance, no hull, or scales that are missing.
     """
-    model = linearised(inputs, vehicle, notch)
-    scales = state_scale(inputs, notch), inputs.tensor_product.input_scale.array()
-    singular_values: tuple[np.ndarray, ...] = ()
-    if inputs.representation == "grid":
-        altitudes = np.linspace(*vehicle.altitude_range, inputs.grid.altitude_vertices)
-        velocities = np.linspace(*vehicle.velocity_range, inputs.grid.velocity_vertices)
-        whole = grid_polytope(model, altitudes, velocities, inputs.period)
-        interpolation = "linear"
-        altitude_samples = (altitudes, np.eye(len(altitudes)))
-        velocity_samples = (velocities, np.eye(len(velocities)))
-    else:
-        options = inputs.tensor_product
-        altitudes = np.linspace(*vehicle.altitude_range, options.altitude_samples)
-        velocities = np.linspace(*vehicle.velocity_range, options.velocity_samples)
-        samples = sample(model, altitudes, velocities, inputs.period)
-        product = tensor_product(*samples, altitudes, velocities, *scales, options.tolerance, options.functions)
-        whole, interpolation = product.polytope, "cubic"
-        altitude_samples, velocity_samples = product.altitude_samples, product.velocity_samples
-        singular_values = product.singular_values
+    grid, options, extended = inputs.grid, inputs.tensor_product, inputs.system == "ECM"
+    scales = state_scale(inputs, notch), options.input_scale.array()
+    counts, tensor = (options.altitude_samples, options.velocity_samples), (options.tolerance, options.functions)
+    of_grid = inputs.representation == "grid"
+    if of_grid:
+        counts = grid.altitude_vertices, grid.velocity_vertices
+    filter_ = Filter(*series(continuous(notch))) if extended else None
+    found = polytopic.polytopic_model(vehicle, filter_, inputs.period, counts, scales, None if of_grid else tensor)
     report = {
         "representation": inputs.representation,
-        "vertices": [altitude_samples[1].shape[1], velocity_samples[1].shape[1]],
-        "singular_values": [values[:8].tolist() for values in singular_values],
+        "vertices": [weights.shape[1] for _, weights in found.samples],
+        "singular_values": [values[:8].tolist() for values in found.singular_values],
     }
-    polytope = whole if inputs.system == "DM" else _vehicle(whole, Filter(*series(continuous(notch))))
-    polytope = _rounded(polytope, scales[0][:N_STATES], scales[1])
-    if inputs.system == "DM":
-        whole = polytope
-    return DesignModel(polytope, whole, interpolation, altitude_samples, velocity_samples, report)
+    polytope = _rounded(found.polytope, scales[0][:N_STATES], scales[1])
+    return DesignModel(found, polytope, found.whole if extended else polytope, report)
 
 
 def design_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[NotchSection] = ()) -> DesignModel:
     """Return :func:`polytopic_model` with its accuracy between the samples in the report."""
     model = polytopic_model(inputs, vehicle, notch)
-    continuous_model = linearised(inputs, vehicle, notch)
-
-    def exact(altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
-        return zero_order_hold(*continuous_model(altitude, velocity), inputs.period)
-
-    accuracy = model_accuracy(
-        model.whole,
-        exact,
-        off_grid(*vehicle.altitude_range, _POINTS),
-        off_grid(*vehicle.velocity_range, _POINTS),
-        state_scale(inputs, notch),
-        inputs.tensor_product.input_scale.array(),
-        _FREQUENCIES[: np.searchsorted(_FREQUENCIES, 0.99 * np.pi / inputs.period)],
-        inputs.period,
-    )
-    return replace(model, report=model.report | {"accuracy": accuracy.report()})
+    scales = state_scale(inputs, notch), inputs.tensor_product.input_scale.array()
+    return replace(model, report=model.report | {"accuracy": model.found.accuracy(model.whole, scales).report()})
 
 
 def _rounded(polytope: Polytope, state_scale: np.ndarray, input_scale: np.ndarray) -> Polytope:
@@ -141,16 +87,3 @@ def _rounded(polytope: Polytope, state_scale: np.ndarray, input_scale: np.ndarra
     A = rounded(polytope.A, state_scale[:, None] / state_scale, VERTEX_DIGITS)
     B = rounded(polytope.B, state_scale[:, None] / input_scale, VERTEX_DIGITS)
     return Polytope(A, B, polytope.altitude, polytope.velocity)
-
-
-def _vehicle(whole: Polytope, notch: Filter) -> Polytope:
-    """Return the vehicle's part of the polytopic ECM: with the true pitch rate, no filter state acts on it."""
-    T = from_true_rate(notch)
-    A, B = np.linalg.solve(T, whole.A @ T), np.linalg.solve(T, whole.B)
-    vehicle = slice(N_STATES)
-    return Polytope(
-        np.ascontiguousarray(A[:, vehicle, vehicle]),
-        np.ascontiguousarray(B[:, vehicle]),
-        whole.altitude,
-        whole.velocity,
-    )

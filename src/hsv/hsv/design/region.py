@@ -14,20 +14,16 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
-from hsv.design.disturbance import ChannelModel, Extremes, Record, Signals
+from hsv.design.disturbance import ChannelModel, Extremes
 from hsv.design.inputs import DesignInputs
 from hsv.flight.assembly import assemble
 from hsv.flight.closed_loop import fly
-from hsv.flight.corners import Corner, corners, fraction, screening_corners
+from hsv.flight.corners import Corner, corners, fraction, region_parameters, screening_corners
 from hsv.flight.flight import Flight
 from hsv.flight.side_by_side import fly_perturbed
-from hsv.model.actuators import ACTUATOR_SETS
 from hsv.model.plant import FlightStatus
 
 Result = TypeVar("Result")
-
-_NO_STOP = 1e3
-"""Stop of an actuator beyond those of the vehicle, which hold as well."""
 
 
 def incomplete_share(inputs: DesignInputs) -> float:
@@ -36,43 +32,6 @@ def incomplete_share(inputs: DesignInputs) -> float:
     Of a diagonal tau it is the largest factor, which gives the largest set.
     """
     return float(max(inputs.adjustable.tau)) if inputs.adjustable else 1.0
-
-
-def region_parameters(inputs: DesignInputs, share: float = 1.0) -> dict[str, Any]:
-    """Return the flat flight parameters of the declared region, the design's own and the perturbation left out.
-
-    ``share``: of the lost elevator effectiveness.
-    """
-    region, start, target = inputs.disturbance, inputs.nominal.start, inputs.nominal.target
-    times, points, blend = [0.0], [target], {}
-    if region.ramp:
-        times, points = [region.ramp.start, region.ramp.end], [start, target]
-        blend = {"reference.blend": region.ramp.blend} if region.ramp.blend else {}
-    return {
-        "duration": region.duration,
-        **inputs.flown_vehicle.to_parameters(),
-        "vehicle.coupling": region.coupling,
-        "initial.altitude": start.altitude,
-        "initial.velocity": start.velocity,
-        "reference.times": times,
-        "reference.altitudes": [point.altitude for point in points],
-        "reference.velocities": [point.velocity for point in points],
-        **blend,
-        "fault.channels": ["elevator_deflection"],
-        "fault.types": ["loss_of_effectiveness"],
-        "fault.parameters": [f"effectiveness={1.0 - share * (1.0 - region.elevator_effectiveness)!r}"],
-        "fault.starts": [region.fault_start],
-        **actuator_parameters(inputs),
-    }
-
-
-def actuator_parameters(inputs: DesignInputs) -> dict[str, Any]:
-    """Return the flat parameters of the actuators that the design knows, the stops those of its vehicle."""
-    values: dict[str, Any] = {}
-    for name in inputs.actuators:
-        where = f"actuator.{ACTUATOR_SETS[name].channel}"
-        values |= {f"{where}.set": name, f"{where}.stop": [_NO_STOP]}
-    return values
 
 
 class Region:
@@ -84,7 +43,8 @@ class Region:
     def __init__(
         self, design: ControlDesign, inputs: DesignInputs, share: float, equipment: Mapping[str, Any] | None = None
     ) -> None:
-        self._parts = assemble({**design.to_parameters(), **region_parameters(inputs, share), **(equipment or {})})
+        declared = region_parameters(inputs.model_dump(), inputs.flown_vehicle, share)
+        self._parts = assemble({**design.to_parameters(), **declared, **(equipment or {})})
         self.share = share
         self._bounds = inputs.flown_vehicle.uncertainty
 
@@ -129,21 +89,6 @@ def _checked(corner: Corner, flight: Flight) -> Flight:
     return flight
 
 
-def record(flight: Flight) -> Record:
-    """Return the part of ``flight`` that disturbances are computed from."""
-    h = flight.history
-    return Record(
-        h.state,
-        h.deviation,
-        h.nominal_input,
-        h.command,
-        h.actuator,
-        flight.reference,
-        flight.reference_input,
-        flight.defect,
-    )
-
-
 @dataclass(frozen=True)
 class RegionResult:
     """Extremes measured over the region: of the channels (7), of f, w, Delta (9 each), of lag feedback (2).
@@ -165,9 +110,8 @@ def measure(
     """Fly ``over`` and return the extremes of every disturbance (paper eq. 17, eq. 19)."""
 
     def job(flight: Flight) -> list[np.ndarray]:
-        recorded = record(flight)
-        s: Signals = model.signals(recorded)
-        parts = (s.channels, s.remainder, s.fault, s.delta, model.errors(recorded)[1])
+        s = model.signals(flight)
+        parts = (s.channels, s.remainder, s.fault, s.delta, model.errors(flight)[1])
         return [extreme for part in parts for extreme in (part.min(axis=0), part.max(axis=0))]
 
     columns = [np.stack(column) for column in zip(*region.map(job, over, progress), strict=True)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -12,14 +12,12 @@ from hsv.base.processes import Progress
 from hsv.control.design import ControlDesign, PlanBounds
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership, widened
 from hsv.design.inputs import DesignInputs, InvariantSetInputs
-from hsv.design.region import Region, RegionResult, incomplete_share, measure, record
+from hsv.design.region import Region, RegionResult, incomplete_share, measure
 from hsv.design.sets.counter_example import counter_examples
-from hsv.design.sets.ellipsoid import ellipsoid
-from hsv.design.sets.invariant_set import InvariantSet
-from hsv.design.sets.problem import TubeProblem
+from hsv.design.sets.invariant_set import InvariantSet, ellipsoid
 from hsv.design.sets.star_norms import star_norms
 from hsv.design.tightening import TightenedInputs, check_plan, plan_bounds, tighten
-from hsv.design.tube_problem import channel_model, tube_problem
+from hsv.design.tube_problem import TubeProblem, tube_problem
 from hsv.flight.flight import Flight
 from hsv.flight.metrics import flight_metrics
 from hsv.flight.random_sequences import random_sequences
@@ -60,7 +58,7 @@ def invariant_set(
     progress("invariant set", 1, 1)
     if inputs.method == "ellipsoid":
         return found
-    return found.narrowed(star_norms(problem, found.centre, partial(progress, "star norms")))
+    return replace(found, star_norms=star_norms(problem, found.centre, partial(progress, "star norms")))
 
 
 @dataclass(frozen=True)
@@ -96,9 +94,8 @@ def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, pr
         DesignError: No invariant set, or one that fails when recomputed, or leaves nothing of an input.
     """
     seen, vehicle = region.fraction(), inputs.flown_vehicle
-    measured = measure(
-        region, channel_model(design, vehicle), seen, lambda done: progress("disturbances", done, len(seen))
-    )
+    model = ChannelModel(design, vehicle)
+    measured = measure(region, model, seen, lambda done: progress("disturbances", done, len(seen)))
     disturbance = measured.channels.structured(inputs.disturbance.inflation).scaled(inputs.disturbance.share)
     found = invariant_set(tube_problem(design, vehicle, disturbance), inputs.invariant_set, progress)
     certified = found.certify()
@@ -127,7 +124,7 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
     sampling = random_sequences(found.problem.system.A, columns, found.centre, found.Q, SEQUENCES, STEPS, SEED)
     progress("random sequences", 1, 1)
 
-    flown = flights_in_tube(channel_model(design, inputs.flown_vehicle), region, found, progress)
+    flown = flights_in_tube(ChannelModel(design, inputs.flown_vehicle), region, found, progress)
     lowest, highest = np.min([f.lowest for f in flown], axis=0), np.max([f.highest for f in flown], axis=0)
     plan = check_plan(bounds, lowest[:2], highest[:2])
     allowed = plan_bounds(bounds, lowest, highest)
@@ -144,11 +141,8 @@ def flights_in_tube(
 ) -> list[FlightEvidence]:
     """Fly all corners of ``region`` and return the evidence of each flight; ``model`` computes its disturbances."""
     everyone = region.corners()
-    return region.map(
-        lambda flight: flight_evidence(flight, found, found.problem.disturbance, model),
-        everyone,
-        lambda done: progress("flights in the tube", done, len(everyone)),
-    )
+    tell = partial(progress, "flights in the tube")
+    return region.map(lambda flight: flight_evidence(flight, found, model), everyone, lambda n: tell(n, len(everyone)))
 
 
 @dataclass(frozen=True)
@@ -166,19 +160,15 @@ class FlightEvidence:
     metrics: np.ndarray
 
 
-def flight_evidence(
-    flight: Flight, found: InvariantSet, disturbance: DisturbanceSet, model: ChannelModel
-) -> FlightEvidence:
+def flight_evidence(flight: Flight, found: InvariantSet, model: ChannelModel) -> FlightEvidence:
     """Return the evidence of ``flight`` for the tube."""
-    h, recorded = flight.history, record(flight)
-    errors, _ = model.errors(recorded)
-    plan = recorded.plan
-    pitch_acceleration = np.diff(h.deviation[:, PITCH_RATE]) / flight.period
+    (errors, _), plan = model.errors(flight), flight.plan
+    pitch_acceleration = np.diff(flight.history.deviation[:, PITCH_RATE]) / flight.period
     metrics = flight_metrics(flight.data())
     return FlightEvidence(
         level=float(found.level(errors).max()),
         ratios=np.max(np.abs(errors - found.centre), axis=0) / found.half_width,
-        membership=disturbance.membership(model.signals(recorded).channels),
+        membership=found.problem.disturbance.membership(model.signals(flight).channels),
         lowest=np.append(plan.min(axis=0), pitch_acceleration.min()),
         highest=np.append(plan.max(axis=0), pitch_acceleration.max()),
         metrics=np.array([abs(metrics[name]) for name in _SHOWN]),
@@ -191,12 +181,7 @@ def _disturbance_report(measured: RegionResult, disturbance: DisturbanceSet) -> 
         "statement": "bounds of the declared region only; every other flight is to be checked for membership",
         "flights": measured.flights,
         "channels": disturbance.report(),
-        "measured": {
-            "lower": measured.channels.lower.tolist(),
-            "upper": measured.channels.upper.tolist(),
-            "lower_flight": measured.channels.lower_flight.tolist(),
-            "upper_flight": measured.channels.upper_flight.tolist(),
-        },
+        "measured": {name: extreme.tolist() for name, extreme in vars(measured.channels).items()},
         "boxes": {name: {"lower": e.lower.tolist(), "upper": e.upper.tolist()} for name, e in extremes.items()},
     }
 

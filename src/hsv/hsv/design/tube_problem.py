@@ -2,35 +2,45 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from hsv.control.design import ControlDesign
-from hsv.control.notch_filter import discretise
-from hsv.design.disturbance import ChannelModel, DisturbanceSet, acceleration_channels
-from hsv.design.error_system import error_system, union
-from hsv.design.sets.problem import TubeProblem
-from hsv.model.actuators import ACTUATOR_SETS, ActuatorSet
-from hsv.model.lpv.actuated import sampled_actuators
+from hsv.design.disturbance import ChannelModel, DisturbanceSet
+from hsv.design.error_system import ErrorSystem, error_system, union
 from hsv.model.signals import N_RIGID
 from hsv.model.vehicle import Vehicle
 
 
-def channel_model(design: ControlDesign, vehicle: Vehicle) -> ChannelModel:
-    """Return how disturbances are measured against the model of ``design``, which is for ``vehicle``."""
-    return ChannelModel(
-        design.polytope,
-        discretise(design.notch, design.period),
-        acceleration_channels(vehicle, design.period),
-        design.adjusted_gain(design.tau)[:, :N_RIGID],
-        vehicle,
-        design.filtered,
-        sampled_actuators(known_actuators(design), design.period) if design.actuators else None,
-    )
+@dataclass(frozen=True)
+class TubeProblem:
+    """Error system and disturbances for which a set is sought.
 
+    Vertices may change arbitrarily from step to step, and so may the disturbances within their bounds.
+    """
 
-def known_actuators(design: ControlDesign) -> tuple[ActuatorSet, ...]:
-    """Return the actuators that ``design`` knows."""
-    return tuple(ACTUATOR_SETS[name] for name in design.actuators)
+    system: ErrorSystem
+    disturbance: DisturbanceSet
+
+    def centre(self) -> np.ndarray:
+        """Return the equilibrium of the mean vertex under the mid-points of the disturbances (n)."""
+        A, G = self.system.A.mean(axis=0), self.system.G.mean(axis=0)
+        return np.linalg.solve(np.eye(len(A)) - A, G @ self.disturbance.centre)
+
+    def columns(self, centre: np.ndarray) -> np.ndarray:
+        """Return (r, n, d + 1) the effect of the disturbances at half their width on e - ``centre``.
+
+        The last column is what each vertex moves the centre by under the mid-points: no choice of centre makes it
+        vanish at all vertices.
+        """
+        A, G = self.system.A, self.system.G
+        drift = A @ centre + G @ self.disturbance.centre - centre
+        return np.concatenate((G * self.disturbance.half_width, drift[:, :, None]), axis=2)
+
+    def output_rows(self) -> np.ndarray:
+        """Return the rows (7, n) of the outputs that are bounded: the rigid states, and F of the two inputs."""
+        return np.vstack((np.eye(N_RIGID, len(self.system.names)), self.system.F))
 
 
 def bounding_factors(design: ControlDesign) -> list[np.ndarray]:
@@ -45,7 +55,7 @@ def bounding_factors(design: ControlDesign) -> list[np.ndarray]:
 
 def tube_problem(design: ControlDesign, vehicle: Vehicle, disturbance: DisturbanceSet) -> TubeProblem:
     """Return the error system of ``design``, for all its factors, under ``disturbance``."""
-    model, polytope = channel_model(design, vehicle), design.polytope
+    model, polytope = ChannelModel(design, vehicle), design.polytope
     gain = design.feedback_gain[:, :N_RIGID]
     systems = [
         error_system(
@@ -54,7 +64,7 @@ def tube_problem(design: ControlDesign, vehicle: Vehicle, disturbance: Disturban
             gain * factor,
             model.notch,
             model.columns,
-            known_actuators(design),
+            design.actuator_sets,
             design.period,
         )
         for factor in bounding_factors(design)

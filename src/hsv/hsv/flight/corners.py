@@ -1,18 +1,25 @@
-"""Corners of the uncertain parameters' bounds: relative changes of vehicle parameters, one vehicle each."""
+"""The region that a design declares: its flight, and the corners of the uncertain parameters' bounds."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from scipy.linalg import hadamard
+
+from hsv.model.actuators import ACTUATOR_SETS
+from hsv.model.vehicle import Vehicle
 
 Corner = Mapping[str, float]
 """Relative changes of a vehicle by name of the parameter."""
 
 _FRACTIONED = 10
 """Uncertain parameters from which on a quarter of the corners is enough to measure disturbances."""
+
+_NO_STOP = 1e3
+"""Stop of an actuator beyond those of the vehicle, which hold as well."""
 
 
 def corners(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, float]]:
@@ -50,3 +57,36 @@ def screening_corners(bounds: Mapping[str, float], share: float = 1.0) -> list[C
     runs = hadamard(16)[:, 1 : 1 + len(bounds)]
     rows = share * np.vstack((runs, -runs)) * np.array(list(bounds.values()))
     return [{}, *(dict(zip(bounds, map(float, row), strict=True)) for row in rows)]
+
+
+def region_parameters(inputs: Mapping[str, Any], vehicle: Vehicle, share: float = 1.0) -> dict[str, Any]:
+    """Return the flat flight parameters of the region that the inputs of a design declare, the design's own left out.
+
+    Args:
+        inputs: The inputs as a certificate has them, SI.
+        vehicle: Vehicle of the design, nominal.
+        share: Share of the lost elevator effectiveness (paper eq. 47).
+    """
+    declared, ramp = inputs["disturbance"], inputs["disturbance"].get("ramp")
+    start, target = inputs["nominal"]["start"], inputs["nominal"]["target"]
+    points = [start, target] if ramp else [target]
+    values: dict[str, Any] = {
+        "duration": declared["duration"],
+        **vehicle.to_parameters(),
+        "vehicle.coupling": declared["coupling"],
+        "initial.altitude": start["altitude"],
+        "initial.velocity": start["velocity"],
+        "reference.times": [ramp["start"], ramp["end"]] if ramp else [0.0],
+        "reference.altitudes": [point["altitude"] for point in points],
+        "reference.velocities": [point["velocity"] for point in points],
+        "fault.channels": ["elevator_deflection"],
+        "fault.types": ["loss_of_effectiveness"],
+        "fault.parameters": [f"effectiveness={1.0 - share * (1.0 - declared['elevator_effectiveness'])!r}"],
+        "fault.starts": [declared["fault_start"]],
+    }
+    if ramp and ramp.get("blend"):
+        values["reference.blend"] = ramp["blend"]
+    for name in filter(None, (inputs.get("actuator") or {}).values()):
+        channel = f"actuator.{ACTUATOR_SETS[name].channel}"
+        values |= {f"{channel}.set": name, f"{channel}.stop": [_NO_STOP]}
+    return values

@@ -61,6 +61,11 @@ class Flight:
         return self.trajectory.along(len(self.history.signals)).defect
 
     @property
+    def plan(self) -> np.ndarray:
+        """u_n + u_r (n + 1, 2)."""
+        return np.asarray(self.history.nominal_input + self.reference_input)
+
+    @property
     def fingerprint(self) -> str:
         """The digest of all bits of the history, see :mod:`hsv.flight.fingerprint`."""
         return fingerprint(self.history.signals)

@@ -33,13 +33,12 @@ from hsv.control.verification import (
 )
 from hsv.flight.assembly import assemble, assemble_flight
 from hsv.flight.closed_loop import Components, fly
-from hsv.flight.corners import Corner, corners, fraction
+from hsv.flight.corners import Corner, corners, fraction, region_parameters
 from hsv.flight.flight import Flight
 from hsv.flight.random_sequences import random_sequences
 from hsv.flight.responses import along_filter, lag_response
 from hsv.flight.scenario import Scenario
 from hsv.flight.side_by_side import fly_perturbed
-from hsv.model.actuators import ACTUATOR_SETS
 from hsv.model.lpv.actuated import respond, sampled_actuators
 from hsv.model.lpv.polytope import evaluate
 from hsv.model.plant import FlightStatus
@@ -49,36 +48,11 @@ from hsv.model.trim import trim
 _FLIGHTS, _SEED = 48, 7
 """Number and seed of random corners that are flown in addition to those that determine a bound."""
 
-_NO_STOP = 1e3
-"""Stop of an actuator that leaves those of the vehicle, which hold as well."""
-
 
 def region(subject: Subject, design: ControlDesign, share: float) -> Components:
     """Return the nominal flight of the declared region: the step of the design with ``share`` of the fault, (47)."""
-    inputs = subject.certificate["inputs"]
-    declared, ramp = inputs["disturbance"], inputs["disturbance"].get("ramp")
-    start, target = inputs["nominal"]["start"], inputs["nominal"]["target"]
-    points = [start, target] if ramp else [target]
-    values: dict[str, Any] = {
-        "duration": declared["duration"],
-        **subject.vehicle.to_parameters(),
-        "vehicle.coupling": declared["coupling"],
-        "initial.altitude": start["altitude"],
-        "initial.velocity": start["velocity"],
-        "reference.times": [ramp["start"], ramp["end"]] if ramp else [0.0],
-        "reference.altitudes": [point["altitude"] for point in points],
-        "reference.velocities": [point["velocity"] for point in points],
-        "fault.channels": ["elevator_deflection"],
-        "fault.types": ["loss_of_effectiveness"],
-        "fault.parameters": [f"effectiveness={1.0 - share * (1.0 - declared['elevator_effectiveness'])!r}"],
-        "fault.starts": [declared["fault_start"]],
-    }
-    if ramp and ramp.get("blend"):
-        values["reference.blend"] = ramp["blend"]
-    for name in design.actuators:
-        channel = f"actuator.{ACTUATOR_SETS[name].channel}"
-        values |= {f"{channel}.set": name, f"{channel}.stop": [_NO_STOP]}
-    return assemble({**design.to_parameters(), **values})
+    declared = region_parameters(subject.certificate["inputs"], subject.vehicle, share)
+    return assemble({**design.to_parameters(), **declared})
 
 
 class Disturbances(NamedTuple):
@@ -100,12 +74,12 @@ def disturbances(subject: Subject, flight: Flight) -> Disturbances:
     Behind actuators u and the lost elevator are mean positions over a period.
     """
     design, vehicle, h = subject.design, subject.vehicle, flight.history
-    notch, plan = discretise(design.notch, design.period), h.nominal_input + flight.reference_input
+    notch, plan = discretise(design.notch, design.period), flight.plan
     lost = np.zeros_like(h.command)
     lost[:, 1] = (h.actuator - h.command)[:, 1]
     acting, through = h.command, lost
     if design.actuators:
-        actuators = sampled_actuators([ACTUATOR_SETS[name] for name in design.actuators], design.period)
+        actuators = sampled_actuators(design.actuator_sets, design.period)
         at_rest = trim(vehicle.decoupled, h.state[0, 0], h.state[0, 1]).input
         acting, through = at_rest + respond(actuators, h.command - at_rest)[1], respond(actuators, lost)[1]
     polytope = design.polytope
@@ -165,7 +139,7 @@ def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
     ratios = np.where(found.channels == 0.0, 0.0, np.inf)
     np.divide(found.channels, bounds, out=ratios, where=bounds != 0.0)
     step, channel = np.unravel_index(int(np.argmax(ratios)), ratios.shape)
-    plan = h.nominal_input + flight.reference_input
+    plan = flight.plan
     turning = np.diff(h.deviation[:, PITCH_RATE]) / flight.period
     return Evidence(
         float(level(tube.Q, found.error - tube.c).max()),

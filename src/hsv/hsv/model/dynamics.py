@@ -64,6 +64,10 @@ POSITIVE = frozenset(
 """Coefficients that are above zero in any vehicle."""
 
 
+_COMPLEX_STEP = 1e-40
+"""The complex step of hsv_transitions."""
+
+
 class VehicleParameters(NamedTuple):
     """All constants of the equations of motion and the limits of inputs and angles, SI (kg, m, s, N, rad).
 
@@ -248,6 +252,24 @@ def advance(
         substeps,
     )
     return new
+
+
+def transitions(
+    state: np.ndarray, inputs: np.ndarray, period: np.ndarray, substeps: np.ndarray, p: VehicleParameters
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the states (N, 9) after N periods from ``state`` (N, 9), and their derivatives (N, 9, 12).
+
+    The derivatives are by state, input and length of the period (s), by the complex step: exact.
+    """
+    end, changes = np.empty((len(period), N_STATES)), np.empty((len(period), N_STATES, N_STATES + N_INPUTS + 1))
+    lib.hsv_transitions(
+        len(period),
+        *(doubles(vector(each)) for each in (state, inputs, period)),
+        ffi.from_buffer("int64_t[]", np.ascontiguousarray(substeps, np.int64)),
+        vehicle_struct(p).pointer,
+        *map(doubles, (end, changes)),
+    )
+    return end, changes / _COMPLEX_STEP
 
 
 def _conditions(conditions: np.ndarray | None) -> Any:

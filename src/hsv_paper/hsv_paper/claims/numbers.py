@@ -20,10 +20,9 @@ from hsv.control.nominal_law import FamilyLaw
 from hsv.control.nominal_trajectory import nominal_data
 from hsv.control.notch_filter import NotchSection, discretise, flown_sections, notch_response
 from hsv.control.optimisation import spectral_radii
-from hsv.design.disturbance import CHANNELS, DisturbanceSet
-from hsv.design.region import record
+from hsv.design.disturbance import CHANNELS, ChannelModel, DisturbanceSet
 from hsv.design.tube import invariant_set
-from hsv.design.tube_problem import channel_model, tube_problem
+from hsv.design.tube_problem import tube_problem
 from hsv.flight.assembly import assemble, flight_parameters
 from hsv.flight.corners import Corner, fraction
 from hsv.flight.flight import Flight
@@ -416,12 +415,12 @@ def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.
     """
     values = flight_parameters(load_scenario(scenario))
     sections = flown_sections(values) if values["notch.enabled"] else ()
-    model = channel_model(
+    model = ChannelModel(
         replace(ControlDesign.from_parameters(values), notch=sections), Vehicle.from_parameters(values)
     )
 
     def largest(corner: Corner, flight: Flight) -> np.ndarray:
-        return np.asarray(np.abs(model.signals(record(flight)).channels).max(axis=0))
+        return np.asarray(np.abs(model.signals(flight).channels).max(axis=0))
 
     rows = np.array(fly_perturbed(assemble(values), over, largest))
     return {channel.name: column for channel, column in zip(CHANNELS, rows.T, strict=True)}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,6 +11,7 @@ from matplotlib.figure import Figure
 from hsv.base.units import to_paper
 from hsv.flight.metrics import METRICS, FlightData, flight_metrics
 from hsv.model.vehicle import load_vehicle
+from hsv_paper.flights import Flights
 
 _LIMITS = load_vehicle().decoupled
 
@@ -36,13 +36,6 @@ Made by `hsv-paper figures --only {number} --out docs/figures`, including all nu
 """
 
 
-class FlightSource(Protocol):
-    """Gives flights by the names of their scenarios."""
-
-    def __getitem__(self, scenario: str, /) -> FlightData:
-        """Return the flight of a shipped scenario."""
-
-
 @dataclass(frozen=True)
 class Drawing:
     """A drawn figure and three remarks on it, with the numbers of this drawing."""
@@ -59,7 +52,7 @@ class PaperFigure:
 
     number: int
     caption: str
-    draw: Callable[[FlightSource], Drawing]
+    draw: Callable[[Flights], Drawing]
     scenarios: tuple[str, ...] = ()
 
     @property
@@ -75,31 +68,24 @@ class PaperFigure:
         return text + (f"\nThe flights can be repeated with {runs}.\n" if runs else "")
 
 
-def paper_figure(
-    number: int, caption: str, scenarios: tuple[str, ...] = ()
-) -> Callable[[Callable[[FlightSource], Drawing]], PaperFigure]:
-    """Return a decorator that makes a figure of the function that draws it."""
-    return lambda draw: PaperFigure(number, caption, draw, scenarios)
-
-
-def measured(flights: FlightSource, scenario: str, metric: str) -> float:
+def measured(flights: Flights, scenario: str, metric: str) -> float:
     """Return a metric of a flight in the paper's unit."""
     return to_paper(flight_metrics(flights[scenario])[metric], METRICS[metric].unit)[0]
 
 
-def input_extremes(flights: FlightSource, scenarios: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+def input_extremes(flights: Flights, scenarios: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
     """Return the smallest and the largest commands (2) of several flights: fuel ratio, elevator in deg."""
     commands = np.concatenate([flights[scenario].command for scenario in scenarios]) * [1.0, to_paper(1.0, "rad")[0]]
     return commands.min(axis=0), commands.max(axis=0)
 
 
-def input_ranges(flights: FlightSource, scenarios: Sequence[str]) -> str:
+def input_ranges(flights: Flights, scenarios: Sequence[str]) -> str:
     """Return the ranges of both commands over several flights, in words."""
     least, largest = input_extremes(flights, scenarios)
     return f"{least[0]:.2f} to {largest[0]:.2f} and {least[1]:.1f} deg to {largest[1]:.1f} deg"
 
 
-def limited(flights: FlightSource, scenarios: Sequence[str]) -> str:
+def limited(flights: Flights, scenarios: Sequence[str]) -> str:
     """Return in how many steps of several flights a command was saturated, in words."""
     steps = sum(int(np.any(flights[scenario].saturated, axis=1).sum()) for scenario in scenarios)
     return f"saturated in {steps or 'no'} step{'s' if steps > 1 else ''} of the {len(scenarios)} flights"

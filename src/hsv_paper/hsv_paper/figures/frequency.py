@@ -21,7 +21,8 @@ from hsv_paper.designs import (
     extended_model,
     inputs_of,
 )
-from hsv_paper.figures.figure import Drawing, FlightSource, paper_figure
+from hsv_paper.figures.figure import Drawing
+from hsv_paper.flights import Flights
 from hsv_paper.linear_loop import ELEVATOR
 from hsv_paper.modes import PeakFall, elastic_modes, linearised, open_loop_modes, peak_falls, pitch_rate_response
 from hsv_paper.plots import (
@@ -46,12 +47,7 @@ _BETWEEN = f"{BETWEEN[0] / FOOT:.0f} ft and {BETWEEN[1] / FOOT:.0f} ft/s"
 _POLYTOPIC = {"color": BLUE, "linestyle": ":", "linewidth": 2.0}
 
 
-@paper_figure(
-    2,
-    "Bode diagram comparison of polytopic LPV and DM. (a) Amplitude frequency characteristic. (b) Phase frequency "
-    "characteristic.",
-)
-def figure_02(flights: FlightSource) -> Drawing:
+def figure_02(flights: Flights) -> Drawing:
     """Draw elevator to pitch rate of the polytopic model and of the decoupled model, between the samples."""
     flown, model = design("baseline"), certificate("baseline")["model"]
     frequencies = np.logspace(-2.0, 2.0, 600)
@@ -81,12 +77,7 @@ def figure_02(flights: FlightSource) -> Drawing:
     )
 
 
-@paper_figure(
-    3,
-    "Bode diagram of notch filter's effect on flexible hypersonic vehicle. (a) Effect of omega_p when epsilon_p = "
-    "0.5. (b) Effect of epsilon_p when omega_p = 15.",
-)
-def figure_03(flights: FlightSource) -> Drawing:
+def figure_03(flights: Flights) -> Drawing:
     """Draw elevator to filtered pitch rate of the coupled model, one parameter of the poles changed at a time."""
     section, frequencies = design("baseline").notch[0], np.logspace(0.0, 2.0, 1500)
     plain = pitch_rate_response("paper_like", frequencies)
@@ -123,8 +114,7 @@ def figure_03(flights: FlightSource) -> Drawing:
     )
 
 
-@paper_figure(4, "Open-loop pole distribution.")
-def figure_04(flights: FlightSource) -> Drawing:
+def figure_04(flights: Flights) -> Drawing:
     """Draw all poles of the coupled model, and those near the origin enlarged, for both sets of coupling."""
     figure = new_figure(4.2)
     whole, near = figure.subplots(1, 2, width_ratios=(1.5, 1))
@@ -182,8 +172,7 @@ def figure_04(flights: FlightSource) -> Drawing:
     )
 
 
-@paper_figure(5, "Bode diagram of Notch filter on flexible modes.")
-def figure_05(flights: FlightSource) -> Drawing:
+def figure_05(flights: Flights) -> Drawing:
     """Draw elevator to pitch rate about both modes, with and without the design's filter, and its gain alone."""
     section, frequencies = design("baseline").notch, np.logspace(0.7, 1.7, 3000)
     plain, filter_ = pitch_rate_response("paper_like", frequencies), notch_response(section, frequencies)
@@ -215,12 +204,7 @@ def figure_05(flights: FlightSource) -> Drawing:
     )
 
 
-@paper_figure(
-    8,
-    "Bode diagram comparison of codesigned polytopic LPV model and ECM. (a) Amplitude frequency characteristics. (b) "
-    "Phase frequency characteristics.",
-)
-def figure_08(flights: FlightSource) -> Drawing:
+def figure_08(flights: Flights) -> Drawing:
     """Draw elevator to filtered pitch rate of the co-designed model and of the ECM without and with its coupling."""
     inputs, model, frequencies = inputs_of("adjustable"), certificate("adjustable")["model"], CODESIGN_FREQUENCIES
     figure, magnitude, phase = bode_panels()

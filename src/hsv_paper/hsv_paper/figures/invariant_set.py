@@ -14,7 +14,8 @@ from hsv.control.design import TubeSet
 from hsv.flight.metrics import FlightData
 from hsv.model.signals import N_RIGID
 from hsv_paper.designs import design
-from hsv_paper.figures.figure import Drawing, FlightSource, paper_figure
+from hsv_paper.figures.figure import Drawing
+from hsv_paper.flights import Flights
 from hsv_paper.plots import BLUE, GREEN, GREY, letter, new_figure
 
 WITH, WITHOUT = "case1_uncertain", "case1_uncertain_no_notch"
@@ -65,8 +66,7 @@ def rigid_level(tube: TubeSet, error: np.ndarray) -> np.ndarray:
     return np.asarray(np.einsum("ki,ij,kj->k", offset, shape, offset))
 
 
-@paper_figure(6, "The state of system in the mRPI set at the same time.", (WITH, WITHOUT))
-def figure_06(flights: FlightSource) -> Drawing:
+def figure_06(flights: Flights) -> Drawing:
     """Draw three projections of the set, whole and enlarged about the states; below, levels over time."""
     tube = design("baseline").tube
     assert tube is not None

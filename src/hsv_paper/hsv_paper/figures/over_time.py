@@ -20,15 +20,14 @@ from hsv.model.vehicle import load_vehicle
 from hsv_paper.figures.figure import (
     LIMITS,
     Drawing,
-    FlightSource,
     gain_switches,
     in_words,
     input_extremes,
     input_ranges,
     limited,
     measured,
-    paper_figure,
 )
+from hsv_paper.flights import Flights
 from hsv_paper.modes import elastic_modes
 from hsv_paper.plots import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
 
@@ -227,7 +226,7 @@ def _panel(axis: Axes, panel: Panel, curves: Sequence[Curve], column: _Column, r
     return bool(near)
 
 
-def _case_1(flights: FlightSource, *, single: bool = False, vibrating: bool = False) -> list[Curve]:
+def _case_1(flights: Flights, *, single: bool = False, vibrating: bool = False) -> list[Curve]:
     """Return the controllers of Figures 9 to 12; the one that rings most is drawn first and does not hide the others.
 
     Args:
@@ -244,7 +243,7 @@ def _case_1(flights: FlightSource, *, single: bool = False, vibrating: bool = Fa
     return _curves(flights, (without, tube, *robust) if vibrating else (without, *robust, tube))
 
 
-def _case_2(flights: FlightSource) -> list[Curve]:
+def _case_2(flights: Flights) -> list[Curve]:
     """Return the three controllers of Figures 14 to 17, the paper's on top."""
     shown = (
         ("baseline", ORANGE, BASELINE, 2.0),
@@ -254,7 +253,7 @@ def _case_2(flights: FlightSource) -> list[Curve]:
     return _curves(flights, shown)
 
 
-def _curves(flights: FlightSource, shown: Sequence[tuple[str, str, Scenarios, float]]) -> list[Curve]:
+def _curves(flights: Flights, shown: Sequence[tuple[str, str, Scenarios, float]]) -> list[Curve]:
     return [Curve(label, color, flights[names[0]], flights[names[1]], width) for label, color, names, width in shown]
 
 
@@ -277,7 +276,7 @@ def _conditions_2(nominal: str = "thin lines show") -> str:
     )
 
 
-def _switches(flights: FlightSource) -> str:
+def _switches(flights: Flights) -> str:
     """Return in words at which times (s) the tubes' nominal law switches to the next gain."""
     flight = flights[NOTCH[0]]
     return f"at {in_words(flight.time[gain_switches(flight)])} s"
@@ -288,13 +287,12 @@ def _during(flight: FlightData, start: float, end: float) -> np.ndarray:
     return flight.state[(flight.time >= start) & (flight.time <= end)]
 
 
-def _of_case_2(flights: FlightSource, metric: str) -> list[float]:
+def _of_case_2(flights: Flights, metric: str) -> list[float]:
     """Return a metric of the three controllers of Case 2 with uncertain parameters, in the paper's unit."""
     return [measured(flights, names[0], metric) for names in (ADJUSTABLE, WHOLE, BASELINE)]
 
 
-@paper_figure(9, "Trajectory in Case 1. (a) Altitude. (b) Velocity.", (*CASE_1, *RMPC_SINGLE))
-def figure_09(flights: FlightSource) -> Drawing:
+def figure_09(flights: Flights) -> Drawing:
     """Draw altitude and velocity; the altitude with the single gain leaves its panel."""
     top = 86480.0
     panels = replace(ALTITUDE, shown=(85450.0, top)), replace(VELOCITY, shown=(7880.0, 8190.0))
@@ -321,8 +319,7 @@ def figure_09(flights: FlightSource) -> Drawing:
     )
 
 
-@paper_figure(10, "States in Case 1. (a) Attack angle. (b) Pitch angle. (c) Pitch rate.", CASE_1)
-def figure_10(flights: FlightSource) -> Drawing:
+def figure_10(flights: Flights) -> Drawing:
     """Draw angle of attack, pitch angle and pitch rate."""
     figure = histories(ATTITUDE, _case_1(flights), zoom=Zoom(95.0, 125.0), height=2.1)
     tube, without, robust = (
@@ -344,14 +341,7 @@ def figure_10(flights: FlightSource) -> Drawing:
     )
 
 
-@paper_figure(
-    11,
-    "The generalized flexible coordinates of real system in Case 1. (a) The first-order generalized flexible "
-    "coordinate. (b) Derivative of the first-order generalized flexible coordinate. (c) The second-order generalized "
-    "flexible coordinate. (d) Derivative of the second-order generalized flexible coordinate.",
-    CASE_1,
-)
-def figure_11(flights: FlightSource) -> Drawing:
+def figure_11(flights: Flights) -> Drawing:
     """Draw both elastic coordinates with their derivatives."""
     curves = _case_1(flights, vibrating=True)
     figure = histories(ELASTIC, curves, zoom=Zoom(99.0, 107.0), nominal_apart=True, height=1.9)
@@ -388,8 +378,7 @@ def figure_11(flights: FlightSource) -> Drawing:
     )
 
 
-@paper_figure(12, "Control inputs in Case 1. (a) Fuel-to-air ratio. (b) Elevator deflection.", CASE_1)
-def figure_12(flights: FlightSource) -> Drawing:
+def figure_12(flights: Flights) -> Drawing:
     """Draw both inputs as commanded."""
     figure = histories(INPUTS, _case_1(flights), zoom=Zoom(98.0, 118.0), height=2.3)
     _, largest = input_extremes(flights, RMPC)
@@ -413,14 +402,7 @@ def figure_12(flights: FlightSource) -> Drawing:
     )
 
 
-@paper_figure(
-    13,
-    "Derivative of the generalized flexible coordinates of nominal system in the case of notch filter for the "
-    "second-order flexible mode. (a) Derivative of the first-order generalized flexible coordinate. (b) Derivative of "
-    "the second-order generalized flexible coordinate.",
-    (SECOND_MODE, NO_FILTER),
-)
-def figure_13(flights: FlightSource) -> Drawing:
+def figure_13(flights: Flights) -> Drawing:
     """Draw both elastic rates, with the notch at the second mode and without a notch."""
     curves = [
         Curve("Tube-MPC without notch", GREEN, flights[NO_FILTER]),
@@ -446,8 +428,7 @@ def figure_13(flights: FlightSource) -> Drawing:
     )
 
 
-@paper_figure(14, "Trajectory in case 2. (a) altitude. (b) Velocity.", CASE_2)
-def figure_14(flights: FlightSource) -> Drawing:
+def figure_14(flights: Flights) -> Drawing:
     """Draw altitude and velocity along the ramp."""
     closer = Zoom(78.0, 130.0, "end of the ramp, and the fault")
     figure = histories((ALTITUDE, VELOCITY), _case_2(flights), zoom=closer, reference=True, height=2.6)
@@ -465,8 +446,7 @@ def figure_14(flights: FlightSource) -> Drawing:
     )
 
 
-@paper_figure(15, "States in Case 2. (a) Attack angle. (b) Pitch angle. (c) Pitch rate.", CASE_2)
-def figure_15(flights: FlightSource) -> Drawing:
+def figure_15(flights: Flights) -> Drawing:
     """Draw angle of attack, pitch angle and pitch rate."""
     figure = histories(ATTITUDE, _case_2(flights), zoom=Zoom(95.0, 125.0), height=2.1)
     off = _of_case_2(flights, "post_fault_attitude_deviation")
@@ -492,14 +472,7 @@ def figure_15(flights: FlightSource) -> Drawing:
     )
 
 
-@paper_figure(
-    16,
-    "The generalized flexible coordinates of real system in Case 2. (a) The first-order generalized flexible "
-    "coordinate. (b) Derivative of the first-order generalized flexible coordinate. (c) The second-order generalized "
-    "flexible coordinate. (d) Derivative of the second-order generalized flexible coordinate.",
-    CASE_2,
-)
-def figure_16(flights: FlightSource) -> Drawing:
+def figure_16(flights: Flights) -> Drawing:
     """Draw both elastic coordinates with their derivatives."""
     figure = histories(ELASTIC, _case_2(flights), zoom=Zoom(99.0, 107.0), nominal_apart=True, height=1.9)
     decay = _of_case_2(flights, "elastic_decay_time")
@@ -515,8 +488,7 @@ def figure_16(flights: FlightSource) -> Drawing:
     )
 
 
-@paper_figure(17, "Control inputs in Case 2. (a) Fuel-to-air ratio. (b) Elevator deflection.", CASE_2)
-def figure_17(flights: FlightSource) -> Drawing:
+def figure_17(flights: Flights) -> Drawing:
     """Draw both inputs as commanded."""
     figure = histories(INPUTS, _case_2(flights), zoom=Zoom(98.0, 118.0), height=2.3)
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.model.dynamics import VehicleParameters, advance
+from hsv.model.dynamics import VehicleParameters, advance, transitions
 from hsv.model.faults.injector import FaultInjector
 from hsv.model.faults.schedule import ScheduledFault
 from hsv.model.faults.table import Fault
 from hsv.model.plant import FlightStatus, Plant
 from hsv.model.signals import N_INPUTS, N_STATES, NEVER
 from hsv.model.trim import Trim, trim
-from hsv_paper.limits.optimum import INPUT_SCALE, STATE_SCALE, Point, Problem, transitions
+from hsv_paper.limits.optimum import INPUT_SCALE, STATE_SCALE, Point, Problem
 
 _LAST_WEIGHT = 100.0
 """Weight of a deviation at the end of the flight, against those before."""

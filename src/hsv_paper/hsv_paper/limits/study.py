@@ -13,16 +13,14 @@ from matplotlib.axes import Axes
 from hsv.base.units import to_paper
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
-from hsv.flight.comparison import settling_times
 from hsv.flight.corners import Corner, corners
 from hsv.flight.governed import governed
-from hsv.flight.metrics import FlightData
+from hsv.flight.metrics import SETTLING_BAND, FlightData
 from hsv.flight.scenario import load_scenario, parse_scenario
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.plant import FlightStatus
 from hsv.model.vehicle import Vehicle, load_vehicle
-from hsv_paper.limits.optimum import finer, solve
-from hsv_paper.limits.recovery import (
+from hsv_paper.limits.problems import (
     DELAYS,
     HORIZON,
     PERIOD,
@@ -31,10 +29,12 @@ from hsv_paper.limits.recovery import (
     held_periods,
     recovery,
     static_limit,
+    straight,
+    time_bound,
+    transfer,
     turning_limit,
 )
 from hsv_paper.limits.replay import Flown, fly_optimum
-from hsv_paper.limits.transfer import straight, time_bound, transfer
 from hsv_paper.linear_loop import START, TARGET
 from hsv_paper.plots import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
 from hsv_paper.study import Outcome, Scope, Study
@@ -44,14 +44,8 @@ COUPLING = "paper_like"
 SCENARIOS = ("case1", "case1_smooth", "case1_qp", "case1_governed")
 """Compared with the fastest transfer."""
 
-PERIODS = 200
-"""Periods of the published transfers."""
-
-COARSE = 50
-"""Periods with which the iteration begins."""
-
-GUESS = 15.0
-"""Time (s) of the first guess."""
+PERIODS, COARSE, GUESS, TOLERANCE = 200, 50, 15.0, 1e-5
+"""Periods of the published transfers and of the first mesh, time (s) of the first guess, tolerance of an optimum."""
 
 AFTER = 20.0
 """Time (s) flown in the trim after an optimum."""
@@ -65,13 +59,8 @@ LATER = 30.0
 CURVE = tuple(round(0.02 * i, 2) for i in range(16))
 """Delays (s) of the figure's curves."""
 
-TOLERANCE = 1e-5
-
-BLEND = 5.0
-"""Half the time (s) in which climb rate and acceleration of the governed reference change."""
-
-RESOLUTION = 1e-3
-"""To which the least effectiveness that a flight survives is bisected."""
+BLEND, RESOLUTION = 5.0, 1e-3
+"""Half the time (s) in which the rates of the governed reference change; to which effectiveness is bisected."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +87,26 @@ class DeepestFault:
     static: float
     flown: Flown
 
+    def row(self, vehicle: str) -> str:
+        """Return a row of the table of optima."""
+        fine = "" if self.finer is None else f"{self.finer:.4f}"
+        numbers = f"{self.effectiveness:.4f} | {fine} | {self.turning:.4f} | {self.static:.4f}"
+        flown = "recovers" if self.flown.finished else "is lost"
+        return f"| {vehicle} | {self.delay:g} | {self.horizon:g} | {numbers} | {flown} |"
+
+    def report(self) -> dict[str, Any]:
+        """Return the numbers for JSON."""
+        return {
+            "delay_s": self.delay,
+            "horizon_s": self.horizon,
+            "effectiveness": self.effectiveness,
+            "finer_mesh": self.finer,
+            "turning_limit": self.turning,
+            "static_limit_of_its_trim": self.static,
+            "flown": self.flown.finished,
+            "deviation_at_end": self.flown.deviation(self.horizon),
+        }
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -123,13 +132,13 @@ class Limits:
 
 
 def fastest_transfer(vehicle: VehicleParameters, periods: int, *, settling: bool) -> FastestTransfer:
-    """Return the fastest transfer with so many ``periods``; see :func:`hsv_paper.limits.transfer.transfer`."""
+    """Return the fastest transfer with so many ``periods``; see :func:`hsv_paper.limits.problems.transfer`."""
     first = transfer(vehicle, COARSE, settling=settling)
     half = transfer(vehicle, periods // 2, settling=settling)
     whole = transfer(vehicle, periods, settling=settling)
-    coarse = solve(first, straight(first, GUESS), 10.0 * TOLERANCE)
-    coarser = solve(half, finer(coarse, periods // 2 // COARSE), TOLERANCE)
-    found = solve(whole, finer(coarser, 2), TOLERANCE)
+    coarse = first.solve(straight(first, GUESS), 10.0 * TOLERANCE)
+    coarser = half.solve(coarse.finer(periods // 2 // COARSE), TOLERANCE)
+    found = whole.solve(coarser.finer(2), TOLERANCE)
     flown = fly_optimum(whole, found, np.ones(len(found.input), dtype=int), AFTER)
     return FastestTransfer(found.scalar, coarser.scalar, flown)
 
@@ -137,9 +146,9 @@ def fastest_transfer(vehicle: VehicleParameters, periods: int, *, settling: bool
 def deepest_fault(
     vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizon: float, *, refine: bool
 ) -> DeepestFault:
-    """Return the deepest loss of effectiveness; see :func:`hsv_paper.limits.recovery.recovery`."""
+    """Return the deepest loss of effectiveness; see :func:`hsv_paper.limits.problems.recovery`."""
     problem = recovery(vehicle, envelope, delay, horizon)
-    found = solve(problem, at_trim(problem), TOLERANCE)
+    found = problem.solve(at_trim(problem), TOLERANCE)
     fine = recovery(vehicle, envelope, delay, horizon, 2)
     share = found.scalar
     flown = fly_optimum(problem, found, np.array(held_periods(horizon)), AFTER, share + MARGIN, round(delay / PERIOD))
@@ -147,7 +156,7 @@ def deepest_fault(
         delay,
         horizon,
         share,
-        solve(fine, finer(found, 2), TOLERANCE).scalar if refine else None,
+        fine.solve(found.finer(2), TOLERANCE).scalar if refine else None,
         turning_limit(vehicle, delay),
         static_limit(vehicle, found.state[-1:, :2]),
         flown,
@@ -241,10 +250,20 @@ def worst_corners(limits: np.ndarray) -> tuple[int, ...]:
     return tuple(dict.fromkeys((int(np.argmax(limits[:, 1])), int(np.argmax(limits[:, slowest])))))
 
 
-def _settling(data: FlightData) -> tuple[float, float, float]:
-    """Return the settling times (s) of altitude and velocity, and the later one."""
-    altitude, velocity = map(float, settling_times(data))
-    return altitude, velocity, max(altitude, velocity)
+def settling_times(flight: FlightData) -> np.ndarray:
+    """Return the times (2), s, from which altitude and velocity stay within 2 % of the whole change up to the fault.
+
+    The change is from the first state to the last reference, whether that is a step or not; infinite: not settled.
+    """
+    before = flight.time < (np.inf if flight.fault_start is None else flight.fault_start - 1e-9)
+    target = flight.reference[-1, :2]
+    off = np.abs(flight.state[before, :2] - target) > SETTLING_BAND * np.abs(target - flight.state[0, :2])
+    last = [int(np.flatnonzero(column)[-1]) + 1 if column.any() else 0 for column in off.T]
+    return np.array([flight.time[index] if index < len(off) else np.inf for index in last])
+
+
+def _settled(data: FlightData) -> float:
+    return float(settling_times(data).max())
 
 
 def _rounded_down(value: float) -> float:
@@ -255,11 +274,11 @@ def _shows(found: Limits) -> str:
     rest, settled, limits = found.rest, found.settled, found.corners
     needed = needed_effectiveness(limits)
     settling = [
-        f"| {name} | {altitude:.1f} | {velocity:.1f} | {later / settled.time:.1f} |"
-        for name, (altitude, velocity, later) in ((name, _settling(data)) for name, data in found.flights.items())
+        f"| {name} | {times[0]:.1f} | {times[1]:.1f} | {times.max() / settled.time:.1f} |"
+        for name, times in ((name, settling_times(data)) for name, data in found.flights.items())
     ]
-    rows = [_fault_row("nominal", fault) for fault in found.faults]
-    rows += [_fault_row(f"corner {index}", fault) for index, solved in found.worst.items() for fault in solved]
+    rows = [fault.row("nominal") for fault in found.faults]
+    rows += [fault.row(f"corner {index}") for index, solved in found.worst.items() for fault in solved]
     over_all = [
         "| trim at Case 1's target | " + _range(limits[:, 0]),
         "| a trim in the envelope | " + _range(limits[:, 1]),
@@ -286,7 +305,7 @@ def _shows(found: Limits) -> str:
         gap=100.0 * (rest.time / found.bound - 1.0),
         settling="\n".join(settling),
         blend=BLEND,
-        governed=_settling(found.governed)[2],
+        governed=_settled(found.governed),
         survived=found.survived,
         margin=MARGIN,
         after=AFTER,
@@ -297,16 +316,6 @@ def _shows(found: Limits) -> str:
     )
 
 
-def _fault_row(vehicle: str, fault: DeepestFault) -> str:
-    """Return a row of the table of optima."""
-    fine = "" if fault.finer is None else f"{fault.finer:.4f}"
-    flown = "recovers" if fault.flown.finished else "is lost"
-    return (
-        f"| {vehicle} | {fault.delay:g} | {fault.horizon:g} | {fault.effectiveness:.4f} | {fine} | {fault.turning:.4f} "
-        f"| {fault.static:.4f} | {flown} |"
-    )
-
-
 def _range(limits: np.ndarray) -> str:
     """Return cells for the nominal vehicle, the first, and for the best and the worst of the others."""
     return f"{limits[0]:.3f} | {limits[1:].min():.3f} | {limits[1:].max():.3f} |"
@@ -314,7 +323,7 @@ def _range(limits: np.ndarray) -> str:
 
 def _findings(found: Limits) -> tuple[str, ...]:
     rest, settled, limits = found.rest, found.settled, found.corners
-    ratios = ", ".join(f"{_settling(data)[2] / settled.time:.1f} ({name})" for name, data in found.flights.items())
+    ratios = ", ".join(f"{_settled(data) / settled.time:.1f} ({name})" for name, data in found.flights.items())
     known = " and from ".join(
         f"{fault.effectiveness:.3f} if it is known after {fault.delay:g} s"
         for fault in found.faults
@@ -345,28 +354,15 @@ def _findings(found: Limits) -> tuple[str, ...]:
 
 def _numbers(found: Limits) -> dict[str, Any]:
     rest, settled, limits = found.rest, found.settled, found.corners
-
-    def written(fault: DeepestFault) -> dict[str, Any]:
-        return {
-            "delay_s": fault.delay,
-            "horizon_s": fault.horizon,
-            "effectiveness": fault.effectiveness,
-            "finer_mesh": fault.finer,
-            "turning_limit": fault.turning,
-            "static_limit_of_its_trim": fault.static,
-            "flown": fault.flown.finished,
-            "deviation_at_end": fault.flown.deviation(fault.horizon),
-        }
-
     return {
         "transfer_s": {"rest": rest.time, "rest_half_mesh": rest.coarser, "bound": found.bound},
         "settling_s": {"least": settled.time, "least_half_mesh": settled.coarser}
-        | {name: _settling(data)[2] for name, data in found.flights.items()}
-        | {"governed": _settling(found.governed)[2]},
+        | {name: _settled(data) for name, data in found.flights.items()}
+        | {"governed": _settled(found.governed)},
         "replay_deviation": {"rest": rest.flown.deviation(), "settled": settled.flown.deviation()},
-        "faults": [written(fault) for fault in found.faults],
+        "faults": [fault.report() for fault in found.faults],
         "worst_corners": {
-            str(index): {"perturbation": dict(found.over[index]), "faults": [written(fault) for fault in solved]}
+            str(index): {"perturbation": dict(found.over[index]), "faults": [fault.report() for fault in solved]}
             for index, solved in found.worst.items()
         },
         "least_survived": {"case1": found.survived},

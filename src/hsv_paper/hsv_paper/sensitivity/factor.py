@@ -16,13 +16,13 @@ from hsv.base.units import to_paper
 from hsv.control.design import ControlDesign
 from hsv.design.adjustable import certified_loops, relaxed_bound
 from hsv.design.baseline import design_gains, nominal_family, nominal_problem, with_family
+from hsv.design.feedback import common_lyapunov
 from hsv.design.inputs import DesignInputs, find_inputs, read_inputs, with_tau
-from hsv.design.lyapunov import common_lyapunov
-from hsv.design.region import Region, region_parameters
+from hsv.design.region import Region
 from hsv.design.tube import MeasuredSet, measured_set
 from hsv.flight.assembly import assemble
 from hsv.flight.closed_loop import fly
-from hsv.flight.corners import fraction
+from hsv.flight.corners import fraction, region_parameters
 from hsv.flight.metrics import flight_metrics
 from hsv.model.signals import N_RIGID
 from hsv.model.trim import trim
@@ -209,7 +209,7 @@ def _with(gains: ControlDesign, tau: float) -> ControlDesign:
 
 
 def _metrics(design: ControlDesign, inputs: DesignInputs, over: Corners) -> list[dict[str, float]]:
-    parts = assemble({**design.to_parameters(), **region_parameters(inputs)})
+    parts = assemble({**design.to_parameters(), **region_parameters(inputs.model_dump(), inputs.flown_vehicle)})
     return [flight_metrics(fly(parts.perturbed(corner)).data()) for corner in over]
 
 

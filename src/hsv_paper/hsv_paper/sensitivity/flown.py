@@ -12,10 +12,10 @@ from hsv.control.design import ControlDesign, find_design, read_design, read_par
 from hsv.design.baseline import design_gains
 from hsv.design.inputs import find_inputs, read_inputs
 from hsv.flight.scenario import load_scenario
-from hsv.flight.sources import DIGITS, code_digest, digest_of, kept, package_digest
+from hsv.flight.sources import DIGITS, code_digest, digest_of, package_digest
 from hsv.flight.tables import CommandTable
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.flights import Point
+from hsv_paper.flights import Point, kept
 from hsv_paper.linear_loop import COUPLING_SCALES, Corners, Feedback
 from hsv_paper.plots import BLUE, DOTTED_GREY, GREEN, GREY, ORANGE, RED, ZERO, letter, new_figure, plain_log
 from hsv_paper.sensitivity.sweep import (

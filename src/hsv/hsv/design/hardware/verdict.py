@@ -1,8 +1,9 @@
 """Verdict: whether a design stays certified if models of hardware and air add to its disturbances.
 
 Actuators add states. The invariant set is sought as a design seeks its own, under all vertices, and the nominal plan of
-the certificate has to fit into what it leaves of the inputs. Whether limits of actuators act in that set is said by
-:mod:`hsv.design.hardware.limits`.
+the certificate has to fit into what it leaves of the inputs. The error system is linear, so a certificate holds for
+actuators whose stops and rate limits no error in the set reaches. Where they are reached it holds for the same
+actuators without them, and says nothing of the limited ones.
 """
 
 from __future__ import annotations
@@ -16,24 +17,67 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.base.processes import Progress
-from hsv.base.units import UnitSystem, in_words
+from hsv.base.units import UnitSystem, in_system, in_words
 from hsv.control.design import ControlDesign
-from hsv.design.certified import CertifiedDesign
-from hsv.design.disturbance import widened
-from hsv.design.hardware.effects import N_SCHEDULING, Measured, Model, with_models
-from hsv.design.hardware.limits import Reach, reaches
-from hsv.design.hardware.plan import Plan
-from hsv.design.region import Region, incomplete_share, record
+from hsv.design.certified import CertifiedDesign, Plan
+from hsv.design.disturbance import ChannelModel, widened
+from hsv.design.hardware.models import N_SCHEDULING, Measured, Model, with_models
+from hsv.design.region import Region, incomplete_share
 from hsv.design.sets.invariant_set import InvariantSet
-from hsv.design.sets.problem import TubeProblem
 from hsv.design.tightening import left_by
 from hsv.design.tube import invariant_set
-from hsv.design.tube_problem import channel_model, tube_problem
-from hsv.model.actuators import ACTUATOR_SETS, IDEAL
+from hsv.design.tube_problem import tube_problem
+from hsv.model.actuators import ACTUATOR_SETS, IDEAL, SUBSTEPS
+from hsv.model.lpv.actuated import actuator_names, actuator_system
+from hsv.model.lpv.linearisation import zero_order_hold
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_RIGID
+from hsv.model.trim import trim
 
 Lag = tuple[np.ndarray, np.ndarray] | None
 """Smallest and largest feedback (2 each) to the lag of the plan behind actuators; none where they are ideal."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Range of one actuator: position between ``lowest`` and ``highest``, magnitude of the rate up to ``rate``.
+
+    ``stop`` and ``rate_limit`` are its own, infinite where it has none. SI.
+    """
+
+    channel: str
+    lowest: float
+    highest: float
+    rate: float
+    stop: float
+    rate_limit: float
+
+    @property
+    def inactive(self) -> bool:
+        """Whether no limit is reached."""
+        return max(-self.lowest, self.highest) <= self.stop and self.rate <= self.rate_limit
+
+    def said(self, units: UnitSystem = UnitSystem.metric) -> str:
+        """Return by how much each limit is reached or not, in words."""
+        unit = INPUT_UNITS[INPUT_NAMES.index(self.channel)]
+        words = []
+        for what, value, limit, of in (
+            ("position", max(-self.lowest, self.highest), self.stop, unit),
+            ("rate", self.rate, self.rate_limit, "1/s" if unit == "1" else f"{unit}/s"),
+        ):
+            number, shown = in_system(value, of, units)
+            named = "" if shown == "1" else f" {shown}"
+            if np.isfinite(limit):
+                bound = in_system(limit, of, units)[0]
+                side = f"inactive by {bound - number:.3g}" if number <= bound else f"beyond it by {number - bound:.3g}"
+                words.append(f"{what} up to {number:.3g} of {bound:.3g}{named}, {side}")
+            else:
+                words.append(f"{what} up to {number:.3g}{named}, no limit")
+        return f"{self.channel}: {'; '.join(words)}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it for JSON, a limit that is none as ``None``."""
+        numbers = {name: None if value == np.inf else value for name, value in vars(self).items()}
+        return numbers | {"inactive": self.inactive}
 
 
 @dataclass(frozen=True)
@@ -78,9 +122,9 @@ class Verdict:
 
     def limited(self) -> Verdict:
         """Return the verdict on the same actuators with their limits: certified where no limit is reached."""
-        inactive = self.certified and all(reach.inactive for reach in self.reaches)
         limited = replace(self, name=f"{self.name}, limits of actuators", without_limits=self)
-        limited = limited if inactive else replace(limited, half_width=None, feedback=None, room=None, shares=None)
+        if not (self.certified and all(reach.inactive for reach in self.reaches)):
+            limited = replace(limited, half_width=None, feedback=None, room=None, shares=None)
         return replace(limited, reason=limited.said(UnitSystem.si))
 
     def as_dict(self) -> dict[str, Any]:
@@ -155,7 +199,7 @@ def _lag_of_the_plan(subject: CertifiedDesign, design: ControlDesign) -> tuple[n
     """Return the smallest and largest feedback (2 each) to the lag of the nominal vehicle's plan, inflated as W."""
     inputs = subject.inputs
     flight = Region(subject.design, inputs, incomplete_share(inputs)).fly({})
-    feedback = channel_model(design, subject.vehicle).errors(record(flight))[1]
+    feedback = ChannelModel(design, subject.vehicle).lag(flight)[1]
     return widened(feedback.min(axis=0), feedback.max(axis=0), inputs.disturbance.inflation)
 
 
@@ -172,51 +216,38 @@ def verdict(
         name: Name of the verdict.
         design: Design of ``subject``, with the actuators to certify.
         subject: The design with its certificate.
-        models: Beside those disturbances.
+        models: Models next to those disturbances.
         lag: Lag of the nominal input.
     """
     tube, inputs = subject.certificate["tube"], subject.inputs.invariant_set
     problem = with_models(tube_problem(design, subject.vehicle, subject.disturbance), models)
-    own = tube["invariant_set"]["contraction"]
-    others = [value for value in inputs.contraction if value != own]
+    lowest, highest = (np.array(tube["tightening"]["plan"][name]) for name in ("lowest", "highest"))
     measured = [model for model in models if isinstance(model, Measured)]
-    error = np.sum([model.error for model in measured] or [np.zeros(N_RIGID)], axis=0)
-    late = np.sum([model.late for model in measured] or [np.zeros(N_RIGID)], axis=0) > 0.0
-    best = Verdict(name, "no contraction to try")
-    for contractions in ([own], others):
-        # Seldom is another contraction better than the certificate's by much: they are tried where it does not do.
-        if not best.certified and contractions:
-            found = _with_contractions(name, design, subject, problem, contractions, lag, error, late)
-            best = max(found, best, key=lambda one: -np.inf if one.shares is None else float(one.shares.min()))
-    return best
+    error = sum((model.error for model in measured), np.zeros(N_RIGID))
+    late = sum((model.late for model in measured), np.zeros(N_RIGID, int))[:N_SCHEDULING] > 0
 
+    def judged(contractions: list[float]) -> Verdict:
+        try:
+            found = invariant_set(problem, inputs.model_copy(update={"contraction": contractions}))
+        except DesignError as failure:
+            return Verdict(name, str(failure))
+        half_width = found.half_width[:N_RIGID]
+        if late.any() and np.any((half_width > Plan.of(subject).half_width)[:N_SCHEDULING][late]):
+            # Measured took them to be as far from the truth as the design's own set is wide.
+            return Verdict(name, "the set is wider than late samples of altitude and velocity were bounded by")
+        bounds = left_by(found, design.input_minimum, design.input_maximum, lag)
+        limits = design.input_maximum - design.input_minimum
+        room, feedback = bounds.margins(lowest, highest), 0.5 * (limits - bounds.upper + bounds.lower)
+        reach = tuple(reaches(found, design, Plan.of(subject))) if design.actuators else ()
+        return Verdict(name, "", half_width, feedback, room, room / limits[:, None], _start(found, error), reach)
 
-def _with_contractions(
-    name: str,
-    design: ControlDesign,
-    subject: CertifiedDesign,
-    problem: TubeProblem,
-    contractions: list[float],
-    lag: Lag,
-    error: np.ndarray,
-    late: np.ndarray,
-) -> Verdict:
-    inputs, plan = subject.inputs.invariant_set, subject.certificate["tube"]["tightening"]["plan"]
-    try:
-        found = invariant_set(problem, inputs.model_copy(update={"contraction": contractions}))
-    except DesignError as failure:
-        return Verdict(name, str(failure))
-    scheduling = late & (np.arange(N_RIGID) < N_SCHEDULING)
-    if np.any(found.half_width[:N_RIGID][scheduling] > Plan.of(subject).half_width[scheduling]):
-        # Measured took them to be as far from the truth as the design's own set is wide.
-        return Verdict(name, "the set is wider than late samples of altitude and velocity were bounded by")
-    bounds = left_by(found, design.input_minimum, design.input_maximum, lag)
-    room = bounds.margins(np.array(plan["lowest"]), np.array(plan["highest"]))
-    limits = design.input_maximum - design.input_minimum
-    feedback = 0.5 * (limits - bounds.upper + bounds.lower)
-    reach = tuple(reaches(found, design, Plan.of(subject))) if design.actuators else ()
-    start = _start(found, error)
-    return Verdict(name, "", found.half_width[:N_RIGID], feedback, room, room / limits[:, None], start, reach)
+    own = tube["invariant_set"]["contraction"]
+    best = judged([own])
+    # Seldom is another contraction better than the certificate's by much: they are tried where it does not do.
+    others = [value for value in inputs.contraction if value != own]
+    if best.certified or not others:
+        return best
+    return max(judged(others), best, key=lambda one: -np.inf if one.shares is None else float(one.shares.min()))
 
 
 def _start(found: InvariantSet, error: np.ndarray) -> float:
@@ -227,3 +258,36 @@ def _start(found: InvariantSet, error: np.ndarray) -> float:
     if found.star_norms is None:
         return level
     return max(level, *(found.star_norms.level_at_start(found.problem, found.centre, error) for error in errors))
+
+
+def reaches(found: InvariantSet, design: ControlDesign, plan: Plan) -> list[Reach]:
+    """Return the reach of each actuator that ``design`` knows, over the set ``found`` and along ``plan``.
+
+    Positions and rates count on every substep on which limits act.
+    """
+    system, disturbance, known = found.problem.system, found.problem.disturbance, design.actuator_sets
+    flown, commands = plan.actuators(design)
+    states = [system.names.index(name) for name in actuator_names(known)]
+    A, B, C, _ = actuator_system(known)
+    ends: list[list[np.ndarray]] = [[], []]
+    for substep in range(1, SUBSTEPS + 1):
+        held, entering = zero_order_hold(A, B, substep * design.period / SUBSTEPS)
+        # Positions, then rates, from the actuators' states and from the command.
+        maps = (C @ held, C @ entering), (C @ A @ held, C @ (A @ entering + B))
+        for (on_a, on_u), end in zip(maps, ends, strict=True):
+            planned = flown @ on_a.T + commands @ on_u.T
+            on_e, on_d = on_u @ system.F, on_u @ system.F_d
+            on_e[:, states] += on_a
+            on_d[:, 3] += on_u[:, 1]  # the lost elevator goes the way of the command
+            middle = on_e @ found.centre + on_d @ disturbance.centre
+            half = np.sqrt(np.sum((on_e @ found.Q) * on_e, axis=1)) + np.abs(on_d) @ disturbance.half_width
+            end.append(plan.inflation * np.minimum(planned.min(axis=0), 0.0) + middle - half)
+            end.append(plan.inflation * np.maximum(planned.max(axis=0), 0.0) + middle + half)
+    at_rest = trim(plan.subject.vehicle.decoupled, *plan.flight.history.state[0, :2]).input
+    low, high = (of(ends[0], axis=0) + at_rest for of in (np.min, np.max))
+    rate = np.max(np.abs(ends[1]), axis=0)
+    result = []
+    for a in known:
+        i = INPUT_NAMES.index(a.channel)
+        result.append(Reach(a.channel, float(low[i]), float(high[i]), float(rate[i]), a.stop, a.rate_limit))
+    return result

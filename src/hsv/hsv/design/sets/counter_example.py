@@ -9,7 +9,7 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.control.optimisation import spectral_radii
-from hsv.design.sets.problem import TubeProblem
+from hsv.design.tube_problem import TubeProblem
 
 _NEGLIGIBLE = 1e-6
 """Share of a row's sum below which the rest of its response, of steps far back, is left out."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.design.sets.ellipsoid import ellipsoid
+from hsv.design.sets.invariant_set import ellipsoid
 
 FOOT = 0.3048
 ACCEPTED = 1.2 * 1.1 * np.array([42.0 * FOOT, 11.0 * FOOT, *np.radians([2.0, 1.9, 2.9])])

@@ -1,0 +1,317 @@
+"""Models of hardware and air as additions to the disturbance set of a design.
+
+Sensors, wind and density add channels to the structured set, bounded as if they could take any value within at every
+step. Errors of a measurement act through the feedback and the notch filter, and through the scheduling of the nominal
+model. Samples that come late add states. A scenario or the options of ``hsv certify`` declare the models. Noise counts
+:data:`REACH` standard deviations; an effect without a known bound is named, and with it nothing is certified.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from hsv.base.errors import DesignError, QuantityError
+from hsv.base.units import parse_quantity
+from hsv.control.estimator import ESTIMATOR_ENABLED
+from hsv.core.arithmetic import LARGEST
+from hsv.design.certified import CertifiedDesign, Plan
+from hsv.design.disturbance import CHANNELS, DisturbanceSet
+from hsv.design.error_system import ErrorSystem
+from hsv.design.tube_problem import TubeProblem
+from hsv.flight.scenario import Scenario
+from hsv.model.actuators import ACTUATOR_PARAMETERS, IDEAL
+from hsv.model.atmosphere import atmosphere_data
+from hsv.model.dynamics import derivative
+from hsv.model.links import command_link, computation, measurement_link
+from hsv.model.lpv.linearisation import linearise, zero_order_hold
+from hsv.model.sensors import ALPHA, PITCH, SENSOR_SETS, SensorData, sensor_data
+from hsv.model.signals import INPUT_NAMES, N_RIGID, N_STATES, PITCH_RATE, STATE_NAMES, STATE_UNITS
+from hsv.model.trim import trim
+from hsv.model.vehicle import Vehicle
+
+REACH = 3.0
+"""Standard deviations of noise and turbulence that count as their bound: one sample in 370 is beyond."""
+
+LARGEST_REACH = float(np.ceil(1e3 * LARGEST)) / 1e3
+"""Bound of all normal numbers, rounded up to three decimals."""
+
+N_SCHEDULING = 2
+"""The nominal model is scheduled by the first states, altitude and velocity."""
+
+_STILL = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
+"""The conditions that :func:`hsv.model.dynamics.forces` takes, in still air."""
+
+_STEP = np.array([1.0, 1.0, 1e-3])
+"""Differences over which the first conditions, wind (m/s, forward and up) and density, are linearised."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A model as an addition to the disturbance set.
+
+    ``columns`` (r, n, c) of its channels, ``feedthrough`` (2, c) to the feedback, ``half_width`` (c) of their bounds;
+    ``widening`` (7) of both bounds of the structured set; steps (5) by which each rigid state is seen ``late``.
+    """
+
+    columns: np.ndarray
+    feedthrough: np.ndarray
+    half_width: np.ndarray
+    widening: np.ndarray = field(default_factory=lambda: np.zeros(len(CHANNELS)))
+    late: np.ndarray = field(default_factory=lambda: np.zeros(N_RIGID, int))
+
+
+Model = Callable[[ErrorSystem], Effect]
+"""Function from the error system on which a model acts to the effect of the model."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Sensors of the rigid states: largest ``error`` (5), SI, and how many steps ``late`` (5) each is.
+
+    ``inertial``: the angle of attack has the error of the pitch angle, too. ``plan``: without one the nominal model is
+    scheduled with the truth.
+    """
+
+    error: np.ndarray
+    late: np.ndarray = field(default_factory=lambda: np.zeros(N_RIGID, int))
+    inertial: bool = False
+    plan: Plan | None = None
+
+    def __call__(self, system: ErrorSystem) -> Effect:
+        """Return the effect on ``system``; :func:`delayed` adds the delay of the error e."""
+        columns, seen = entering(system), system.F[:, :N_RIGID].copy()
+        error, widening = self.error, np.zeros(len(CHANNELS))
+        if self.plan:
+            # A late sample is one of the plan as it was, and of the error as it was, anywhere else in the set.
+            error = error + self.plan.change(self.late)
+            apart = np.where(self.late > 0, 2.0 * self.plan.half_width, 0.0)
+            if (error + apart)[:N_SCHEDULING].any():
+                widening = self.plan.scheduling((error + apart)[:N_SCHEDULING])
+        if self.inertial:
+            columns[:, :, PITCH] += columns[:, :, ALPHA]
+            seen[:, PITCH] += seen[:, ALPHA]
+        return Effect(columns, seen, error, widening, self.late)
+
+
+def entering(system: ErrorSystem) -> np.ndarray:
+    """Return the effect of a measurement of the rigid states (r, n, 5) in a period, by feedback and notch filter."""
+    columns = system.B @ system.F[:, :N_RIGID]
+    filtered = np.array([name.startswith("filter_") for name in system.names])
+    columns[:, filtered, PITCH_RATE] += system.A[:, filtered, PITCH_RATE]
+    return np.asarray(columns)
+
+
+def delayed(system: ErrorSystem, late: np.ndarray) -> ErrorSystem:
+    """Return ``system`` with rigid states that are seen so many steps ``late`` (5): samples under way are states."""
+    columns, n, extra = entering(system), len(system.names), int(late.sum())
+    room = ((0, 0), (0, extra), (0, 0))
+    A, B, G = np.pad(system.A, ((0, 0), (0, extra), (0, extra))), np.pad(system.B, room), np.pad(system.G, room)
+    F, first, names = np.pad(system.F, ((0, 0), (0, extra))), n, list(system.names)
+    for i in np.flatnonzero(late):
+        last = first + late[i] - 1
+        A[:, :n, i] -= columns[:, :, i]
+        A[:, :n, last] += columns[:, :, i]
+        A[:, first, i] = 1.0
+        A[:, range(first + 1, last + 1), range(first, last)] = 1.0
+        F[:, last], F[:, i] = system.F[:, i], 0.0
+        names += [f"{system.names[i]}_late_{j + 1}" for j in range(late[i])]
+        first = last + 1
+    return ErrorSystem(A, B, G, F, system.F_d, tuple(names), system.unseen + extra)
+
+
+def air(vehicle: Vehicle, period: float, forward: float = 0.0, up: float = 0.0, density: float = 0.0) -> Model:
+    """Return the model of air with bounded velocities (m/s) and a bounded relative error of the density.
+
+    Its effect is that at mid-envelope, held over a ``period`` (s).
+    """
+    bounds = np.array([forward, up, density])
+
+    def effect(system: ErrorSystem) -> Effect:
+        point, slopes = trim(vehicle.decoupled, *vehicle.centre), np.empty((N_STATES, len(bounds)))
+        for column, step in enumerate(_STEP):
+            moved = step * np.eye(len(_STILL))[column]
+            above, below = (
+                derivative(point.state, point.input, vehicle.decoupled, conditions)
+                for conditions in (_STILL + moved, _STILL - moved)
+            )
+            slopes[:, column] = (above - below) / (2.0 * step)
+        A, _ = linearise(vehicle.decoupled, *vehicle.centre)
+        columns = np.zeros((*system.A.shape[:2], len(bounds)))
+        columns[:, :N_RIGID] = zero_order_hold(A[:N_RIGID, :N_RIGID], slopes[:N_RIGID], period)[1]
+        return Effect(columns, np.zeros((len(system.F), len(bounds))), bounds)
+
+    return effect
+
+
+def with_models(problem: TubeProblem, models: Sequence[Model]) -> TubeProblem:
+    """Return ``problem`` with the additional channels of ``models``, except those that are bounded by zero.
+
+    Samples of a state that several make late are late by the sum.
+    """
+    system, lower, upper = problem.system, problem.disturbance.lower, problem.disturbance.upper
+    late = np.zeros(N_RIGID, int)
+    for model in models:
+        added = model(problem.system)
+        late, acting = late + added.late, added.half_width > 0.0
+        widening = np.pad(added.widening, (0, len(lower) - len(added.widening)))
+        lower = np.append(lower - widening, -added.half_width[acting])
+        upper = np.append(upper + widening, added.half_width[acting])
+        system = replace(
+            system,
+            G=np.concatenate((system.G, added.columns[:, :, acting]), axis=2),
+            F_d=np.concatenate((system.F_d, added.feedthrough[:, acting]), axis=1),
+        )
+    return TubeProblem(delayed(system, late) if late.any() else system, DisturbanceSet(lower, upper))
+
+
+def sensors(data: SensorData, plan: Plan, reach: float = REACH, of: str = "sensor") -> dict[str, Model]:
+    """Return the sensor models of the rigid states by name; ideal ones are omitted.
+
+    Noise and a Gauss-Markov bias count ``reach`` standard deviations, and so do biases and scales that are drawn once a
+    flight; a quantum counts half; what is late is so exactly.
+    """
+    rigid = slice(0, N_RIGID)
+    scale = (np.abs(data.scale) + reach * data.scale_sigma)[rigid]
+    errors = {
+        f"{of} noise": reach * np.hypot(data.noise, data.drift_sigma)[rigid],
+        f"{of} bias": (np.abs(data.bias) + reach * data.bias_sigma)[rigid] + scale * plan.largest(),
+        f"{of} quantisation": 0.5 * data.quantum[rigid],
+    }
+    inertial = bool(data.inertial_angle_of_attack)
+    models: dict[str, Model] = {
+        name: Measured(error, inertial=inertial, plan=plan) for name, error in errors.items() if error.any()
+    }
+    if data.latency[rigid].any():
+        models[f"{of} latency"] = Measured(np.zeros(N_RIGID), data.latency[rigid], plan=plan)
+    return models
+
+
+Declared = tuple[dict[str, Model], list[str]]
+"""Models by name, and the names of effects without a bound."""
+
+
+def declared(subject: CertifiedDesign, scenario: Scenario, reach: float = REACH) -> Declared:
+    """Return the models of sensors and air that a scenario declares, by name, and its effects without a bound.
+
+    Args:
+        subject: The design.
+        scenario: Its actuators are for :func:`hsv.design.hardware.verdict.certified_with`.
+        reach: Standard deviations that count as the bound of what is normally distributed.
+    """
+    values, period = scenario.parameters(), subject.design.period
+    data, moving, plan = sensor_data(values, period), atmosphere_data(values, period), Plan.of(subject)
+    models, unbounded = sensors(data, plan, reach), _without_bound(data, values, period)
+    if models:
+        equipment = {name: value for name, value in values.items() if name.startswith("sensors.") or name == "seed"}
+        _remeasure(models, unbounded, plan, equipment)
+    shear = abs(moving.shear) * max(abs(h - moving.shear_altitude) for h in subject.vehicle.altitude_range)
+    bounds = {
+        "wind": np.append(np.abs(moving.wind) + np.array([shear, 0.0]), 0.0),
+        "gusts": np.append(np.abs(moving.gust).sum(axis=0) if len(moving.gust) else np.zeros(2), 0.0),
+        "turbulence": np.append(reach * moving.sigma, 0.0),
+        "density": np.array([0.0, 0.0, abs(moving.density_offset) + reach * moving.density_sigma]),
+    }
+    return models | _airs(subject, bounds), unbounded
+
+
+def described(
+    subject: CertifiedDesign,
+    *,
+    sensor_set: str = IDEAL,
+    bias: Sequence[str] = (),
+    gust: str = "0 ft/s",
+    turbulence: str = "0 ft/s",
+    density: str = "0 %",
+    reach: float = REACH,
+) -> Declared:
+    """Return the models that options describe, by name, and the effects without a bound; none of size zero.
+
+    Args:
+        subject: The design.
+        sensor_set: A published set.
+        bias: Texts "state=quantity" of constant biases of rigid states.
+        gust: Largest wind, from below and from behind.
+        turbulence: Standard deviation, both ways.
+        density: Largest relative difference.
+        reach: Standard deviations that count as the bound of what is normally distributed.
+
+    Raises:
+        QuantityError: A value that cannot be read or is below zero, or a name that is unknown.
+    """
+    if sensor_set not in SENSOR_SETS:
+        raise QuantityError(f"sensors = {sensor_set!r}: expected one of {', '.join(SENSOR_SETS)}")
+    if not 0.0 < reach <= LARGEST_REACH:
+        raise QuantityError(f"reach = {reach:g}: expected more than 0, up to {LARGEST_REACH}, beyond which no noise is")
+    names, biases = STATE_NAMES[:N_RIGID], np.zeros(N_RIGID)
+    for text in bias:
+        name, _, value = text.partition("=")
+        if name.strip() not in names:
+            raise QuantityError(f"bias = {text!r}: expected one of {', '.join(names)}, then = and a quantity")
+        index = names.index(name.strip())
+        biases[index] = abs(parse_quantity(value.strip(), STATE_UNITS[index], f"bias {names[index]}"))
+    up_to = np.array([1.0, 1.0, 0.0])
+    bounds = {}
+    for option, text, unit, factor in (
+        ("gust", gust, "m/s", up_to),
+        ("turbulence", turbulence, "m/s", reach * up_to),
+        ("density", density, "1", 1.0 - up_to),
+    ):
+        if (size := parse_quantity(text, unit, option)) < 0.0:
+            raise QuantityError(f"{option} = {size:g}: expected zero or more")
+        bounds[f"{option} {text}"] = size * factor
+    models: dict[str, Model] = {}
+    unbounded: list[str] = []
+    if sensor_set != IDEAL or biases.any():
+        plan, data = Plan.of(subject), sensor_data({"sensors.set": sensor_set}, subject.design.period)
+        models |= sensors(data, plan, reach, f"{sensor_set} sensors:")
+        if biases.any():
+            models[f"bias of {', '.join(text.strip() for text in bias)}"] = Measured(biases, plan=plan)
+        given = {f"sensors.{n}.bias": [float(b)] for n, b in zip(names, biases, strict=True) if b}
+        _remeasure(models, unbounded, plan, {"sensors.set": sensor_set, **given})
+    return models | _airs(subject, bounds), unbounded
+
+
+def _airs(subject: CertifiedDesign, bounds: Mapping[str, np.ndarray]) -> dict[str, Model]:
+    """Return the models of air by name from ``bounds`` (3) of wind forward and up and of density, if any."""
+    return {name: air(subject.vehicle, subject.design.period, *of) for name, of in bounds.items() if of.any()}
+
+
+def _without_bound(data: SensorData, values: Mapping[str, Any], period: float) -> list[str]:
+    """Return the effects of sensors of the rigid states, estimator, actuators and links for which no bound is known."""
+    limits = np.isfinite(np.r_[data.minimum[:N_RIGID], data.maximum[:N_RIGID]])
+    changed = {p.name: bool(values.get(p.name)) for p in ACTUATOR_PARAMETERS if isinstance(p.default, list)}
+    found = {
+        "lag of a sensor": data.lag_decay[:N_RIGID].any(),
+        "random walk of a sensor": data.walk[:N_RIGID].any(),
+        "drop-out of a sensor": data.drop_out[:N_RIGID].any(),
+        "range of a sensor": limits.any(),
+        "estimator": values.get(ESTIMATOR_ENABLED.name, False),
+        **changed,
+        "link of the measurement": not measurement_link(values).ideal,
+        "link of the command": not command_link(values, period).ideal or computation(values, period)[1] > 0.0,
+    }
+    return [name for name, there in found.items() if there]
+
+
+def _remeasure(models: dict[str, Model], unbounded: list[str], plan: Plan, equipment: Mapping[str, Any]) -> None:
+    """Add the model errors measured in flights with sensors; if a flight fails, they are an unbounded effect."""
+    try:
+        widening = plan.remeasured(equipment)
+    except DesignError as failure:
+        unbounded.append(f"sensors ({failure})")
+        return
+
+    def effect(system: ErrorSystem) -> Effect:
+        return Effect(np.zeros((*system.A.shape[:2], 0)), np.zeros((len(system.F), 0)), np.zeros(0), widening)
+
+    models["model errors under sensors"] = effect
+
+
+def declared_actuators(scenario: Scenario) -> str:
+    """Return the published actuators that a scenario flies, separated by commas, or that they are ideal."""
+    sets = [scenario.equipment.get(f"actuator.{channel}.set", IDEAL) for channel in INPUT_NAMES]
+    return ",".join(name for name in sets if name != IDEAL) or IDEAL

@@ -1,0 +1,231 @@
+"""The two problems: the fastest transfer of Case 1's step, and the deepest loss of elevator effectiveness.
+
+The transfer is between the two trims of the step, of the vehicle as flown, inputs anywhere in U. Two meanings of
+fastest: all of the vehicle is at rest in the target's trim, or, as settling times are measured, altitude and velocity
+are within 2 % of their steps of the target and stay there on a way on which it comes to rest.
+
+The vehicle is in its trim at the target when the effectiveness falls from 1 to P; the elevator that acts is P times the
+command. For a delay the command of the trim is kept, then any inputs within U are permitted.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from scipy.optimize import minimize
+
+from hsv.base.errors import TrimError
+from hsv.flight.metrics import SETTLING_BAND
+from hsv.model.dynamics import VehicleParameters, advance, derivative, forces, in_model_range
+from hsv.model.signals import N_STATES
+from hsv.model.trim import trim
+from hsv.model.vehicle import Vehicle
+from hsv_paper.limits.optimum import Point, Problem
+from hsv_paper.linear_loop import START, TARGET
+
+SUBSTEP = 0.01
+"""Runge-Kutta step (s) of the flights."""
+
+MARGIN = np.array([100.0, 10.0])
+"""Altitude (m) and velocity (m/s)."""
+
+GRID_ERROR = 5e-4
+"""More than the largest rate between the points of the grid can exceed that at them, of itself: from its curvature."""
+
+LONGEST = 60.0
+"""Upper bound of the time (s)."""
+
+REST = 0.4
+"""Time from settling to rest, as a share of the time to settling: a longer one changes nothing."""
+
+TYPICAL = 12.0
+"""Time (s) for which Runge-Kutta steps are as long as in flights; where the time is longer, so are they."""
+
+
+PERIOD = 0.02
+"""T (s), as flown."""
+
+SUBSTEPS = 2
+"""Runge-Kutta steps per period, as flown."""
+
+DELAYS = (0.0, 0.1, 0.2)
+"""Times (s) after which the effectiveness is known."""
+
+HORIZON = 10.0
+"""Time (s) in which the vehicle is to be in a trim."""
+
+COST = 10.0
+"""Weight of P against defects: a tenth of P is a unit."""
+
+
+def transfer(vehicle: VehicleParameters, periods: int, *, settling: bool, rest: float = REST) -> Problem:
+    """Return the problem of the least time (s), s, from Case 1's start to its target.
+
+    Args:
+        vehicle: Parameters.
+        periods: Number of periods of equal length within that time in which inputs are held.
+        settling: The time is that after which altitude and velocity are within 2 % of their steps of the target; the
+            vehicle is at rest there a share ``rest`` of the time later. Otherwise it is the time to rest.
+        rest: Share.
+    """
+    start, target = trim(vehicle, *START), trim(vehicle, *TARGET)
+    total = periods + (round(rest * periods) if settling else 0)
+    low, high = free_states(vehicle, start.state, total)
+    if settling:
+        band = SETTLING_BAND * np.abs(target.state[:2] - start.state[:2])
+        low[periods:, :2], high[periods:, :2] = target.state[:2] - band, target.state[:2] + band
+    low[-1] = high[-1] = target.state
+    inputs = np.tile([[vehicle.input_minimum], [vehicle.input_maximum]], (1, total, 1))
+    substeps, slope = np.full(total, max(2, round(TYPICAL / periods / SUBSTEP))), np.full(total, 1.0 / periods)
+    none, states, scalar = np.zeros(total), np.stack((low, high)), (1.0, LONGEST)
+    return Problem(vehicle, none, slope, substeps, inputs, np.zeros_like(inputs), states, False, scalar)
+
+
+def free_states(vehicle: VehicleParameters, start: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return bounds (N + 1, 9) each of states from a ``start`` (9) that leave the vehicle in the model's range."""
+    low = np.full((periods + 1, N_STATES), -np.inf)
+    high = -low
+    low[:, 2:4], high[:, 2:4] = -vehicle.angle_limit, vehicle.angle_limit
+    low[0] = high[0] = start
+    return low, high
+
+
+def straight(problem: Problem, time: float) -> Point:
+    """Return a first guess of ``time`` (s): states and inputs in a straight line from trim to trim."""
+    start, target = trim(problem.vehicle, *START), trim(problem.vehicle, *TARGET)
+    share = np.concatenate(([0.0], np.cumsum(problem.periods(time))))
+    share = np.minimum(share / time, 1.0)[:, None]
+    state = start.state + share * (target.state - start.state)
+    return Point.guess(time, state, (start.input + share * (target.input - start.input))[:-1])
+
+
+def time_bound(vehicle: VehicleParameters) -> float:
+    """Return a time (s) below which no input within U brings the vehicle from rest at the start to rest at the target.
+
+    Over such a transfer, the velocity changes by the difference of both trims and the altitude likewise; the path
+    angle does not change, nor do pitch rate and elastic rates, so that the pitching moment, too, is zero on average.
+    For any weights, the integral of R = dV/dt + a dh/dt + b dgamma/dt + c M / I is thus known, and the time is at least
+    that integral over the largest R. The weights are those of the best such bound. The largest R is that over U, over
+    angles of attack within the model's range, path angles up to 5 deg, and altitudes and velocities up to
+    :data:`MARGIN` outside those of the trims: the bound is for transfers that stay in there.
+    """
+    start, target = trim(vehicle, *START).state, trim(vehicle, *TARGET).state
+    change = target[:2] - start[:2]
+    altitudes = np.array([start[0] - MARGIN[0], 0.5 * (start[0] + target[0]), target[0] + MARGIN[0]])
+    velocities = np.array([start[1] - MARGIN[1], 0.5 * (start[1] + target[1]), target[1] + MARGIN[1]])
+    fuel = np.array([vehicle.fuel_equivalence_ratio_minimum, vehicle.fuel_equivalence_ratio_maximum])
+    elevator = np.linspace(vehicle.elevator_deflection_minimum, vehicle.elevator_deflection_maximum, 121)
+    alpha = np.linspace(-vehicle.angle_limit, vehicle.angle_limit, 241)
+    path = np.radians([-5.0, 0.0, 5.0])
+    scale = np.array([vehicle.gravity / start[1], start[1], 1.0])
+    rows = []
+    # R is affine in the fuel, the thrust being so: its two limits are enough.
+    grid = product(*(axis.tolist() for axis in (altitudes, velocities, alpha, path, fuel, elevator)))
+    for h, V, angle, gamma, phi, delta in grid:
+        x, u = np.array([h, V, angle, angle + gamma, 0.0, 0.0, 0.0, 0.0, 0.0]), np.array([phi, delta])
+        rates = derivative(x, u, vehicle)
+        rows.append((rates[0], rates[1], rates[2], forces(x, u, vehicle)[3]))
+    climb, acceleration, turn, moment = np.array(rows).T.copy()
+
+    def inverse(weights: np.ndarray) -> float:
+        a, b, c = weights * scale
+        largest = (acceleration + a * climb - b * turn + c * moment / vehicle.moment_of_inertia).max()
+        return -float((change[1] + a * change[0]) / largest)
+
+    simplex = np.array([[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.0, 0.2, 0.0], [1.0, 0.2, -10.0]])
+    found = minimize(inverse, simplex[0], method="Nelder-Mead", options={"initial_simplex": simplex, "fatol": 1e-3})
+    return -float(found.fun) * (1.0 - GRID_ERROR)
+
+
+def recovery(vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizon: float, divide: int = 1) -> Problem:
+    """Return the problem of the least effectiveness, s, from which the vehicle comes to a trim in its envelope.
+
+    Inputs are those that act on the vehicle. They are held for one period at first, for 2 from 1.5 s on, for 5 from
+    3 s on.
+
+    Args:
+        vehicle: Parameters, perturbed or not.
+        envelope: The vehicle's envelope of commands, which has the trim at the end.
+        delay: s.
+        horizon: Time from the fault to the trim (s).
+        divide: In how many each period is divided, for a finer mesh.
+    """
+    before = trim(vehicle, *TARGET)
+    held = np.array(held_periods(horizon))
+    period = np.repeat(held * PERIOD / divide, divide)
+    n, kept = len(period), round(delay / PERIOD) * divide
+    low, high = free_states(vehicle, before.state, n)
+    for i, (axis_low, axis_high) in enumerate((envelope.altitude_range, envelope.velocity_range)):
+        low[-1, i], high[-1, i] = axis_low, axis_high
+    # The fuel is between its limits, the elevator that acts between s times those of the command.
+    inputs, slope = np.zeros((2, n, 2)), np.zeros((2, n, 2))
+    for side, limits in enumerate((vehicle.input_minimum, vehicle.input_maximum)):
+        inputs[side, :, 0], slope[side, :, 1] = limits
+    inputs[:, :kept, 0], slope[:, :kept, 1] = before.input
+    substeps, states = np.repeat(SUBSTEPS * held, divide), np.stack((low, high))
+    return Problem(vehicle, period, np.zeros(n), substeps, inputs, slope, states, True, (0.05, 1.0), COST)
+
+
+def held_periods(horizon: float) -> list[int]:
+    """Return for how many periods of the flight each input is held, up to a ``horizon`` (s)."""
+    held: list[int] = []
+    while (time := sum(held) * PERIOD) < horizon - 1e-9:
+        held.append(1 if time < 1.5 - 1e-9 else 2 if time < 3.0 - 1e-9 else 5)
+    return held
+
+
+def at_trim(problem: Problem) -> Point:
+    """Return the first guess: the vehicle stays in its trim, at half of the effectiveness."""
+    before = trim(problem.vehicle, *TARGET)
+    n = len(problem.period)
+    return Point.guess(0.5, np.tile(before.state, (n + 1, 1)), np.tile(before.input, (n, 1)))
+
+
+def static_limit(vehicle: VehicleParameters, points: np.ndarray) -> float:
+    """Return the least effectiveness with which one of ``points`` (M, 2), altitude m and velocity m/s, is a trim."""
+    least = np.inf
+    for altitude, velocity in points:
+        try:
+            needed = trim(vehicle, altitude, velocity).input[1]
+        except TrimError:
+            continue
+        stop = vehicle.elevator_deflection_maximum if needed > 0.0 else vehicle.elevator_deflection_minimum
+        least = min(least, needed / stop)
+    return float(least)
+
+
+def envelope_points(envelope: Vehicle) -> np.ndarray:
+    """Return a grid (9, 2) of altitudes (m) and velocities (m/s) over the envelope: its corners, sides and middle."""
+    axes = [(low, 0.5 * (low + high), high) for low, high in (envelope.altitude_range, envelope.velocity_range)]
+    return np.array([(altitude, velocity) for altitude in axes[0] for velocity in axes[1]])
+
+
+def turning_limit(vehicle: VehicleParameters, delay: float, resolution: float = 1e-4) -> float:
+    """Return the least effectiveness with which the elevator at its stop turns the vehicle's nose down.
+
+    Found by bisection of flights, without any optimisation: after the ``delay`` (s) the elevator goes to its stop and
+    the fuel, whose thrust lifts the nose, is shut off; the nose is turned when the angle of attack is back at
+    that of the trim.
+    """
+    before = trim(vehicle, *TARGET)
+    low, high = 0.0, 1.0
+    while high - low > resolution:
+        share = 0.5 * (low + high)
+        if _turns(vehicle, before.state, before.input, round(delay / PERIOD), share):
+            high = share
+        else:
+            low = share
+    return high
+
+
+def _turns(vehicle: VehicleParameters, state: np.ndarray, inputs: np.ndarray, kept: int, share: float) -> bool:
+    x = state
+    stop = np.array([vehicle.fuel_equivalence_ratio_minimum, vehicle.elevator_deflection_maximum])
+    for k in range(int(20.0 / PERIOD)):
+        x = advance(x, (inputs if k < kept else stop) * [1.0, share], vehicle, PERIOD, SUBSTEPS)
+        if k >= kept and x[4] < 0.0 and x[2] <= state[2]:
+            return True
+        if not in_model_range(x, vehicle.angle_limit):
+            return False
+    return False
