@@ -189,6 +189,7 @@ def test_a_failure_in_a_later_flight_is_a_difference_and_one_in_the_first_an_err
         found(Failing)
 
 
+@pytest.mark.long
 def test_several_flights_at_a_time_in_several_processes_are_compared():
     flown = scenario(OfTheProcess)
     finding = under_load(flown, fly(assemble_flight(flown)))

@@ -4,6 +4,7 @@ import copy
 
 import numpy as np
 import pytest
+from marking import long
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import DesignError
@@ -60,9 +61,9 @@ def test_a_shipped_design_passes_with_its_flights_and_sequences(name):
     ("field", "value", "named"),
     [
         (("disturbance", "measured", "lower", 0), -0.39, "tube.disturbance.measured.lower[0]"),
-        (("disturbance", "measured", "upper_flight", 2), 17, "tube.disturbance.measured.upper[2]"),
-        (("flights", "flights"), 1024, "tube.flights.flights"),
-        (("flights", "worst_level"), 0.2, "tube.flights: level"),
+        long(("disturbance", "measured", "upper_flight", 2), 17, "tube.disturbance.measured.upper[2]"),
+        long(("flights", "flights"), 1024, "tube.flights.flights"),
+        long(("flights", "worst_level"), 0.2, "tube.flights: level"),
         (("tightening", "plan", "highest", 1), 0.2, "nominal plan of flown corners, highest"),
     ],
 )
