@@ -10,6 +10,7 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 _INCLUDE = re.compile(r"```\{include\} (\S+)\n```\n")
 _LINK = re.compile(r"\]\(([^()\s#]+)")
+_WHOLE_LINK = re.compile(r"\[([^\[\]]+)\]\(([^()\s#]+)\)")
 
 
 def included() -> dict[Path, str]:
@@ -22,7 +23,7 @@ def included() -> dict[Path, str]:
 
 
 def text_of(page: str, source: str, files: dict[Path, str]) -> str:
-    """Return the text of a page with links as the site has them.
+    """Return the text of a page with links as the site has them, where a folder without a page is no link.
 
     Args:
         page: Its name, from the folder of the documentation, without suffix.
@@ -34,12 +35,19 @@ def text_of(page: str, source: str, files: dict[Path, str]) -> str:
         file = (file.parent / match[1]).resolve()
         source = file.read_text(encoding="utf-8")
 
+    def page_file(target: Path) -> Path:
+        return target / "README.md" if target.is_dir() else target
+
     def link(match: re.Match[str]) -> str:
         target = (file.parent / match[1]).resolve()
         if not target.exists():
             return match[0]  # an address, or no link at all
-        of_folder = target / "README.md"
-        place = DOCS / f"{files[known]}.md" if (known := of_folder if target.is_dir() else target) in files else target
+        known = page_file(target)
+        place = DOCS / f"{files[known]}.md" if known in files else target
         return "](" + Path(os.path.relpath(place, (DOCS / page).parent)).as_posix()
 
-    return _LINK.sub(link, source)
+    def without_folder(match: re.Match[str]) -> str:
+        target = (file.parent / match[2]).resolve()
+        return match[1] if target.is_dir() and page_file(target) not in files else match[0]
+
+    return _LINK.sub(link, _WHOLE_LINK.sub(without_folder, source))

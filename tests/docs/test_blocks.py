@@ -22,6 +22,7 @@ WHOLE = {
     "docs/hardware.md": "tests/docs/test_code_blocks.py",
     "docs/hosts.md": "tests/graph/test_hosts.py",
     "docs/vehicle.md": "tests/docs/test_code_blocks.py",
+    "examples/cpp_node/README.md": "tests/graph/test_full_installation.py",
     "examples/node/README.md": "tests/graph/test_own_controllers.py",
 }
 """Pages of which another file runs every block."""

@@ -82,7 +82,12 @@ def test_qp_flies_as_in_process_and_leaving_the_tube_is_told(processes: Processe
     assert warned[0][0] == pytest.approx(0.02 * first) and warned[0][1]["component"]
     said = [message.msg for _, message in bag.decode("/rosout")]
     assert any(f"left the tube at {0.02 * first:.2f} s: {warned[0][1]['component']}" in text for text in said)
-    told = json.loads(processes.run("hsv", "info", processes.folder / "left", "--json").stdout)["tube"]
+    described = json.loads(processes.run("hsv", "info", processes.folder / "left", "--json").stdout)
+    assert described["step_times"]["period_ms"] == 20.0
+    assert described["step_times"]["nodes"].keys() == {"nominal_trajectory", "tube_mpc"}
+    for times in described["step_times"]["nodes"].values():
+        assert 0.0 < times["median_ms"] <= times["p99_ms"] <= times["max_ms"]
+    told = described["tube"]
     assert told["outside_steps"] == outside.sum()
     assert told["excursions"][0]["start_s"] == pytest.approx(0.02 * first)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 from collections.abc import Iterator
@@ -21,6 +22,7 @@ from waiting import exit_code_of, output_of, wait_until
 
 from hsv.bags.description import RECORDER, graph
 from hsv.bags.reader import Bag
+from ros2 import prefixes
 
 pytestmark = pytest.mark.full_ros
 
@@ -108,7 +110,6 @@ def test_launch_ends_with_1_after_a_node_is_killed(processes: Processes, name: s
         ("scenari:=case1", "scenari: no such argument, did you mean scenario?"),
         ("colour:=red", "colour: no such argument: expected one of scenario, bag, "),
         ("scenario:=nowhere", "scenario 'nowhere': expected a path or one of case1, "),
-        ("composed:=yes", "composed:=yes: expected true or false"),
         ("real_time_factor:=quick", "Invalid value for 'real_time_factor'"),
         ("step_timeout:=0", "step_timeout = 0.0: expected at least 0.1"),
         ("bag:=.", "bag = '.': exists already"),
@@ -122,6 +123,12 @@ def test_launch_names_a_wrong_argument_and_starts_nothing(processes: Processes, 
     [line] = [line for line in done.stdout.splitlines() if "[INFO] [launch]" not in line]
     assert line.startswith(f"sil.launch.py: error: {said}")
     assert [path.name for path in processes.folder.rglob("*")] == ["temporary"]
+
+
+def test_launch_refuses_what_is_no_choice(processes: Processes) -> None:
+    done = processes.run(*LAUNCH, "composed:=yes")
+    assert done.returncode == 1 and "Valid options are: ['true', 'false']" in done.stdout, done.stdout
+    assert not list(processes.folder.iterdir())
 
 
 def test_launch_describes_every_argument(processes: Processes) -> None:
@@ -276,6 +283,21 @@ def test_faults_and_factors_come_and_go_in_flight(processes: Processes) -> None:
     finish(flight)
     # Commands on parameters and topics leave one that waits for more of them.
     assert processes.run("ros2", "daemon", "stop").returncode == 0
+
+
+@pytest.mark.skipif("rclcpp" not in prefixes(), reason="the installation has no rclcpp")
+def test_the_controller_in_cpp_flies_as_the_one_in_python(processes: Processes) -> None:
+    shutil.copytree(ROOT / "examples" / "cpp_node", processes.folder / "cpp_node")
+    built = processes.run("bash", "-c", "cd cpp_node && python3 -m colcon build")
+    assert built.returncode == 0 and "warning" not in built.stdout, built.stdout
+    executable = processes.folder / "cpp_node" / "install" / "hsv_example_cpp" / "lib" / "hsv_example_cpp" / "regulator"
+    node = processes.start(executable)
+    scenario = short_scenario(processes.folder)
+    done = processes.run("hsv", "run", scenario, "--external", "--bag", "external", "--no-report")
+    assert done.returncode == 0 and node.poll() is None, done.stdout
+    finish(node)
+    command = Bag(processes.folder / "external").columns("/hsv/command")
+    assert len(command["step"]) == 251 and np.isfinite(command["elevator_deflection"]).all()
 
 
 EXAMPLE = re.compile(r"```python\n(.*?)```", re.DOTALL)

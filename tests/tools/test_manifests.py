@@ -65,6 +65,15 @@ def test_a_package_declares_what_it_imports_and_nothing_else(manifest: Path) -> 
     assert package.build_depends == [] or package.name == "hsv" or package.get_build_type() == "ament_cmake"
 
 
+@pytest.mark.parametrize(
+    "manifest", [*MANIFESTS, *ROOT.glob("examples/*/package.xml")], ids=lambda path: path.parent.name
+)
+def test_a_package_names_its_authors_its_site_and_its_license(manifest: Path) -> None:
+    package = parse_package(str(manifest))
+    assert package.authors and package.urls and package.licenses == ["Apache-2.0"]
+    assert (manifest.parent / "LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()
+
+
 @pytest.mark.parametrize("manifest", MANIFESTS, ids=lambda path: path.parent.name)
 def test_a_package_has_a_changelog_of_its_name(manifest: Path) -> None:
     text = (manifest.parent / "CHANGELOG.rst").read_text(encoding="utf-8")

@@ -60,3 +60,5 @@ def test_links_of_pages_lead_to_pages():
         "tutorial/a", "[one](../../README.md#topics) [two](https://x.org) [three](b.md)", files
     )
     assert own == "[one](../readme.md#topics) [two](https://x.org) [three](b.md)"
+    folders = repository_pages.text_of("a", "[`core`](../src/hsv/hsv/core), [lqr](../examples/lqr)", files)
+    assert folders == "`core`, [lqr](examples/lqr.md)"

@@ -138,9 +138,6 @@ def prepare(context: LaunchContext) -> list[Action]:
     if Path(__file__).name in (Path(word).name for word in sys.argv):
         # Those of the command line are for this file, and not for one that includes it.
         refuse_unknown(argument.split(":=")[0] for argument in context.argv)
-    for name, choices in CHOICES.items():
-        if options[name] not in choices:
-            refuse(f"{name}:={options[name]}: expected {' or '.join(choices)}")
     folder = tempfile.mkdtemp(prefix="hsv_launch_")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     try:
@@ -201,7 +198,7 @@ def remove_if_empty(bag: str) -> None:
 def generate_launch_description() -> LaunchDescription:
     """Return the nodes of the graph with the parameters of a scenario."""
     declared = [
-        DeclareLaunchArgument(name, default_value=default, description=description)
+        DeclareLaunchArgument(name, default_value=default, description=description, choices=CHOICES.get(name))
         for name, (default, description) in ARGUMENTS.items()
     ]
     return LaunchDescription([*declared, OpaqueFunction(function=prepare)])

@@ -52,7 +52,6 @@ class NominalTrajectoryNode(BlockNode):
                 "running" if status is NominalStatus.OK else str(status.name),
                 warning=fails,
                 gain_index=signals.gain_index,
-                step_time_p99_ms=self.step_time_p99,
             )
 
     def _command(self, request: SetCommand.Request, response: SetCommand.Response) -> SetCommand.Response:

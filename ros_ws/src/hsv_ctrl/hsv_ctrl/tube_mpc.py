@@ -75,7 +75,6 @@ class TubeNode(BlockNode):
                 saturated=bool(result.saturated.any()),
                 level=result.level,
                 component=result.component,
-                step_time_p99_ms=self.step_time_p99,
                 **known,
             )
 

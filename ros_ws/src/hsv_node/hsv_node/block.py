@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import deque
+from array import array
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -16,9 +16,6 @@ from hsv.bags.messages import StepMessages
 from hsv.base.errors import RunError, SignalError
 from hsv.flight.blocks import Signals
 from hsv_node.lockstep import PeerNode
-
-STEP_TIMES = 1000
-"""Number of steps over which the percentile of the step time is taken, once a simulated second."""
 
 
 class BlockNode(PeerNode):
@@ -37,7 +34,8 @@ class BlockNode(PeerNode):
         # In the order of the role: other nodes wait for the first and work on it while the rest is published.
         self._answers = [(StepMessages(topic).pack, self.create_step_publisher(topic)) for topic in role.publishes]
         self.messages = {topic: StepMessages(topic) for topic in self.role.subscribes}
-        self._step_times: deque[float] = deque(maxlen=STEP_TIMES)
+        self._step_times = array("d")
+        """Wall time (s) of each step of the component in this run."""
         self._delays = {topic: int(topic in self.role.delayed) for topic in self.role.subscribes}
         for topic in self.role.subscribes:
             self.create_step_subscription(topic, partial(self.on_message, topic))
@@ -45,7 +43,7 @@ class BlockNode(PeerNode):
     def start_run(self, run: Run) -> None:
         """Forget the previous run."""
         self._received.clear()
-        self._step_times.clear()
+        self._step_times = array("d")
         self.component.reset()
 
     def stepped(self, signals: Signals) -> None:
@@ -77,10 +75,12 @@ class BlockNode(PeerNode):
             publish(pack(signals))
         self.stepped(signals)
 
-    @property
-    def step_time_p99(self) -> str:
-        """The 99th percentile of the wall time of the last steps of the component, in ms."""
-        return f"{1e3 * np.percentile(self._step_times, 99):.3f}"
+    def diagnose(self, signals: Signals, summary: str = "running", warning: bool = False, **values: object) -> None:
+        """Publish this node's diagnostics with the wall times of the steps of its component so far, in ms."""
+        median, p99, largest = 1e3 * np.percentile(self._step_times, (50.0, 99.0, 100.0))
+        times = {"median": median, "p99": p99, "max": largest}
+        measured = {f"step_time_{name}_ms": f"{value:.3f}" for name, value in times.items()}
+        super().diagnose(signals, summary, warning, **values, **measured)
 
     def _due(self, step: int) -> Sequence[str]:
         """Return the topics that ``step`` takes; none while one of their messages is missing."""

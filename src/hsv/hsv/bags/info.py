@@ -9,7 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsv.bags.bag_warnings import bag_warnings
-from hsv.bags.description import ACTUATOR, COMMAND, STATE, TUBE_MPC, TUBE_STATUS
+from hsv.bags.description import (
+    ACTUATOR,
+    COMMAND,
+    CONTROLLER,
+    CONTROLLERS,
+    DIAGNOSTICS,
+    NOMINAL_TRAJECTORY,
+    STATE,
+    TUBE_MPC,
+    TUBE_STATUS,
+)
 from hsv.bags.equipment import effectors, equipment_topics, held, measurement_errors, moving_air
 from hsv.bags.flight import flight_fingerprint, input_columns
 from hsv.bags.parameter_sections import ParameterSections
@@ -25,6 +35,9 @@ from hsv.model.faults.table import FAULT_KINDS, SENSOR
 from hsv.model.faults.table import fault_parameters as parameters_of
 from hsv.model.signals import INPUT_NAMES
 
+_LAW_NODES = (NOMINAL_TRAJECTORY.name, CONTROLLER.name, *CONTROLLERS)
+_STEP_TIME = "step_time_"
+
 
 def describe(bag: Bag) -> dict[str, Any]:
     """Return the contents and events of a bag; callers add to the dictionary, for example metrics.
@@ -33,9 +46,10 @@ def describe(bag: Bag) -> dict[str, Any]:
         ``path``, ``folder``, ``complete``, ``warnings`` (texts), ``start_s``, ``duration_s``, ``messages``, ``topics``,
         ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None without a published value),
         ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one entry per interval),
-        ``equipment`` (deviations of sensors, links, effectors and air from the ideal, SI), ``saturation``, ``tube`` and
-        ``not_covered`` (texts: properties of the flight outside the certificate of its design). The last six are None
-        if their topic is missing, ``not_covered`` also if parameters are. Times are simulated times in seconds;
+        ``equipment`` (deviations of sensors, links, effectors and air from the ideal, SI), ``step_times`` (wall times
+        of the steps of the control law in ms, by node, and the control period), ``saturation``, ``tube`` and
+        ``not_covered`` (texts: properties of the flight outside the certificate of its design). The last seven are None
+        if their topic is missing, ``not_covered`` also if parameters are. Other times are simulated times in seconds;
         ``end_s`` is None for an interval that lasts until the end of the bag.
     """
     start, end = bag.span
@@ -61,6 +75,7 @@ def describe(bag: Bag) -> dict[str, Any]:
         "ending": ending(bag) if STATE in bag.roles else None,
         "faults": faults,
         "equipment": _equipment(bag) if STATE in bag.roles else None,
+        "step_times": _step_times(bag) if DIAGNOSTICS in bag.roles and STATE in bag.roles else None,
         "saturation": _saturation(bag) if COMMAND in bag.roles else None,
         "tube": _tube(bag) if TUBE_STATUS in bag.roles else None,
         "not_covered": _not_covered(bag, faults) if TUBE_STATUS in bag.roles else None,
@@ -170,6 +185,32 @@ def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | N
         return uncovered(values, design_of(values), parse_json(report) if report else None, flown)
     except (HsvError, ValueError, LookupError, TypeError):
         return None  # the attachments are of another version or incomplete
+
+
+def _step_times(bag: Bag) -> dict[str, Any] | None:
+    """Return the times (ms) that the nodes of the control law reported last, and the control period (ms)."""
+    statistics = ("median_ms", "p99_ms", "max_ms")
+    nodes: dict[str, dict[str, float]] = {}
+    try:
+        for _, message in bag.decode(DIAGNOSTICS):
+            for status in message.status:
+                values = {pair.key.removeprefix(_STEP_TIME): pair.value for pair in status.values}
+                if (node := status.name.partition(":")[0]) in _LAW_NODES and values.keys() >= {*statistics}:
+                    nodes[node] = {name: float(values[name]) for name in statistics}
+        stamps = bag.times(STATE)
+    except (RecordingError, ValueError, AttributeError):
+        return None  # the diagnostics of something else
+    period = float(stamps[1] - stamps[0]) / 1e6 if len(stamps) > 1 else 0.0
+    return {"period_ms": period, "nodes": nodes} if nodes and period else None
+
+
+def step_times_in_words(step_times: dict[str, Any]) -> str:
+    """Return the wall times of the control law on one line."""
+    nodes = [
+        f"{name} {times['median_ms']:.3g} ms in the median, 99 % {times['p99_ms']:.3g}, largest {times['max_ms']:.3g}"
+        for name, times in step_times["nodes"].items()
+    ]
+    return "; ".join([*nodes, f"a period has {step_times['period_ms']:g} ms"])
 
 
 def _saturation(bag: Bag) -> dict[str, Any]:

@@ -340,6 +340,7 @@ def _conclude(
         simulated_time=float(data.time[-1]),
         wall_time=wall_time,
         not_covered=description["not_covered"],
+        step_times=description["step_times"],
         files=files,
     )
     report_flight(flown, units, json, strict, every)

@@ -205,6 +205,7 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
 
 
 def _print_description(description: dict[str, Any], units: UnitSystem) -> None:
+    from hsv.bags.info import step_times_in_words
     from hsv.cli.summary import print_section
     from hsv.flight.fingerprint import published_in_words
 
@@ -220,6 +221,7 @@ def _print_description(description: dict[str, Any], units: UnitSystem) -> None:
         "attached": attached or "nothing",
         "faults": _intervals(description["faults"], partial(_fault, units)),
         **_equipment(description["equipment"], units),
+        "control law": step_times_in_words(times) if (times := description["step_times"]) else "not recorded",
         "saturation": _saturation(description["saturation"]),
         "tube": _tube(description["tube"]),
         "fingerprint": f"{published}\n{description['fingerprint'] or ''}".rstrip(),

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.text import Text
 
@@ -44,6 +44,8 @@ class FlightSummary:
     """Wall time (s) that the flight took, where it is known."""
     not_covered: Sequence[str] | None
     """Items of the flight that the certificate does not cover; ``None``: not known."""
+    step_times: dict[str, Any] | None = None
+    """Wall times of the steps of the control law where they are recorded, see :func:`hsv.bags.info.describe`."""
     files: Mapping[str, Path] = field(default_factory=dict)
     """Written files by name."""
 
@@ -81,14 +83,21 @@ def report_flight(
                 "as_published": same,
                 "wall_time_s": wall_time,
                 "real_time_factor": factor,
+                "step_times": flight.step_times,
                 "not_covered": flight.not_covered,
                 **{name: str(path) for name, path in flight.files.items()},
             }
         )
     else:
+        law = {}
+        if flight.step_times:
+            from hsv.bags.info import step_times_in_words
+
+            law = {"control law": step_times_in_words(flight.step_times)}
         pace = f" in {significant(wall_time)} s, {significant(factor)} x real time" if wall_time and factor else ""
         run: dict[str, object] = {
             "flown": f"{time:.6g} s{pace}",
+            **law,
             **({"not covered": "; ".join(flight.not_covered)} if flight.not_covered else {}),
             **flight.files,
             # On a line of its own, it is as wide as a terminal.

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup, escape
 
+from hsv.bags.info import step_times_in_words
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.bags.reader import Bag
 from hsv.base.errors import RecordingError
@@ -86,6 +87,7 @@ def report_page(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.m
         sentence=sentence(runs),
         happened=happened(runs, differences),
         verdict=verdict,
+        step_times=step_times_in_words,
         picture=_picture(runs),
         effectors=any(curve.kind is Kind.effector for run in runs for c in run.curves.curves.values() for curve in c),
         equal=[found[0].panel.title for found in differences if not any(d.largest for d in found)],
