@@ -102,7 +102,7 @@ def test_a_reader_gets_what_it_lacks(hub, messages):
 
 
 def test_a_long_flight_is_thinned_and_keeps_its_beginning(hub, messages, monkeypatch):
-    monkeypatch.setattr(hub_module, "MOST_ROWS", len(hub._rows))
+    monkeypatch.setattr(hub_module, "MAX_ROWS", len(hub._rows))
     period = 20_000_000
     [state] = [index for index, message in enumerate(messages[:A_STEP]) if message[0] == "hsv/state"]
     generation = hub.history(0, 0).generation

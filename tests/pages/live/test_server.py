@@ -125,7 +125,7 @@ def test_who_never_reads_holds_nobody_up(hub, server, messages):
     for _ in range(20):
         # Far more than the system keeps for them.
         hub.start_run("2e" * 16, 0.02, 200)
-        hub.say(limits={"padding": ["x" * 100_000]})
+        hub.update(limits={"padding": ["x" * 100_000]})
         fly(hub, server, messages)
     while client.status.get("limits") != {"padding": ["x" * 100_000]} or len(client.data) < 201 * 4:
         assert client.read()

@@ -26,39 +26,41 @@ from hsv_node.middleware import LATCHED, type_name
 from hsv_node.process import ends_with
 
 ABSENT_AFTER = 3.0
-"""Seconds without a change in the ROS domain after which nobody is looked for who is not on this machine."""
+"""Time (s) without a change in the ROS domain after which a node without a sign of it on this machine is absent."""
 
 SILENT_AFTER = 30.0
-"""Seconds without a change in the ROS domain after which somebody who is there, or may be, is given up."""
+"""Time (s) without a change in the ROS domain after which waiting for an existing node ends."""
 
 SETTLED_AFTER = 3.0
-"""Seconds without a change in the topics after which all that there are are known."""
+"""Time (s) without a change in the topics after which discovery is complete."""
 
-WHOLE_AFTER = 1.0
-"""The same where all nodes of a graph are known."""
+COMPLETE_AFTER = 1.0
+"""As :data:`SETTLED_AFTER`, if all nodes of a graph are known."""
 
-SAY_AFTER = 5.0
-"""Seconds of waiting before the first message about it, and between messages."""
+MESSAGE_AFTER = 5.0
+"""Time (s) of waiting before the first message about it, and between messages."""
 
 INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
 
 _UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 """Name that rmw reports for a node whose endpoint is known but whose name is not yet."""
 
-_LOOK = 0.1
+_POLL = 0.1
+"""Time (s) between checks of a condition."""
 
 
 class GraphClient(Node):
-    """A node that is not of the graph: it asks, and is gone."""
+    """A temporary node outside the graph, which finds nodes of the graph and calls their services."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"hsv_{name}", enable_rosout=False, start_parameter_services=False)
 
     def find_run(self) -> Run:
-        """Return the run of the plant that is there.
+        """Return the current run of the plant.
 
         Raises:
-            RunError: There is none.
+            RunError: There is no run.
         """
         runs: list[Run] = []
         name = self._name_of(PLANT, roles.published, Run)
@@ -69,7 +71,7 @@ class GraphClient(Node):
         return runs[-1]
 
     def topic_of(self, role: NodeDescription, kind: type) -> str:
-        """Return the full name of the topic of a type that the node of the graph in ``role`` publishes.
+        """Return the full name of the topic of message type ``kind`` published by the node in ``role``.
 
         Raises:
             RunError: There is no such node.
@@ -78,12 +80,12 @@ class GraphClient(Node):
 
     @property
     def where(self) -> str:
-        """The domain and namespace in which this node looks for a graph."""
+        """Domain and namespace in which this node looks for a graph, as text."""
         namespace = self.get_namespace()
         return f"ROS_DOMAIN_ID={self.context.get_domain_id()}{f', namespace {namespace}' if namespace != '/' else ''}"
 
     def call(self, role: NodeDescription, kind: Any, request: Any) -> Any:
-        """Return the reply of a service, by its type, of the node of the graph in ``role``.
+        """Call the service of type ``kind`` of the node in ``role`` and return the reply.
 
         Raises:
             RunError: There is no such node, or it does not answer.
@@ -101,20 +103,21 @@ class GraphClient(Node):
         return self._others(self.get_publishers_info_by_topic(topic))
 
     def subscribers_of(self, topic: str) -> list[str]:
-        """Return the full names of the known nodes that subscribe ``topic``, except this one."""
+        """Return the full names of the known nodes that subscribe to ``topic``, except this one."""
         return self._others(self.get_subscriptions_info_by_topic(topic))
 
-    def settle(self, whole: Callable[[], object], enough: Callable[[], object]) -> None:
-        """Wait until nothing new comes for a while, a shorter one where the graph is ``whole``, or there is ``enough``.
+    def settle(self, complete: Callable[[], object], enough: Callable[[], object]) -> None:
+        """Wait until the topics and endpoints do not change any more, or until ``enough`` are known.
 
-        Beside a whole graph there are others that take part in its topics: a recorder, or who watches.
+        The wait is shorter if the graph is ``complete``. It is needed even then, because further nodes, such as a
+        recorder or a viewer, may use the topics of the graph.
         """
         standstill = Standstill()
         while not enough():
             still = standstill.look(self._endpoints())
-            if still >= (WHOLE_AFTER if whole() else SETTLED_AFTER):
+            if still >= (COMPLETE_AFTER if complete() else SETTLED_AFTER):
                 return
-            rclpy.spin_once(self, timeout_sec=_LOOK)
+            rclpy.spin_once(self, timeout_sec=_POLL)
 
     def _endpoints(self) -> list[tuple[str, int, int]]:
         names = (name for name, _ in self.get_topic_names_and_types())
@@ -123,19 +126,19 @@ class GraphClient(Node):
     def wait_for(
         self, done: Callable[[], object], what: str, published: Sequence[str] = (), for_ever: bool = False
     ) -> bool:
-        """Wait until ``done``; return whether it is.
+        """Wait until ``done`` is true; return whether it is.
 
         Args:
             done: Condition to wait for.
             what: Name of the condition in messages.
-            published: Where somebody has to be there, what he publishes. Who does on this machine may take his time;
-                otherwise nobody is long looked for.
-            for_ever: Whether to wait however long nothing changes.
+            published: Topics of a required node. If no process on this machine publishes one of them, the wait is
+                short.
+            for_ever: Whether to wait without a limit.
         """
-        standstill, says = Standstill(), Standstill()
+        standstill, message_pause = Standstill(), Standstill()
         absent = bool(published)
         while not done():
-            rclpy.spin_once(self, timeout_sec=_LOOK)
+            rclpy.spin_once(self, timeout_sec=_POLL)
             if absent:
                 absent = not any(
                     is_published(self.context.get_domain_id(), self.resolve_topic_name(topic)) for topic in published
@@ -143,15 +146,15 @@ class GraphClient(Node):
             still = standstill.look(sorted(self.get_node_names_and_namespaces()))
             if not for_ever and still > (ABSENT_AFTER if absent else SILENT_AFTER):
                 return False
-            if says.look(None) > SAY_AFTER:
-                says = Standstill()
+            if message_pause.look(None) > MESSAGE_AFTER:
+                message_pause = Standstill()
                 print(f"waiting for {what}", file=sys.stderr, flush=True)
         return True
 
     def _name_of(
         self, role: NodeDescription, offers: Callable[[Node, str, str], Mapping[str, Sequence[str]]], kind: type
     ) -> str | None:
-        """Return what the node in ``role`` calls that of its ``offers`` which is of a type, None without a node."""
+        """Return the name of the topic or service of type ``kind`` of the node in ``role``, or None without a node."""
         names: list[str] = []
 
         def found() -> bool:
@@ -166,21 +169,21 @@ class GraphClient(Node):
         raise RunError(f"no {role.name} in {self.where}: expected a node that publishes {role.known_by}")
 
     def _others(self, endpoints: Sequence[Any]) -> list[str]:
-        # An endpoint is known sooner than its node.
+        # Discovery finds an endpoint before the name of its node.
         known = [e for e in endpoints if e.node_name not in (_UNKNOWN_NODE, self.get_name())]
         return sorted({roles.full_name(e.node_name, e.node_namespace) for e in known})
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Refuses wrong words in one line."""
+    """A parser that reports wrong arguments in one line."""
 
     def error(self, message: str) -> NoReturn:
-        """End with exit code 2."""
+        """Print the message and end with exit code 2."""
         self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
 
 class _Prog(argparse.Action):
-    """Name of the command for its user, such as ``hsv set``, which precedes error messages."""
+    """Option that sets the command name in error messages, such as ``hsv set``."""
 
     def __call__(self, parser: argparse.ArgumentParser, _options: argparse.Namespace, values: Any, *_: object) -> None:
         parser.prog = values
@@ -191,16 +194,22 @@ def run_client(
     act: Callable[[GraphClient, argparse.Namespace], None],
     args: Sequence[str] | None = None,
 ) -> int:
-    """Run a command and return its exit code: 1 without a run, 2 if rejected, with one line each."""
-    given = list(sys.argv if args is None else args)
+    """Run a command and return its exit code: 1 without a run, 2 for a rejected request, each with a one-line error.
+
+    Args:
+        parser: Parser of the command, whose name is that of the node.
+        act: Function that executes the command.
+        args: Command line; default: ``sys.argv``.
+    """
+    arguments = list(sys.argv if args is None else args)
     name = parser.prog
     parser.add_argument("--prog", action=_Prog, help=argparse.SUPPRESS)
-    options = parser.parse_args(remove_ros_args(given)[1:])
+    options = parser.parse_args(remove_ros_args(arguments)[1:])
     clients: list[GraphClient] = []
     code = 1
     try:
         take_signals(signal.default_int_handler)
-        rclpy.init(args=given, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+        rclpy.init(args=arguments, signal_handler_options=rclpy.SignalHandlerOptions.NO)
         clients.append(GraphClient(name))
         act(clients[0], options)
         sys.stdout.flush()
@@ -208,7 +217,7 @@ def run_client(
     except KeyboardInterrupt:
         code = _refuse(parser.prog, "interrupted", INTERRUPTED)
     except BrokenPipeError:
-        # Nobody reads any more: Python must not find that out a second time at its end.
+        # The reader of the pipe has ended: redirect stdout, so that Python does not fail again when it exits.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 1
     except HsvError as error:
@@ -222,15 +231,15 @@ def run_client(
 
 
 def answer(text: str, values: Mapping[str, Any], as_json: bool) -> None:
-    """Print an answer: ``text`` for people, ``values`` as a JSON object on one line for programs."""
+    """Print an answer: ``text``, or ``values`` as a JSON object on one line if ``as_json``."""
     print(json_text(values) if as_json else text, flush=True)
 
 
 def acting_from(run: Run, step: int) -> tuple[str, dict[str, Any]]:
-    """Return from which time on something acts that begins at ``step``, in words and as numbers.
+    """Return the time at which a change at ``step`` takes effect, as text and as numbers.
 
     Raises:
-        RunError: The run will have ended before.
+        RunError: The run ends before this step.
     """
     if step > run.last_step:
         raise RunError(f"the run ends with step {run.last_step}: what begins at step {step} does not act any more")

@@ -1,4 +1,4 @@
-"""The live node: shows a flight while it is flown, to Foxglove and on a page, and asks the nodes what the page asks."""
+"""The live node: displays a running flight in Foxglove and on a page, and forwards the page's commands to the nodes."""
 
 from __future__ import annotations
 
@@ -54,27 +54,26 @@ from hsv_node.process import ProcessNode
 from hsv_node.roles import full_name, node_in_role, services
 
 RATE = 20.0
-"""Looks a second at what has come: rows of the page, and batches for Foxglove."""
+"""Polls per second, Hz: rows of the page, and batches for Foxglove."""
 
 AT_ONCE = 100
-"""Steps that are decoded at most in one look, of a flight that was on its way before anybody looked at its page."""
+"""Maximum number of steps decoded per poll, when a page is opened during a flight."""
 
 DEPTH = 1000
-"""Messages of a topic that wait to be taken: of a flight at full speed some are lost here, at real-time pace only where
-this process gets no processor time for 20 s."""
+"""Depth of the queue of a topic, messages: 20 s in real time; at full speed messages may be lost."""
 
 WATCHING = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""No publisher waits for who watches."""
+"""Quality of service of a viewer, for which no publisher waits."""
 
-_LOOK = 1.0
-"""Seconds between two looks for the plant."""
+_PLANT_CHECK = 1.0
+"""Time (s) between two checks for the plant."""
 
 
 class LiveExecutor(FlowExecutor):
-    """Sleeps until a look is due, and not until a message comes: a hundred of them cost little more than one."""
+    """An executor that polls at a fixed rate, because many messages at once cost little more than one."""
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Sleep for so long, then take all messages that have arrived, and check for replies of services."""
+        """Sleep for the timeout (s), then take all messages that have arrived, and check for replies of services."""
         time.sleep(timeout_sec or 0.0)
         self.drain()
         if any(True for node in self.get_nodes() for _ in node.clients):
@@ -83,25 +82,25 @@ class LiveExecutor(FlowExecutor):
 
 @dataclass
 class _Request:
-    """Something that was asked of a node, until it is answered or given up."""
+    """A pending service request to a node."""
 
     role: NodeDescription
     kind: Any
     request: Any
     done: Callable[[Any], None]
-    """Takes the response."""
+    """Function called with the response."""
     refused: Callable[[str], None]
-    """Takes why there is none."""
+    """Function called with the reason if there is no response."""
     client: Client | None = None
     future: Future | None = None
     standstill: Standstill = field(default_factory=Standstill)
 
 
 class LiveNode(ProcessNode):
-    """Forwards the messages unchanged, samples them for the page, and carries out the commands of the page."""
+    """A node that forwards the messages unchanged, samples them for the page, and executes the page's commands."""
 
     def __init__(self) -> None:
-        # What it said and had for parameters would be recorded with the flight.
+        # Without rosout and parameter services, so that nothing of this node is recorded with the flight.
         super().__init__(LIVE.name, enable_rosout=False, start_parameter_services=False)
         refuse_unknown(self, LIVE.name, self.of_others)
         values = declare(self, LIVE_PARAMETERS)
@@ -114,10 +113,10 @@ class LiveNode(ProcessNode):
         self.page = PageServer(values["live.page_port"], self.hub, layout)
         self._run: Run | None = None
         self._plant = ""
-        """Full name of the plant's node, once it has answered."""
+        """Full name of the plant, once it is found."""
         self._requests: list[_Request] = []
-        self._next_look = self._looks_for_plant = time.monotonic()
-        # In the order in which they are looked at: a run before its messages, its end behind them.
+        self._next_poll = self._next_plant_check = time.monotonic()
+        # The executor takes subscriptions in this order: a run before its messages, its end after them.
         self.create_subscription(Run, RUN, self._on_run, LATCHED, raw=True)
         for topic in TOPICS:
             self._watch(topic, partial(self._on_step_message, topic, self._names[topic]))
@@ -131,31 +130,31 @@ class LiveNode(ProcessNode):
 
     def poll(self) -> None:
         """Sample the messages that have arrived, and continue with the commands."""
-        self._next_look = max(self._next_look + 1.0 / RATE, time.monotonic())
+        self._next_poll = max(self._next_poll + 1.0 / RATE, time.monotonic())
         self.hub.sample()
         if self.page.watched:
             self.hub.decode(AT_ONCE)
         while not self.page.commands.empty():
-            self._carry_out(*self.page.commands.get())
+            self._execute(*self.page.commands.get())
         for request in list(self._requests):
-            if self._settled(request):
+            if self._finished(request):
                 self._requests.remove(request)
                 if request.client is not None:
                     self.destroy_client(request.client)
-        if time.monotonic() >= self._looks_for_plant:
-            self._looks_for_plant = time.monotonic() + _LOOK
-            self._look_for_plant()
+        if time.monotonic() >= self._next_plant_check:
+            self._next_plant_check = time.monotonic() + _PLANT_CHECK
+            self._check_plant()
         self.page.publish()
 
     def wait_timeout(self) -> float:
-        """Wait for the next look."""
-        return max(self._next_look - time.monotonic(), 0.0)
+        """Return the time (s) to the next poll."""
+        return max(self._next_poll - time.monotonic(), 0.0)
 
     def close(self) -> None:
         """Show the last messages, and disconnect the viewers."""
         if isinstance(self.executor, LiveExecutor):
             self.executor.drain()
-        self._look_for_plant()
+        self._check_plant()
         if self.page.watched:
             self.hub.sample()
             self.hub.decode()
@@ -202,23 +201,23 @@ class LiveNode(ProcessNode):
                 self.hub.note(f"{node}: {status.message}", warning=True)
 
     def _on_parameter_event(self, event: ParameterEvent) -> None:
-        """Follow changes of the plant's pace."""
+        """Update the settings when parameters of the plant change."""
         if event.node == self._plant:
             self._on_settings({p.name: parameter_value_to_python(p.value) for p in event.changed_parameters})
 
     def _on_settings(self, values: dict[str, Any]) -> None:
         settings = {name: value for name, value in values.items() if name in SETTABLE}
-        self.hub.say(settings=self.hub.status()["settings"] | settings)
+        self.hub.update(settings=self.hub.status()["settings"] | settings)
 
     def _on_limits(self, values: dict[str, Any]) -> None:
         low, high = (list(values.get(f"input.{end}") or ()) for end in ("minimum", "maximum"))
-        self.hub.say(limits=dict(zip(INPUTS, zip(low, high, strict=False), strict=False)))
+        self.hub.update(limits=dict(zip(INPUTS, zip(low, high, strict=False), strict=False)))
 
-    def _look_for_plant(self) -> None:
-        """Note the end of a run whose plant is gone without a word."""
+    def _check_plant(self) -> None:
+        """Record the end of a run if the plant has disappeared without announcing it."""
         if self._run is None or self.hub.status()["ending"] is not None:
             return
-        # Known once it has published.
+        # The plant can be missing only after it has published.
         if self.hub.time and not self.count_publishers(STATE):
             self.hub.end(VehicleState.RUNNING, round(self.hub.time * 1e-9 / self._run.period))
 
@@ -230,18 +229,18 @@ class LiveNode(ProcessNode):
         def done(response: GetParameters.Response) -> None:
             take(dict(zip(names, map(parameter_value_to_python, response.values), strict=False)))
 
-        # A controller that is a node of its own may have none of them: then they are not shown.
+        # An external controller may not have these parameters; the page then omits them.
         self._requests.append(
             _Request(role, GetParameters, GetParameters.Request(names=names), done, lambda reason: None)
         )
 
-    def _carry_out(self, command: Command, answer: Answer) -> None:
+    def _execute(self, command: Command, answer: Answer) -> None:
         def refuse(why: str) -> None:
             answer({"accepted": False, "message": why})
 
         def acknowledge(words: str, step: int) -> None:
             period = self._run.period if self._run else 0.0
-            if isinstance(command, Change):  # faults are noted when they act
+            if isinstance(command, Change):  # the hub adds events for faults when they act
                 self.hub.note(words, step=step)
             answer({"accepted": True, "message": f"{words}, t = {step * period:.2f} s", "step": step})
 
@@ -260,8 +259,8 @@ class LiveNode(ProcessNode):
         kind, request = _service_request(command)
         self._requests.append(_Request(command.node, kind, request, done, refuse))
 
-    def _settled(self, request: _Request) -> bool:
-        """Go on with a request; return whether it is answered or given up."""
+    def _finished(self, request: _Request) -> bool:
+        """Continue with a request; return whether it is answered or abandoned."""
         if request.future is not None and request.future.done():
             request.done(request.future.result())
             return True
@@ -286,7 +285,7 @@ class LiveNode(ProcessNode):
 
 
 def _service_request(command: Command) -> tuple[Any, Any]:
-    """Return the type of the service that carries a command out, and its request."""
+    """Return the type of the service that executes a command, and the request."""
     if isinstance(command, Change):
         parameter = RosParameter(command.parameter.name, value=command.value).to_parameter_msg()
         return SetParameters, SetParameters.Request(parameters=[parameter])

@@ -1,4 +1,4 @@
-"""Emulates all peers of one node: feeds it from a bag, step by step, and writes down what it answers."""
+"""Emulator of all peers of one node: it feeds the node from a bag, step by step, and records the outputs."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from hsv_node.parameters import declare
 
 
 class PeerEmulatorNode(LockstepNode):
-    """Emulates the peers of ``peer_emulator.node``, each under its own name, from the messages in a bag."""
+    """A node that emulates the peers of ``peer_emulator.node``, each under its name, with the messages in a bag."""
 
     def __init__(self) -> None:
         super().__init__(description.PEER_EMULATOR, "replay")
@@ -59,7 +59,7 @@ class PeerEmulatorNode(LockstepNode):
         self._standstill = Standstill()
 
     def _emulate(self, peer: NodeDescription, me: NodeDescription) -> Iterator[tuple[str, Any]]:
-        """Make a node that is known for ``peer`` by what it publishes, and yield its publishers by topic."""
+        """Create a node with the topics of ``peer``, which identify it, and yield its publishers by topic."""
         node = rclpy.create_node(
             peer.name, namespace=self.get_namespace(), context=self.context, use_global_arguments=False
         )
@@ -72,7 +72,7 @@ class PeerEmulatorNode(LockstepNode):
                 node.create_subscription(message_class(description.TOPICS[topic]), topic, _ignore, STEP, raw=True)
 
     def _join(self) -> bool:
-        """Announce a run to the node under test, or everybody as ready to a plant; return whether to start."""
+        """Announce a run to the node under test, or all peers as ready to a plant; return whether to start at once."""
         if self._is_plant:
             self._announcer = self.create_publisher(Ready, description.READY, LATCHED)
             self.create_subscription(Run, description.RUN, self._on_run, LATCHED)
@@ -103,9 +103,9 @@ class PeerEmulatorNode(LockstepNode):
         self._feed()
 
     def _feed(self) -> None:
-        """Give the next step to the node under test if it has answered to the one before."""
+        """Send the next step to the node under test if it has answered the previous one."""
         done = min(self._answered.values())
-        # The plant speaks first: its answer to nothing is the first state.
+        # The plant publishes the first state without an input.
         if done >= self._steps and (not self._is_plant or self._fed >= self._steps):
             self.finish(0)
         elif self._fed < self._steps and done >= self._fed + self._is_plant:
@@ -120,13 +120,13 @@ class PeerEmulatorNode(LockstepNode):
                 self.finish(0)
 
     def poll(self) -> None:
-        """Start when the links are connected; give up on a node that does not answer."""
-        if not self._is_plant and self._ready and self._fed == 0 and self._heard_by_node():
+        """Start when the links are connected; end if the node under test does not answer in time."""
+        if not self._is_plant and self._ready and self._fed == 0 and self._connected():
             self._feed()
         answers = sum(self._answered.values())
         if not answers and not self._fed:
-            # However long it takes to start: whoever has started it sees it end or hang.
-            self.say_waiting(lambda: [self._under_test], decides=True)
+            # There is no limit for the start of the node: its launcher sees whether it ends or hangs.
+            self.log_waiting(lambda: [self._under_test], decides=True)
         elif self._standstill.look((self._fed, answers)) > self._limit:
             silent = [topic for topic, count in self._answered.items() if count <= min(self._answered.values())]
             self.get_logger().fatal(
@@ -135,24 +135,24 @@ class PeerEmulatorNode(LockstepNode):
             )
             self.finish(1)
 
-    def _heard_by_node(self) -> bool:
+    def _connected(self) -> bool:
         return all(publisher.get_subscription_count() > 0 for publisher in self._feeds.values()) and all(
             self.count_publishers(topic) > 0 for topic in self._answered
         )
 
     def stopped(self, signal_number: int) -> int:
-        """Say that the replay is incomplete."""
+        """Return the exit code of an incomplete replay."""
         return 128 + signal_number
 
     def close(self) -> None:
-        """Finish the bag of answers."""
+        """Finish the bag with the outputs."""
         for peer in self._peers.values():
             peer.destroy_node()
         self._output.close()
 
 
 def _ignore(_: bytes) -> None:
-    """The link is there for its name; the answers are read once, by the emulator itself."""
+    """Ignore a message: the subscription only makes the peer visible, and the emulator itself reads the answers."""
 
 
 def main(args: Sequence[str] | None = None) -> int:

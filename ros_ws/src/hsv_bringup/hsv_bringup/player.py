@@ -19,7 +19,7 @@ from hsv.bags.description import CLOCK, PLANT, RECORDER, TOPICS
 from hsv.bags.reader import Bag
 from hsv.bags.topic import Qos
 from hsv.base.errors import ParameterError, RecordingError
-from hsv_node.lockstep import SAID_EVERY
+from hsv_node.lockstep import LOG_INTERVAL
 from hsv_node.main import run_node
 from hsv_node.middleware import message_class
 from hsv_node.parameters import refuse_sim_time, refuse_unknown
@@ -98,7 +98,7 @@ class PlayerNode(ProcessNode):
         if not slow:
             self.finish(0)
         elif time.monotonic() > self._says:
-            self._says = time.monotonic() + SAID_EVERY
+            self._says = time.monotonic() + LOG_INTERVAL
             self.get_logger().info("waiting for slow subscribers of " + ", ".join(slow))
 
     def _publish(self) -> None:

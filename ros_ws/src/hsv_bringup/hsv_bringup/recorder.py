@@ -41,7 +41,7 @@ from hsv.flight.blocks import Signals
 from hsv.graph.snapshot import Snapshot
 from hsv_bringup.flow_executor import BatchExecutor
 from hsv_bringup.peer_parameters import GIVE_UP_AFTER, PeerParameters
-from hsv_node.lockstep import SAID_EVERY, PeerNode
+from hsv_node.lockstep import LOG_INTERVAL, PeerNode
 from hsv_node.main import run_node
 from hsv_node.middleware import LATCHED, STEP, message_class
 from hsv_node.parameters import declare
@@ -164,7 +164,7 @@ class RecorderNode(PeerNode):
         if stamp <= self._now and self._complete >= 0:
             # Each topic keeps its order: whoever sends this is not of the graph.
             self.get_logger().error(
-                f"{topic} at {stamp * 1e-9:.2f} s: is written already, ignored", throttle_duration_sec=SAID_EVERY
+                f"{topic} at {stamp * 1e-9:.2f} s: is written already, ignored", throttle_duration_sec=LOG_INTERVAL
             )
             return
         step = self._pending.setdefault(stamp, {})

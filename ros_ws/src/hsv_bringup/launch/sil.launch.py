@@ -1,9 +1,9 @@
-"""Launch the graph of the bench; ends with the summary, the verdict and the exit code of its flight.
+"""Launch the node graph; end with the summary, the verdict and the exit code of the flight.
 
 ros2 launch hsv_bringup sil.launch.py scenario:=case1
 
-It runs under the interpreter of the ROS 2 installation, which need not have the packages that the bench computes with.
-So it asks the command ``hsv``, which the build has installed for its own interpreter, for the prepared run.
+This file runs under the interpreter of the ROS 2 installation, which may lack the packages of the bench. It therefore
+prepares the run with the command ``hsv``, which runs under the interpreter of the build.
 """
 
 import atexit
@@ -49,7 +49,7 @@ ARGUMENTS = {
     "log_level": ("info", "what the nodes log: debug, info, warn, error or fatal"),
     "namespace": ("/", "namespace of all nodes and topics, such as /veh1: several graphs fly in one domain"),
 }
-"""Default and description of each, by name; those of hsv run, as launch files spell them."""
+"""Default and description of each launch argument; the arguments correspond to the options of hsv run."""
 
 CHOICES = {
     "composed": ("true", "false"),
@@ -62,17 +62,23 @@ CHOICES = {
 }
 
 LAUNCH_OWN = ("emulate_tty", "launch-prefix", "launch-prefix-filter", "sigkill_timeout", "sigterm_timeout")
-"""Arguments that every launch file takes."""
+"""Arguments common to all launch files."""
 
 GRACE = 20
-"""Seconds between asking a node to end and forcing it: on a busy machine the recorder takes its time."""
+"""Time (s) between SIGTERM and SIGKILL for a node; on a busy machine the recorder needs several seconds."""
 
 
 class Flight:
-    """The processes of one run: ends them all with the first, has the flight concluded, and keeps its verdict."""
+    """The processes of one run: when the first ends, the others are ended, and the flight is concluded."""
 
     def __init__(self, hsv: str, run: dict[str, Any], options: dict[str, str]) -> None:
-        """Take what ``hsv prepare`` has printed, the path of that command, and the launch arguments."""
+        """Prepare a flight.
+
+        Args:
+            hsv: Path of the command ``hsv``.
+            run: Output of ``hsv prepare``.
+            options: Launch arguments by name.
+        """
         self._hsv = hsv
         self._run = run
         self._options = options
@@ -103,7 +109,7 @@ class Flight:
         # Losing a viewer does not end the flight.
         if node["in_flight"] and not self._ending:
             self._ending = True
-            # Whoever ends first ends the run: the plant when it has landed, any other when something went wrong.
+            # The first process to end determines the outcome: the plant ends after the flight, others on a failure.
             if not (node["ends_run"] and code in self._run["landed_exit_codes"]):
                 what = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
                 self._failure = f"{node['name']} {what}"
@@ -126,17 +132,17 @@ class Flight:
             self._verdict = f"{self._run['bag']}: {self._failure or 'the flight was lost'}"
 
     def on_shutdown(self, _: Shutdown, __: LaunchContext) -> None:
-        """End with exit code 1 after a lost flight: launch does so after an exception, and prints its message."""
+        """Raise the verdict on a lost flight, so that launch prints it and ends with exit code 1."""
         verdict, self._verdict = self._verdict, ""
         if verdict:
             raise RuntimeError(verdict)
 
 
 def prepare(context: LaunchContext) -> list[Action]:
-    """Return the actions that start the nodes of a prepared run; end with exit code 2 on bad arguments."""
+    """Prepare the run and return the actions that start its nodes; end with exit code 2 on bad arguments."""
     options = {name: context.launch_configurations[name] for name in ARGUMENTS}
     if Path(__file__).name in (Path(word).name for word in sys.argv):
-        # Those of the command line are for this file, and not for one that includes it.
+        # Check the command line only if this file was launched directly, not if another file includes it.
         refuse_unknown(argument.split(":=")[0] for argument in context.argv)
     folder = tempfile.mkdtemp(prefix="hsv_launch_")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -157,13 +163,13 @@ def prepare(context: LaunchContext) -> list[Action]:
     run = json.loads(done.stdout)
     atexit.register(remove_if_empty, run["bag"])
     flight = Flight(hsv, run, options)
-    # Last of all handlers, because after an exception those that follow are left out.
+    # Register it as the last handler, because launch skips the handlers after an exception.
     context.register_event_handler(OnShutdown(on_shutdown=flight.on_shutdown), append=True)
     return flight.actions()
 
 
 def refuse_unknown(names: Any) -> None:
-    """Refuse the first of ``names`` that is no argument, which launch itself would ignore."""
+    """Refuse the first unknown argument in ``names``, which launch itself would ignore."""
     for name in names:
         if name not in (*ARGUMENTS, *LAUNCH_OWN):
             near = difflib.get_close_matches(name, ARGUMENTS, n=1)
@@ -172,18 +178,18 @@ def refuse_unknown(names: Any) -> None:
 
 
 def refuse(problem: str, code: int = 2) -> None:
-    """End with one line and exit code ``code`` while nothing runs yet, otherwise as launch does after an error."""
+    """End with a one-line error and exit code ``code``, or raise the error if processes are running already."""
     print(f"sil.launch.py: error: {problem}", file=sys.stderr, flush=True)
     try:
         os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
     except ChildProcessError:
         raise SystemExit(code) from None
-    # Included by a file that has started processes: launch ends them, and then with exit code 1.
+    # An including file has started processes: launch ends them and exits with code 1.
     raise RuntimeError(problem)
 
 
 def as_arguments(text: str) -> str:
-    """Return ``text`` with the options of hsv spelled as launch arguments."""
+    """Return ``text`` with options of hsv replaced by launch arguments."""
     for name in ARGUMENTS:
         text = text.replace("--" + name.replace("_", "-"), name).replace(name.replace("_", "-") + " =", name + " =")
     return text
@@ -196,7 +202,7 @@ def remove_if_empty(bag: str) -> None:
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the nodes of the graph with the parameters of a scenario."""
+    """Return the launch description of the graph for a scenario."""
     declared = [
         DeclareLaunchArgument(name, default_value=default, description=description, choices=CHOICES.get(name))
         for name, (default, description) in ARGUMENTS.items()

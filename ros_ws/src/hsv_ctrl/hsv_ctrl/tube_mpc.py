@@ -116,7 +116,7 @@ class TubeMpcNode(TubeNode):
                     step = self._law.change_tau(values)
                 except ParameterError as error:
                     return SetParametersResult(successful=False, reason=str(error))
-                self.say_change(f"{TAU.name} = {values} from step {step} on")
+                self.log_change(f"{TAU.name} = {values} from step {step} on")
         return SetParametersResult(successful=True)
 
 

@@ -1,4 +1,4 @@
-"""Base of all nodes: parameters, links of the graph description, the ready barrier, diagnostics."""
+"""Base classes of all nodes: parameters, links of the graph description, ready barrier and diagnostics."""
 
 from __future__ import annotations
 
@@ -26,27 +26,28 @@ from hsv_node.parameters import declare, refuse_unknown
 from hsv_node.process import ProcessNode
 from hsv_node.roles import full_name, node_in_role, published_types
 
-FIRST_SAID_AFTER = 2.0
-"""Seconds of waiting for peers before this is said."""
+FIRST_LOG_AFTER = 2.0
+"""Time (s) of waiting for peers before the first message about it."""
 
-SAID_EVERY = 10.0
-"""Seconds between repeated messages."""
+LOG_INTERVAL = 10.0
+"""Time (s) between repeated messages."""
 
-LINK_LOOK = 0.05
-"""Seconds between looks at the links before they stand; each takes a millisecond from those that still start."""
+LINK_CHECK = 0.05
+"""Time (s) between checks of the links until they are matched. A check takes about 1 ms, which slows the start."""
 
 WARN_AFTER = 10.0
-"""Seconds after which a node that waits for all others logs a warning."""
+"""Time (s) after which a node that waits for all others logs a warning."""
 
 
 class LockstepNode(ProcessNode):
     """A node of the graph description that reacts to the messages of a step and never to timers.
 
-    Its peers are known by what they publish, not by their names, which may be remapped as those of the topics may.
+    It identifies its peers by the types of the messages that they publish, because names of nodes and topics may be
+    remapped.
 
     Raises:
         RunError: Another node of this machine publishes its topics in the same domain and namespace.
-        ParameterError: A wrong parameter, named; such as a ``controller`` that nobody knows.
+        ParameterError: A wrong parameter, such as an unknown ``controller``.
     """
 
     def __init__(self, role: NodeDescription, task: str = "") -> None:
@@ -54,7 +55,7 @@ class LockstepNode(ProcessNode):
 
         Args:
             role: Role of the node in the graph.
-            task: Task named in its diagnostics, in a word or two.
+            task: Short name of the task in the diagnostics.
         """
         super().__init__(role.name)
         self._task = task
@@ -75,20 +76,20 @@ class LockstepNode(ProcessNode):
         self._diagnostics = self.create_publisher(DiagnosticArray, description.DIAGNOSTICS, STEP)
         self._diagnosed_second = -1
         self._made = time.monotonic()
-        self._says_next = self._made + FIRST_SAID_AFTER
+        self._next_log = self._made + FIRST_LOG_AFTER
         self._changed = ""
-        """Parameter that is being changed, and the step at which the change takes effect."""
+        """Description of the current parameter change, with the step at which it takes effect."""
         self._foreign = 0
-        self._foreign_said = -SAID_EVERY
+        self._foreign_logged = -LOG_INTERVAL
         self._links: dict[str, list[NodeDescription]] = {}
         self.linked: dict[str, str] = {}
-        """Full names of the nodes at the other ends of the links, by role, as :meth:`missing_links` last saw them."""
+        """Full names of the linked nodes by role, as of the last :meth:`missing_links`."""
         if role.known_by:
             for topic, peer in description.links(self.role, self.controller, self.recorded, self.estimator):
                 self._links.setdefault(topic, []).append(peer)
 
     def create_step_subscription(self, topic: str, callback: Callable[[bytes], None]) -> None:
-        """Subscribe to a step topic of the graph description; ``callback`` takes the bytes of a message."""
+        """Subscribe to a step topic of the graph description; ``callback`` is called with the bytes of a message."""
 
         def take(message: bytes) -> None:
             if self.exit_code is not None:
@@ -102,27 +103,27 @@ class LockstepNode(ProcessNode):
         self._inputs[topic] = self.create_subscription(kind, topic, take, STEP, raw=True)
 
     def refuse_message(self, topic: str, error: RunError) -> str:
-        """Shut down because of a message that cannot be used; return what has been logged."""
+        """Shut down because of an invalid message; return the logged error."""
         logged = f"{self.resolve_topic_name(topic)}: {error}"
-        # Not raised: the executor would print a traceback.
+        # The error is logged and not raised, because the executor would print a traceback.
         self.get_logger().fatal(logged)
         self.finish(1)
         return logged
 
     def create_step_publisher(self, topic: str) -> Callable[[bytes], None]:
-        """Return the function that publishes the bytes of a message on a step topic of the graph description."""
+        """Return a function that publishes the bytes of a message on a step topic of the graph description."""
         kind = description.TOPICS[topic]
         self._outputs[topic] = publisher = self.create_publisher(message_class(kind), topic, STEP)
-        # Of the handle: before it, rclpy asks what it is given, and that takes half as long as to publish it.
+        # Use the handle: the type check in rclpy's publish() takes half as long as the publication.
         publish: Callable[[bytes], None] = publisher.handle.publish_raw
         return publish
 
     def links_are_counted(self) -> bool:
-        """Return whether as many endpoints are matched as there are links: a fast check that does not identify them."""
+        """Return whether enough endpoints are matched for all links; a fast check that does not identify the nodes."""
         return all(self._matched(topic) >= len(roles) for topic, roles in self._links.items())
 
     def missing_links(self) -> list[str]:
-        """Return what this node still waits for, e.g. ``"tube_mpc (/hsv/nominal)"``; empty when all is matched."""
+        """Return the missing links, such as ``"tube_mpc (/hsv/nominal)"``; empty when all links are matched."""
         missing = []
         types_of: dict[tuple[str, str], set[str]] = {}
         self.linked = {}
@@ -142,12 +143,12 @@ class LockstepNode(ProcessNode):
                 if node not in types_of:
                     types_of[node] = published_types(self, *node)
                 found = {role.name: full_name(*node) for role in roles if role.known_by in types_of[node]}
-                # What was built from other message files would be matched, and read as something else.
+                # DDS matches nodes built from other message definitions, but their messages would be misread.
                 (there if endpoint.topic_type_hash in definitions else different).update(found)
             self.linked |= there
             absent = [role for role in roles if role.name not in there]
-            # Types say who is there, counts that the link itself stands: both are needed before the first message. Who
-            # only watches counts for none of them.
+            # A link needs the node, identified by its types, and a matched endpoint, which is counted. Viewers are not
+            # counted.
             absent = absent or roles[max(self._matched(topic) - self._watching(seen, topic, there), 0) :]
             kind = description.TOPICS[topic]
             missing += [
@@ -158,18 +159,18 @@ class LockstepNode(ProcessNode):
         return missing
 
     def node_in_role(self, role: NodeDescription) -> str | None:
-        """Return the full name of the node that plays ``role`` in this graph, None if there is none."""
+        """Return the full name of the node in ``role`` in this graph, or None."""
         if role.name in self.linked:
             return self.linked[role.name]
         found = node_in_role(self, role)
         return full_name(*found) if found else None
 
-    def say_waiting(self, missing: Callable[[], Sequence[str]], decides: bool = False) -> None:
-        """Log from time to time for which nodes this one waits; as a warning if its waiting ``decides`` the start."""
+    def log_waiting(self, missing: Callable[[], Sequence[str]], decides: bool = False) -> None:
+        """Log from time to time the nodes that this node waits for; a warning if this node ``decides`` the start."""
         now = time.monotonic()
-        if now < self._says_next:
+        if now < self._next_log:
             return
-        self._says_next = now + SAID_EVERY
+        self._next_log = now + LOG_INTERVAL
         words = "waiting for " + ", ".join(missing())
         if decides and now - self._made > WARN_AFTER:
             self.get_logger().warning(f"slow start, for {now - self._made:.0f} s {words}")
@@ -177,19 +178,19 @@ class LockstepNode(ProcessNode):
             self.get_logger().info(words)
 
     def publishers_of(self, topic: str) -> list[str]:
-        """Return the full names of the nodes that publish ``topic``, one for each that does."""
+        """Return the full names of the publishers of ``topic``, one per endpoint."""
         return sorted(
             full_name(endpoint.node_name, endpoint.node_namespace)
             for endpoint in self.get_publishers_info_by_topic(topic)
         )
 
-    def say_foreign(self, topic: str, step: int, expected: int) -> None:
-        """Log from time to time that messages arrive that no node of this graph should send."""
+    def log_foreign(self, topic: str, step: int, expected: int) -> None:
+        """Log from time to time that messages with an unexpected step arrive, which come from outside this graph."""
         self._foreign += 1
         now = time.monotonic()
-        if now < self._foreign_said + SAID_EVERY:
+        if now < self._foreign_logged + LOG_INTERVAL:
             return
-        self._foreign_said = now
+        self._foreign_logged = now
         publishers = self.publishers_of(topic)
         self.get_logger().error(
             f"{self._inputs[topic].topic_name} of step {step}: expected {expected}, ignored ({self._foreign} so far; "
@@ -197,15 +198,15 @@ class LockstepNode(ProcessNode):
         )
 
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
-        """Put into the result the step at which a change in flight takes effect."""
+        """Set the parameters; the result states the step at which a change in flight takes effect."""
         self._changed = ""
         result = super().set_parameters_atomically(parameter_list)
         if result.successful:
             result.reason = self._changed
         return result
 
-    def say_change(self, words: str) -> None:
-        """Log a change in flight and the step at which it takes effect, and send the same as the reply."""
+    def log_change(self, words: str) -> None:
+        """Log a change in flight with the step at which it takes effect; the reply to the change has the same text."""
         self._changed = words
         self.get_logger().info(words)
 
@@ -214,7 +215,7 @@ class LockstepNode(ProcessNode):
         return signals.stamp[0] != self._diagnosed_second
 
     def diagnose(self, signals: Signals, summary: str = "running", warning: bool = False, **values: object) -> None:
-        """Publish this node's diagnostics: once a simulated second, see :meth:`diagnosis_due`, and as a warning."""
+        """Publish the diagnostics of this node; nodes do so once per simulated second and for warnings."""
         self._diagnosed_second = signals.stamp[0]
         status = DiagnosticStatus(
             level=DiagnosticStatus.WARN if warning else DiagnosticStatus.OK,
@@ -228,7 +229,7 @@ class LockstepNode(ProcessNode):
         self._diagnostics.publish(message)
 
     def _watching(self, seen: Sequence[TopicEndpointInfo], topic: str, linked: Mapping[str, str]) -> int:
-        """Return how many of the endpoints ``seen`` are of nodes that are not ``linked``, and matched all the same."""
+        """Return the number of endpoints in ``seen`` that are matched although their nodes are not ``linked``."""
 
         def ends(other: QoSProfile) -> tuple[QoSProfile, QoSProfile]:
             return (STEP, other) if topic in self._outputs else (other, STEP)
@@ -247,9 +248,9 @@ class LockstepNode(ProcessNode):
 
 
 class PeerNode(LockstepNode):
-    """A node other than the plant: it announces itself ready to every run that the plant announces.
+    """A node other than the plant, which announces that it is ready for each run of the plant.
 
-    How the run ended it learns from the plant; a plant that is gone without a word has broken it off.
+    The plant announces the end of the run; if it disappears without doing so, the run counts as broken off.
     """
 
     def __init__(self, role: NodeDescription, task: str = "") -> None:
@@ -257,29 +258,29 @@ class PeerNode(LockstepNode):
         self._run: Run | None = None
         self._announced = self._over = False
         self._ready = self.create_publisher(Ready, description.READY, LATCHED)
-        # Before the run, so that the end of one is heard before the beginning of the next.
+        # Subscribe before /hsv/run, so that the end of a run is received before the start of the next.
         self.create_subscription(VehicleState, description.LAST_STATE, self._on_last_state, LATCHED)
         links = SubscriptionEventCallbacks(matched=self._on_plant)
         self._runs = self.create_subscription(Run, description.RUN, self._on_run, LATCHED, event_callbacks=links)
 
     def start_run(self, run: Run) -> None:
-        """Forget the run before; overridden by every node."""
+        """Reset the node for a new run; overridden by every node."""
 
     def end_run(self, how: str) -> None:
-        """Say how the run ended; overridden where there is more to say."""
+        """Log how the run ended; subclasses may do more."""
         self.get_logger().info(how)
 
     @property
     def announced(self) -> Run | None:
-        """The run that this node has announced itself ready for, if there is one."""
+        """The run for which this node has announced itself ready, or None."""
         return self._run if self._announced else None
 
     def missing(self) -> list[str]:
-        """Return what this node waits for before it is ready; overridden where that is more than links."""
+        """Return the missing conditions for this node to be ready; subclasses may add to the links."""
         return self.missing_links()
 
     def poll(self) -> None:
-        """Announce this node as ready as soon as all its links are matched; until then log which peers it waits for."""
+        """Announce this node as ready as soon as all its links are matched; until then log the missing peers."""
         if self._announced:
             return
         if self._run is not None and self.links_are_counted() and not self.missing():
@@ -287,11 +288,11 @@ class PeerNode(LockstepNode):
             self._ready.publish(Ready(node=self.role.name, run_id=self._run.run_id))
             self.get_logger().info(f"ready for {run_in_words(self._run)}")
         else:
-            self.say_waiting(lambda: self.missing() or [f"plant ({self._runs.topic_name})"])
+            self.log_waiting(lambda: self.missing() or [f"plant ({self._runs.topic_name})"])
 
     def wait_timeout(self) -> float:
-        """Check the links more often until they are connected."""
-        return 0.25 if self._announced else LINK_LOOK
+        """Return the time (s) to the next poll, which is shorter until the links are matched."""
+        return 0.25 if self._announced else LINK_CHECK
 
     def _on_run(self, run: Run) -> None:
         if run.interface_version != Run.INTERFACE_VERSION:
@@ -321,22 +322,22 @@ class PeerNode(LockstepNode):
             self._end("broken off, the plant is gone")
 
     def _end(self, how: str) -> None:
-        """Note the end of the run that this node is ready for, once: the plant says it, and then is gone."""
+        """Handle the end of the run once, whether the plant announces it or disappears."""
         if self._run is not None and self._announced and not self._over:
             self._over = True
             self.end_run(f"run {short_id(self._run)} {how}")
 
 
 def short_id(run: Run) -> str:
-    """Return a prefix of the run's id that distinguishes it from others, for display."""
+    """Return the first eight characters of the run's id, for display."""
     return str(run.run_id[:8])
 
 
 def run_in_words(run: Run) -> str:
-    """Return which run this is, and how long it will be."""
+    """Return short id and length of a run as text."""
     return f"run {short_id(run)}: {run.last_step + 1} steps, {run.last_step * run.period:g} s"
 
 
 def step_in_words(step: int, period: float) -> str:
-    """Return time and step in words."""
+    """Return time and step as text."""
     return f"t = {step * period:.2f} s, step {step}"

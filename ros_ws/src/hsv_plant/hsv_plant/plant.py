@@ -39,7 +39,7 @@ from hsv.flight.blocks import VEHICLE, Signals
 from hsv.graph.standstill import Standstill
 from hsv.model.plant import FlightStatus, Plant
 from hsv.model.signals import INPUT_NAMES
-from hsv_node.lockstep import LINK_LOOK, LockstepNode, run_in_words, short_id, step_in_words
+from hsv_node.lockstep import LINK_CHECK, LockstepNode, run_in_words, short_id, step_in_words
 from hsv_node.main import run_node
 from hsv_node.middleware import LATCHED, STEP
 from hsv_node.parameters import declare, declare_vehicle, refuse_sim_time
@@ -111,7 +111,7 @@ class PlantNode(LockstepNode):
                 self.values[parameter.name] = parameter.value
                 self._paced_from = time.monotonic(), step
                 said = str(parameter.value).lower()  # as it is written in files: true, not True
-                self.say_change(f"{parameter.name} = {said} from step {step + 1} on")
+                self.log_change(f"{parameter.name} = {said} from step {step + 1} on")
         return SetParametersResult(successful=True)
 
     def _on_progress(self, progress: RecorderProgress) -> None:
@@ -123,7 +123,7 @@ class PlantNode(LockstepNode):
         signals = self._signals
         step = self._actuator_messages.step(message)
         if not self._started or step != signals.step:
-            self.say_foreign(ACTUATOR, step, signals.step)
+            self.log_foreign(ACTUATOR, step, signals.step)
             return
         self._messages += 1
         if signals.status is FlightStatus.RUNNING:
@@ -206,7 +206,7 @@ class PlantNode(LockstepNode):
     def wait_timeout(self) -> float:
         """Wake in time for the next state when paced."""
         if not self._started:
-            return LINK_LOOK
+            return LINK_CHECK
         due = self._answered and self._room() and not self.values["paused"]
         return min(max(self._delay(), 0.0), 0.25) if due else 0.25
 
@@ -238,7 +238,7 @@ class PlantNode(LockstepNode):
             self.get_logger().info(f"starts {run_in_words(self._run)}")
             self._publish()
             return
-        self.say_waiting(self._missing, decides=True)
+        self.log_waiting(self._missing, decides=True)
         limit = self.values["start_timeout"]
         if limit and time.monotonic() - self._begun > limit:
             self.get_logger().fatal(f"no start within {limit:g} s: still waiting for " + ", ".join(self._missing()))

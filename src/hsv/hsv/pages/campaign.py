@@ -1,4 +1,4 @@
-"""The page of a Monte Carlo campaign: one HTML file that loads nothing."""
+"""The page of a Monte Carlo campaign: a self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -34,12 +34,13 @@ from hsv.pages.picture import Line, Picture, drawing, picture
 from hsv.pages.text import capitalised, quantity, units_of
 
 POINTS = 2000
-"""Flights that a scatter plot draws at most; of more it draws every n-th."""
+"""Maximum number of flights in a scatter plot; of more flights it shows every n-th."""
 
 BINS = 60
+"""Maximum number of bars of a histogram."""
 
 RUN = "run"
-"""Group of the numbers that are not metrics: when a flight ended, and its largest level in the tube."""
+"""Group of the outcomes that are not metrics: end time, and largest level in the tube."""
 
 PICTURED = ("altitude_error", "velocity_error", "angle_of_attack", "elevator_deflection")
 """Signals of the picture of all flights."""
@@ -56,7 +57,7 @@ SECTIONS = {
 
 
 def write_campaign_page(results: Results, out: Path, units: UnitSystem = UnitSystem.metric) -> None:
-    """Write the page of ``results`` to the HTML file ``out``; ``units`` are those in which it opens.
+    """Write the page of ``results`` to the HTML file ``out``; ``units`` are its initial units.
 
     Raises:
         CampaignError: The file cannot be written.
@@ -65,9 +66,9 @@ def write_campaign_page(results: Results, out: Path, units: UnitSystem = UnitSys
 
 
 def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> str:
-    """Return the page."""
+    """Return the HTML page of a campaign."""
     worst, shown, judged = worst_flights(results), distributions(results), shares(results)
-    flights = _flown(results, worst[0].flight)
+    flights = _repeated(results, worst[0].flight)
     differing = [d for d in shown if d.minimum < d.maximum]
     grouped = _grouped(differing)
     numbers = Numbers()
@@ -118,7 +119,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
 
 
 def sentence(results: Results) -> str:
-    """Return the verdict: how many flights are within all limits, and which limit most of them break."""
+    """Return the verdict: the number of flights within all limits, and the limit that most flights exceed."""
     ended, *limited = judged = shares(results)
     lost = ended.flights - ended.within
     ending = f"{lost} of {ended.flights} flights did not come to their end" if lost else "All flights came to their end"
@@ -132,13 +133,13 @@ def sentence(results: Results) -> str:
 
 
 def most_failed(judged: Sequence[Share]) -> Share | None:
-    """Return the limit that most flights break, None if no flight breaks one."""
+    """Return the limit that most flights exceed, or None if no flight exceeds one."""
     over = min((share for share in judged if share.limit is not None), key=lambda share: share.within, default=None)
     return over if over is not None and over.within < over.flights else None
 
 
 def _sorted(results: Results, failed: Share) -> Picture:
-    """Return the picture of the metric that fails most: the magnitudes of all flights in order, and the limit."""
+    """Return the picture of the metric that fails most: the sorted magnitudes of all flights, and the limit."""
     values = np.sort(np.abs(results.column(failed.name)))  # flights that do not define the metric come last, as NaN
     across = 100.0 * (np.arange(len(values)) + 0.5) / len(values)
     lines = [Line("bound", np.array([0.0, 100.0]), np.full(2, failed.limit)), Line("run0", across, values)]
@@ -148,7 +149,7 @@ def _sorted(results: Results, failed: Share) -> Picture:
 
 
 def _grouped(shown: Sequence[Distribution]) -> dict[str, list[Distribution]]:
-    """Return distributions by group: the groups of metrics, then the run."""
+    """Return the distributions by group: the groups of metrics, then the run."""
     groups: dict[str, list[Distribution]] = {group: [] for group in (*Group, RUN)}
     for distribution in shown:
         groups[METRICS[distribution.name].group if distribution.name in METRICS else RUN].append(distribution)
@@ -156,12 +157,12 @@ def _grouped(shown: Sequence[Distribution]) -> dict[str, list[Distribution]]:
 
 
 def _outcome(name: str, value: float, digits: int = 3) -> Markup:
-    """Return the number (SI) that the result has of a flight under ``name``, in all systems of units."""
+    """Return the value (SI) of an outcome as HTML in all systems of units."""
     return quantity(value, OUTCOMES[name], digits, share=is_share(name))
 
 
 def share_interval(share: Share) -> str:
-    """Return the interval of a share in percent, in as many digits as the number of flights resolves."""
+    """Return the confidence interval of a share in percent, with the digits that the number of flights resolves."""
     assert share.interval is not None
     places = max(0, math.ceil(math.log10(share.flights)) - 2)
     low, high = (f"{100.0 * end:.{places}f}" for end in share.interval)
@@ -169,12 +170,12 @@ def share_interval(share: Share) -> str:
 
 
 def relative(factor: Factor) -> bool:
-    """Return whether a factor is the relative change of a parameter, shown in percent."""
+    """Return whether a factor is the relative change of a parameter, displayed in percent."""
     return factor.field != factor.name and factor.unit == "1"
 
 
 def histogram(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return counts and edges of at most :data:`BINS` bars over the finite ``values``."""
+    """Return counts (b) and edges (b + 1) of at most :data:`BINS` bars for the finite ``values``."""
     values = values[np.isfinite(values)]
     distinct = np.unique(values.round(9))
     bins: int | np.ndarray = min(BINS, max(10, 2 * round(np.sqrt(len(values)))))
@@ -187,8 +188,8 @@ def histogram(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return counts, edges
 
 
-def _flown(results: Results, worst: int) -> dict[str, Flight]:
-    """Return the flight of the unchanged scenario and the worst one, if they may be flown, by their names."""
+def _repeated(results: Results, worst: int) -> dict[str, Flight]:
+    """Repeat the flight of the unchanged scenario and the worst flight; return them by name; empty if not flyable."""
     flights = {}
     if results.flyable:
         runner = results.sample_runner
@@ -200,7 +201,7 @@ def _flown(results: Results, worst: int) -> dict[str, Flight]:
 
 
 def _windows(results: Results) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return the first step of each window, its time (s), which windows any flight reached, and the end (s)."""
+    """Return first step and time (s) of each window, the indices of the windows with data, and the end (s)."""
     campaign = results.campaign
     plant = Plant.from_parameters({**campaign.design, **campaign.scenario.parameters()})
     reached = np.flatnonzero(np.isfinite(results.envelope.low).all(axis=1))
@@ -209,10 +210,10 @@ def _windows(results: Results) -> tuple[np.ndarray, np.ndarray, np.ndarray, floa
 
 
 def _envelopes(results: Results, flights: Mapping[str, Flight], numbers: Numbers) -> list[Plot]:
-    """Return a plot of each signal: the range of all flights, their mean, and the flights that are flown again."""
+    """Return a plot of each signal: range and mean of all flights, and the repeated ``flights``."""
     envelope, found = results.envelope, []
     windows, time, reached, _ = _windows(results)
-    x, flown_x = numbers.add(time[reached]), numbers.add(time)
+    x, flight_x = numbers.add(time[reached]), numbers.add(time)
     for index, (name, unit) in enumerate(SIGNALS):
         curves = [
             {"kind": kind, "label": label, "run": None, "x": x, "y": numbers.add(values[reached, index])}
@@ -224,13 +225,13 @@ def _envelopes(results: Results, flights: Mapping[str, Flight], numbers: Numbers
         ]
         for run, flight in enumerate(flights.values()):
             y = numbers.add(_curve(flight, windows, index))
-            curves.append({"kind": "nominal" if run else "actual", "label": "", "run": run, "x": flown_x, "y": y})
+            curves.append({"kind": "nominal" if run else "actual", "label": "", "run": run, "x": flight_x, "y": y})
         found.append(Plot(f"envelope_{name}", capitalised(in_words(name)), unit, "envelopes", curves))
     return found
 
 
 def _histogram(results: Results, shown: Distribution, numbers: Numbers) -> Plot:
-    """Return the histogram of a metric with its limits, as far as they lie within the data."""
+    """Return the histogram of a metric with the limits inside the range of the data."""
     counts, edges = histogram(results.column(shown.name))
     x, y = numbers.add(0.5 * (edges[:-1] + edges[1:])), numbers.add(counts)
     note = Markup("median {}, 95 % below {}, largest {}").format(
@@ -251,7 +252,7 @@ def _histogram(results: Results, shown: Distribution, numbers: Numbers) -> Plot:
 
 
 def _scatter(results: Results, factor: Factor, drawn: np.ndarray, numbers: Numbers) -> Plot:
-    """Return the plot of the chosen metric against a factor; the script fills in the metric."""
+    """Return the scatter plot of a metric against a factor; the script of the page fills in the chosen metric."""
     x, every = numbers.add(results.column(f"sample_{factor.name}")[drawn]), int(drawn[1]) if len(drawn) > 1 else 1
     curve = {"kind": "dots", "label": "", "run": None, "x": x, "y": x, "every": every}
     title, share = capitalised(in_words(factor.name)), relative(factor)
@@ -259,7 +260,7 @@ def _scatter(results: Results, factor: Factor, drawn: np.ndarray, numbers: Numbe
 
 
 def _limits(results: Results, shown: Distribution) -> list[float]:
-    """Return the limits of a metric that lie within the data: others would squeeze the plot."""
+    """Return the limits of a metric inside the range of the data; others would compress the plot."""
     limit = limits(results).get(shown.name)
     return [] if limit is None else [end for end in (-limit, limit) if shown.minimum <= end <= shown.maximum]
 
@@ -281,6 +282,6 @@ def _picture(results: Results, flights: Mapping[str, Flight]) -> Picture:
 
 
 def _curve(flight: Flight, windows: np.ndarray, index: int) -> np.ndarray:
-    """Return a signal of a flight at the windows that it reached."""
+    """Return a signal of a flight at the first steps of the windows that it reached."""
     curve = signals(flight.data().flight_curves)[index]
     return np.asarray(curve[windows[windows < len(curve)]])

@@ -1,4 +1,4 @@
-"""Recorded flights as a report shows them: description, metrics, verdicts, events, parameters and curves."""
+"""Data of recorded flights for a report: description, metrics, verdicts, events, parameters and curves."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from hsv.pages.panels import AIR_PANELS, INPUTS, MEASUREMENT_ERRORS, PANELS, Cur
 
 @dataclass(frozen=True)
 class DrawnCurve:
-    """A curve of one flight in SI: y (n) over the flight's time, or (2) over both ends of it."""
+    """A curve of one flight, SI: y (n) over the time of the flight, or y (2) at its two ends."""
 
     kind: Kind
     label: str
@@ -35,7 +35,7 @@ class DrawnCurve:
 
 @dataclass(frozen=True)
 class FlightCurves:
-    """Time (n) in seconds, the panels of the flight by name, in order, and the curves by panel."""
+    """The curves of a flight: time (n; s), panels by name in their order, and curves by name of the panel."""
 
     time: np.ndarray
     panels: dict[str, Panel] = field(default_factory=dict)
@@ -47,38 +47,38 @@ class FlightCurves:
         self.curves[panel.name] = list(curves)
 
     def over(self, curve: DrawnCurve) -> np.ndarray:
-        """Return the times of a curve."""
+        """Return the times (s) of a curve."""
         return self.time if len(curve.y) == len(self.time) else self.time[[0, -1]]
 
     def actual(self, name: str) -> np.ndarray | None:
-        """Return the values of the curve that a panel is about, None without it."""
+        """Return the values of the actual curve of a panel, or None without one."""
         return next((curve.y for curve in self.curves.get(name, ()) if curve.kind is Kind.actual), None)
 
 
 @dataclass(frozen=True)
 class ReportedRun:
-    """A recorded flight."""
+    """A recorded flight in a report."""
 
     label: str
     description: dict[str, Any]
     """See :func:`hsv.bags.info.describe`."""
     texts: dict[str, str]
-    """The attached texts by file name; empty where the bag has none."""
+    """Attached texts by file name; empty if the bag does not have them."""
     scenario: Scenario | None
-    """Scenario of the flight; None if the bag has none that can be read, and :attr:`remark` says why."""
+    """Scenario of the flight; None if the bag has no readable one, for the reason in :attr:`remark`."""
     remark: str
     metrics: dict[str, float]
     verdicts: dict[str, Verdict]
     curves: FlightCurves
     events: list[Event]
     parameters: dict[str, dict[str, Any]]
-    """Parameters of the scenario and of the design, as they are in the bag."""
+    """Parameters of the scenario and of the design in the bag."""
     incomplete: str
-    """Number of steps with all topics, and number of steps; empty if the bag is complete."""
+    """Numbers of complete and of all steps as text; empty if the bag is complete."""
 
     @property
     def custom(self) -> dict[str, str]:
-        """Data of the recorder about the run: run id, commit, design and its hash, ..."""
+        """Custom data of the recorder: run id, commit, design and its hash, ..."""
         return dict(self.description["custom_data"])
 
     @property
@@ -88,24 +88,24 @@ class ReportedRun:
 
     @property
     def failure(self) -> str:
-        """Reason for which the flight did not finish; empty if it did."""
+        """Reason why the flight did not finish; empty if it did."""
         return next((event.text for event in self.events if event.kind == "error" and event.subject == "plant"), "")
 
     @property
     def good(self) -> bool:
-        """Whether the flight is recorded completely and came to its end within every limit."""
+        """Whether the flight is completely recorded and finished within every limit."""
         return not self.failure and not self.incomplete and all(verdict.within for verdict in self.verdicts.values())
 
     @property
     def input_limits(self) -> dict[str, tuple[float, float]]:
-        """Smallest and largest value of each input, SI, where the design states them."""
+        """Minimum and maximum of each input by the design, SI; empty without a design."""
         design = self.parameters["design"]
         ends = zip(design.get("input.minimum", []), design.get("input.maximum", []), strict=False)
         return dict(zip(INPUTS, ends, strict=False))
 
 
 def reported_runs(bags: Sequence[Bag]) -> list[ReportedRun]:
-    """Return the runs of a report, one for each of ``bags``, with distinct labels.
+    """Return the runs for a report, one for each of ``bags``, with distinct labels.
 
     Raises:
         RecordingError: A bag holds no flight.
@@ -148,7 +148,7 @@ def _scenario(text: str, name: str) -> tuple[Scenario | None, str]:
 
 
 def flight_curves(bag: Bag) -> FlightCurves:
-    """Return the curves of ``bag`` at the steps that all of their topics have.
+    """Return the curves of ``bag`` at the steps contained in all their topics.
 
     Raises:
         RecordingError: A topic is missing, or no step is complete.
@@ -165,7 +165,7 @@ def flight_curves(bag: Bag) -> FlightCurves:
         return np.sum([part if curve.column is None else part[:, curve.column] for part in parts], axis=0)
 
     def tube(name: str) -> np.ndarray:
-        """Return a vector of the tube status (n, components); without a set it has no components."""
+        """Return a vector of the tube status (n, components), which has no components without an invariant set."""
         found = columns[TUBE_STATUS][name] if TUBE_STATUS in columns else ()
         return np.asarray(found, float).reshape(len(flight.time), -1)
 

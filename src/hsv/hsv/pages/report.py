@@ -1,4 +1,4 @@
-"""The report of recorded flights: one HTML page that loads nothing."""
+"""The report of recorded flights: a self-contained HTML page."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ from hsv.pages.side_view import geometry
 from hsv.pages.text import capitalised, number, percent, quantity, switched
 
 DECLARED = {p.name: p for table in (LOCKSTEP_PARAMETERS, *NODE_PARAMETERS.values()) for p in table}
-"""Every parameter of every node by name."""
+"""Declarations of all parameters of the nodes by name."""
 
 EVENTS_SHOWN = 200
-"""Events of a run that are listed; of a run with more, the page states how many there are."""
+"""Maximum number of listed events of a run; the page states the total number."""
 
 PICTURED = ("altitude", "velocity", "angle_of_attack", "level")
-"""Panels of the picture that the page opens with."""
+"""Panels of the picture at the top of the page."""
 
 COMPARED = ("trajectory", "attitude", "elastic", "inputs", "tube")
-"""Groups of panels whose differences are drawn, except errors in the tube, which repeat those of the state."""
+"""Groups of panels whose differences are plotted, without errors in the tube, which repeat those of the state."""
 
 NEARLY = 0.01
-"""Share of the range of a quantity up to which flights nearly agree."""
+"""Largest difference of flights that nearly agree, as a share of the range of a quantity."""
 
 
 def write_report(bags: Sequence[Bag], out: Path, *, units: UnitSystem = UnitSystem.metric) -> None:
-    """Write the report of ``bags``, in the same plots, to the HTML file ``out``.
+    """Write the report of ``bags``, with common plots, to the HTML file ``out``.
 
     Args:
-        bags: One flight or several, which are then compared.
+        bags: One flight, or several flights to compare.
         out: File to write.
-        units: Initial units of the page; they can be switched there.
+        units: Initial units of the page.
 
     Raises:
         RecordingError: A bag holds no flight, or the file cannot be written.
@@ -58,7 +58,7 @@ def write_report(bags: Sequence[Bag], out: Path, *, units: UnitSystem = UnitSyst
 
 
 def report_page(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.metric) -> str:
-    """Return the page."""
+    """Return the HTML page of the report."""
     numbers, differences = Numbers(), flight_differences(runs)
     plots = [_plot(panel, runs, numbers) for panel in all_panels(runs)]
     plots += [_difference_plot(found, runs, numbers) for found in differences if any(d.largest for d in found)]
@@ -102,13 +102,13 @@ def report_page(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.m
 
 
 def all_panels(runs: Sequence[ReportedRun]) -> list[Panel]:
-    """Return the panels that any of ``runs`` has, in the order of the page."""
+    """Return the panels of all ``runs`` in the order of the page."""
     most = max(runs, key=lambda run: len(run.curves.panels))
     return list({name: panel for run in (most, *runs) for name, panel in run.curves.panels.items()}.values())
 
 
 def sentence(runs: Sequence[ReportedRun]) -> Markup:
-    """Return the verdict on one flight, or on several, in all systems of units."""
+    """Return the verdict on one or several flights in all systems of units."""
     if len(runs) == 1:
         return verdict(runs[0])
     return switched({system: str(escape(f"{capitalised(_several(runs, system))}.")) for system in UnitSystem})
@@ -116,8 +116,8 @@ def sentence(runs: Sequence[ReportedRun]) -> Markup:
 
 def verdict(run: ReportedRun) -> Markup:
     """Return the verdict on one flight in all systems of units."""
-    said = {system: _one(run, verdict_sentence(run.verdicts, run.metrics, system)) for system in UnitSystem}
-    return switched({system: str(escape(f"{capitalised(text)}.")) for system, text in said.items()})
+    texts = {system: _one(run, verdict_sentence(run.verdicts, run.metrics, system)) for system in UnitSystem}
+    return switched({system: str(escape(f"{capitalised(text)}.")) for system, text in texts.items()})
 
 
 def _several(runs: Sequence[ReportedRun], system: UnitSystem) -> str:
@@ -135,7 +135,7 @@ def _several(runs: Sequence[ReportedRun], system: UnitSystem) -> str:
 
 
 def _one(run: ReportedRun, limits: str) -> str:
-    """Return a verdict on the limits, and whether the flight ended early or is not recorded completely."""
+    """Return the verdict on the ``limits`` with remarks about an early end and an incomplete recording."""
     parts = [f"lost: {run.failure}"] if run.failure else []
     parts.append(limits if run.scenario else run.remark)
     if run.incomplete:
@@ -144,7 +144,7 @@ def _one(run: ReportedRun, limits: str) -> str:
 
 
 def happened(runs: Sequence[ReportedRun], differences: Sequence[Sequence[Difference]]) -> str:
-    """Return what happened in one flight, or how far several agree; empty where nothing can be compared."""
+    """Return a summary of the events of one flight, or of the agreement of several; empty without common curves."""
     if len(runs) > 1:
         return f"{capitalised(text)}." if (text := _agreement(differences)) else ""
     (run,) = runs
@@ -177,7 +177,7 @@ def _agreement(differences: Sequence[Sequence[Difference]]) -> str:
 
 @dataclass(frozen=True)
 class Difference:
-    """The difference of a run from the first one in SI, at the steps (n) that both have; time in seconds."""
+    """The difference ``y`` (n; SI) of a run from the first one over their common ``time`` (n; s)."""
 
     panel: Panel
     run: int
@@ -188,17 +188,17 @@ class Difference:
 
     @property
     def largest(self) -> float:
-        """The largest magnitude."""
+        """Largest magnitude of the difference."""
         return float(np.nanmax(np.abs(self.y)))
 
     @property
     def share(self) -> float:
-        """The largest magnitude relative to the range; infinite where the first run does not move."""
+        """Largest magnitude relative to the range; infinite if the first run is constant."""
         return 0.0 if not self.largest else self.largest / self.range if self.range else np.inf
 
 
 def flight_differences(runs: Sequence[ReportedRun]) -> list[list[Difference]]:
-    """Return how each run but the first differs from it, by panel; computed in double precision, before rounding."""
+    """Return the differences of all other runs from the first one, by panel, in double precision."""
     found = []
     for panel in runs[0].curves.panels.values():
         if panel.group in COMPARED and not panel.name.startswith("error_"):
@@ -234,9 +234,9 @@ def _difference_plot(found: Sequence[Difference], runs: Sequence[ReportedRun], n
 
 
 def _plot(panel: Panel, runs: Sequence[ReportedRun], numbers: Numbers) -> Plot:
-    """Return a panel with the curves of all runs; those that are the same in all are drawn once."""
+    """Return the plot of a panel with the curves of all runs; curves common to all are drawn once."""
     curves: list[dict[str, Any]] = []
-    # The widest curve is drawn first, so that it hides no other.
+    # The curve with the largest range is drawn first, so that it does not hide the others.
     widths = {index: float(np.ptp(y[np.isfinite(y)])) for index, y in enumerate(_actual(panel, runs)) if y is not None}
     for index in sorted(widths, key=lambda index: widths[index], reverse=True):
         own = runs[index].curves
@@ -257,14 +257,14 @@ def _actual(panel: Panel, runs: Sequence[ReportedRun]) -> list[np.ndarray | None
     return [run.curves.actual(panel.name) for run in runs]
 
 
-def _agreed(wanted: DrawnCurve, panel: Panel, runs: Sequence[ReportedRun]) -> bool:
-    """Return whether a curve is the same in all flights that have it."""
-    drawn = [curve for run in runs for curve in run.curves.curves.get(panel.name, ()) if curve.label == wanted.label]
-    return all(np.array_equal(curve.y, wanted.y) for curve in drawn)
+def _agreed(curve: DrawnCurve, panel: Panel, runs: Sequence[ReportedRun]) -> bool:
+    """Return whether ``curve`` is the same in all flights that have it."""
+    drawn = [other for run in runs for other in run.curves.curves.get(panel.name, ()) if other.label == curve.label]
+    return all(np.array_equal(other.y, curve.y) for other in drawn)
 
 
 def _faults(run: ReportedRun) -> list[dict[str, Any]]:
-    """Return the faults of a run for the player, in words without numbers, which the list of events has."""
+    """Return the faults of a run for the player, without their parameters, which are in the list of events."""
     return [
         {
             "channel": fault["channel"],
@@ -301,7 +301,7 @@ def _picture(runs: Sequence[ReportedRun]) -> Picture:
 
 
 def _drawing(panel: Panel, end: float, runs: Sequence[ReportedRun]) -> Drawing:
-    """Return a panel of the picture: the flights above all else, the nominal trajectory of one flight only."""
+    """Return a panel of the picture with the flights on top; only a single flight shows its nominal trajectory."""
     kinds = [Kind.bound, Kind.reference, Kind.nominal, Kind.actual]
     if len(runs) > 1:
         kinds.remove(Kind.nominal)
@@ -318,7 +318,7 @@ def _drawing(panel: Panel, end: float, runs: Sequence[ReportedRun]) -> Drawing:
 
 
 def _grouped(runs: Sequence[ReportedRun]) -> dict[Group, dict[str, Metric]]:
-    """Return the metrics that any of the runs defines or is judged by, by group."""
+    """Return the metrics with a value or a verdict in any of the runs, by group."""
     known = {name for run in runs for name in (*run.metrics, *run.verdicts)}
     groups = {
         group: {name: metric for name, metric in METRICS.items() if metric.group is group and name in known}
@@ -328,7 +328,7 @@ def _grouped(runs: Sequence[ReportedRun]) -> dict[Group, dict[str, Metric]]:
 
 
 def _parameters(part: str, runs: Sequence[ReportedRun]) -> Iterator[tuple[str, str, list[Markup]]]:
-    """Yield name, description and values of each parameter: one value if all runs agree, else one for each run."""
+    """Yield name, description and values of each parameter; equal values of all runs are given once."""
     for name in dict.fromkeys(name for run in runs for name in run.parameters[part]):
         values = [run.parameters[part].get(name) for run in runs]
         if all(value == values[0] for value in values):
@@ -337,7 +337,7 @@ def _parameters(part: str, runs: Sequence[ReportedRun]) -> Iterator[tuple[str, s
 
 
 def _value(name: str, value: Any) -> Markup:
-    """Return the value of a parameter as HTML; many numbers are unfolded on request."""
+    """Return the value of a parameter as HTML; long lists of numbers are collapsed."""
     unit = (DECLARED[name].unit if name in DECLARED else "") or "1"
     match value:
         case None | "" | []:

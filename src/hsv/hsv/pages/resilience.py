@@ -16,19 +16,19 @@ from hsv.flight.scenario import scenario_table
 from hsv.pages.engine import render
 
 FLIGHTS = "flights"
-"""Folder next to the page with the scenarios of the worst flights."""
+"""Name of the folder, next to the page, with the scenarios of the worst flights."""
 
 SECTIONS = {"map": "Map of survival", "controllers": "Controllers", "cells": "Numbers", "repeat": "Repeat a flight"}
 """Headings in the order of the page."""
 
 
 def write_results(results: ResilienceResults, out: Path, command: str) -> list[Path]:
-    """Write page, Markdown and the scenario of the worst flight of every cell into ``out``; return page and Markdown.
+    """Write page, Markdown and the scenario of each cell's worst flight into ``out``; return page and Markdown.
 
     Args:
-        results: Results of a campaign.
-        out: A folder.
-        command: Command that produces them, printed on the page.
+        results: Results of a resilience campaign.
+        out: Folder to write to.
+        command: Command that produces the results, printed on the page.
 
     Raises:
         CampaignError: A file cannot be written.
@@ -47,12 +47,12 @@ def write_results(results: ResilienceResults, out: Path, command: str) -> list[P
 
 
 def flight_file(cell: Cell) -> str:
-    """Return the file of the scenario of a cell's worst flight, relative to the page."""
+    """Return the path of the scenario of a cell's worst flight, relative to the page."""
     return f"{FLIGHTS}/{cell.case.label}_{cell.severity}.toml"
 
 
 def flight_text(cell: Cell) -> str:
-    """Return the scenario of a cell's worst flight as a file."""
+    """Return the scenario file of a cell's worst flight as text."""
     worst, case = cell.worst, cell.case
     subject, fault = case.subject, TRIED[case.fault]
     table = scenario_table(subject.file(case.moment, worst.vehicle, fault, worst.value), subject.name)
@@ -69,7 +69,7 @@ def vehicle_words(vehicle: int) -> str:
 
 
 def sentence(results: ResilienceResults) -> str:
-    """Return the verdict: how many of its flights each controller survives, the best one first."""
+    """Return the verdict: the number of flights that each controller survives, best controller first."""
     counts = {}
     for subject in results.campaign.subjects:
         squares = [square for (_, name), square in results.squares.items() if name == subject.name]
@@ -80,7 +80,7 @@ def sentence(results: ResilienceResults) -> str:
 
 
 def resilience_page(results: ResilienceResults, template: str, command: str) -> str:
-    """Return the page or the Markdown, by its template; both name the ``command`` that makes them."""
+    """Return the page or the Markdown text by its ``template``; both state the ``command`` that produces them."""
     return render(
         template,
         command=command,

@@ -1,1 +1,1 @@
-"""Watching a flight while it is flown: the page, the Foxglove server, and what both show and may ask for."""
+"""Live view of a running flight: page, Foxglove server, their data, and the commands of the page."""

@@ -1,4 +1,4 @@
-"""The numbers that the page draws: a column each, read from the messages of a step by the report's own panels."""
+"""The curves of the live page as columns of numbers, by the panels of the report."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from hsv.bags.description import STATE, TUBE_STATUS
 from hsv.pages.panels import ERRORS, PANELS, Curve, Kind, Panel, error_panel
 
 Read = Callable[[Any], float]
-"""Reads a number of a message."""
+"""Function that returns a number from a message."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """A curve of a panel, and how its value is read of a message of its topic."""
+    """A curve of a panel, with the function that reads its value from a message of its topic."""
 
     panel: Panel
     kind: Kind
@@ -28,7 +28,7 @@ class Column:
 
 
 def columns() -> list[Column]:
-    """Return all columns but the time, those of a panel one after the other."""
+    """Return all columns except the time, grouped by panel."""
     found = [column for panel in PANELS for column in _curves(panel)]
     for component in range(len(ERRORS)):
         panel = error_panel(component)
@@ -39,7 +39,7 @@ def columns() -> list[Column]:
 
 
 def row(columns: Sequence[Column], messages: Mapping[str, Any]) -> np.ndarray:
-    """Return time (s) and the value of every column (1 + columns), NaN where its topic has no message.
+    """Return time (s) and the values of all columns (1 + columns); NaN if a topic has no message.
 
     Args:
         columns: Columns to read.

@@ -1,4 +1,4 @@
-"""Commands of the page for a flight, checked before any node is called."""
+"""Commands of the live page to a flight, which are validated before a node is called."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hsv.model.faults.table import CHANNELS, FAULT_KINDS, Fault, read_fault
 
 @dataclass(frozen=True)
 class Inject:
-    """Begin a fault, for so many simulated seconds, or with 0 until it is cleared."""
+    """Command to inject a fault for a duration (simulated s); 0: until it is cleared."""
 
     fault: Fault
     duration: float
@@ -25,7 +25,7 @@ class Inject:
 
 @dataclass(frozen=True)
 class Clear:
-    """End the faults of a channel and of a type; of any where that is empty."""
+    """Command to clear the faults of a channel and a type; an empty text means any."""
 
     channel: str
     type: str
@@ -34,7 +34,7 @@ class Clear:
 
 @dataclass(frozen=True)
 class Change:
-    """Give a parameter that may change in flight another value."""
+    """Command to change a parameter in flight."""
 
     node: NodeDescription
     parameter: Parameter
@@ -45,10 +45,10 @@ Command = Inject | Clear | Change
 
 
 def read_command(fields: Mapping[str, Any]) -> Command:
-    """Return the command in the ``fields`` of a request; quantities are texts with their units.
+    """Return the command in the ``fields`` of a request; quantities are texts with units.
 
     Raises:
-        ParameterError, QuantityError: A field that is missing, unknown or wrong, and what was expected.
+        ParameterError, QuantityError: A field is missing, unknown or wrong.
     """
     name = _text(fields, "command")
     if name not in _COMMANDS:

@@ -1,4 +1,4 @@
-"""The flight over the Foxglove WebSocket protocol: every topic with its definition, its messages as they came."""
+"""Server of the Foxglove WebSocket protocol: all topics with their definitions and unchanged messages."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from hsv.graph.addresses import HOST
 
 
 class FoxgloveServer:
-    """Serves topics to Foxglove and Lichtblick, to read only; a client that is slow misses messages, others do not."""
+    """A read-only server of topics for Foxglove and Lichtblick; a slow client misses messages and delays no others."""
 
     def __init__(self, port: int, topics: Mapping[str, str]) -> None:
         """Start the server.
 
         Args:
-            port: Port of this machine; 0: any free one.
-            topics: Type of each topic, by its full name.
+            port: Port on this machine; 0: any free port.
+            topics: Types of the topics by full name.
 
         Raises:
             ParameterError: The port is in use.
             RecordingError: A message type is not installed.
         """
-        # Of a client that comes wrongly or leaves, a person at the flight need not hear.
+        # Suppress messages about clients that connect and disconnect.
         foxglove.set_log_level(logging.CRITICAL)
-        # Kept: its channels close with it.
+        # Keep the context, because its channels are closed with it.
         self._context = foxglove.Context()
         self._channels = {
             name: foxglove.Channel(
@@ -46,7 +46,7 @@ class FoxgloveServer:
 
     @property
     def port(self) -> int:
-        """The port of the server."""
+        """Port of the server."""
         return self._server.port
 
     def send(self, topic: str, time: int, data: bytes) -> None:
@@ -54,9 +54,9 @@ class FoxgloveServer:
         self._channels[topic].log(data, log_time=time)
 
     def start_run(self) -> None:
-        """Have the clients forget the run before."""
+        """Reset the clients for a new run."""
         self._server.clear_session()
 
     def close(self) -> None:
-        """Leave the clients."""
+        """Stop the server and disconnect the clients."""
         self._server.stop()

@@ -1,4 +1,4 @@
-"""The live page: the plots of the report of a flight that is being flown, with the controls of that flight."""
+"""The live page: the plots of the report for a running flight, with the controls of that flight."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hsv.pages.side_view import geometry
 
 
 def live_page(hub: Hub, port: int) -> str:
-    """Return the page of the flight of ``hub``, as it is served on ``port``."""
+    """Return the HTML page for the flight of ``hub``, served on ``port``."""
     plots = []
     for panel, columns in groupby(enumerate(hub.columns, 1), lambda numbered: numbered[1].panel):
         # The script keeps the rows of the flight as arrays: the time is array 0, the columns follow.
@@ -40,7 +40,7 @@ def live_page(hub: Hub, port: int) -> str:
 
 
 def _kinds() -> dict[str, dict[str, Any]]:
-    """Return the types of fault by channel for the form, with the ranges of their parameters."""
+    """Return the fault types by channel for the form, with the ranges of their parameters."""
     found: dict[str, dict[str, Any]] = {channel: {} for channel in CHANNELS}
     for name, kind in FAULT_KINDS.items():
         for channel in kind.channels:

@@ -1,4 +1,4 @@
-"""The server of the live page: the page, and a WebSocket for its data and its commands."""
+"""The server of the live page, with a WebSocket for data and commands."""
 
 from __future__ import annotations
 
@@ -31,31 +31,31 @@ LAYOUT = "/foxglove.json"
 """Path of the layout for Foxglove and Lichtblick."""
 
 LONGEST_REQUEST = 10_000
-"""Bytes that a page may send at once."""
+"""Maximum length of a request, bytes."""
 
 GOING_AWAY = 1001
-"""Close code of a server that ends."""
+"""WebSocket close code of a server that stops."""
 
 CLOSE_TIMEOUT = 1.0
-"""Seconds for which clients are waited for at the end."""
+"""Time to wait for clients at the end, s."""
 
 Answer = Callable[[dict[str, Any]], None]
-"""Takes the answer to a command: whether it was ``accepted``, a ``message``, and the ``step`` from which on it acts."""
+"""Function that sends the answer to a command: ``accepted``, ``message``, and the ``step`` at which it takes effect."""
 
 
 class PageServer:
-    """Serves the page in a separate thread; a client that is slow or never reads does not delay others.
+    """A server of the page in a separate thread; a slow client does not delay others.
 
     Raises:
         ParameterError: The port is in use.
     """
 
     def __init__(self, port: int, hub: Hub, layout: str) -> None:
-        """Listen on ``port``, 0 for a free one; ``layout`` is that for Foxglove, which is served beside the page."""
+        """Listen on ``port`` (0: any free port); ``layout`` is the Foxglove layout, which is served as well."""
         self._hub = hub
         self._token = secrets.token_urlsafe(16)
         self.commands: SimpleQueue[tuple[Command, Answer]] = SimpleQueue()
-        """Valid commands, to be carried out and answered."""
+        """Queue of valid commands with the functions that answer them."""
         self._changed: set[asyncio.Event] = set()
         self._loop = asyncio.new_event_loop()
         try:
@@ -70,18 +70,18 @@ class PageServer:
             "/": ("text/html; charset=utf-8", live_page(hub, self.port).encode()),
             LAYOUT: ("application/json", layout.encode()),
         }
-        """Type and bytes of what is served, by path."""
+        """Media type and contents of the served documents, by path."""
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
 
     @property
     def url(self) -> str:
-        """Address of the page, with the token for commands in the fragment, which browsers do not send."""
+        """URL of the page; the fragment, which browsers do not send, contains the token for commands."""
         return f"http://{HOST}:{self.port}/#token={self._token}"
 
     @property
     def layout_url(self) -> str:
-        """Address of the layout for Foxglove and Lichtblick."""
+        """URL of the layout for Foxglove and Lichtblick."""
         return f"http://{HOST}:{self.port}{LAYOUT}"
 
     @property
@@ -90,12 +90,12 @@ class PageServer:
         return bool(self._changed)
 
     def publish(self) -> None:
-        """Send new data of the hub to every client as soon as it is ready."""
+        """Send new data of the hub to every client, as soon as the client is ready."""
         if self._changed:
             self._loop.call_soon_threadsafe(self._wake)
 
     def close(self) -> None:
-        """Send new data, and disconnect the clients."""
+        """Send the last data and disconnect the clients."""
         asyncio.run_coroutine_threadsafe(self._leave(), self._loop).result()
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
@@ -124,7 +124,7 @@ class PageServer:
             changed.set()
 
     async def _listen(self, port: int) -> Server:
-        # A program that connects without a valid handshake is none of the pilot's business.
+        # Suppress messages about clients without a valid handshake.
         logger = logging.getLogger(__name__)
         logger.addFilter(lambda record: record.msg != "opening handshake failed")
         return await serve(
@@ -142,8 +142,8 @@ class PageServer:
         origin, allowed = request.headers.get("Origin"), origins(self.port)
         socket = request.path == SOCKET and "Upgrade" in request.headers
         if origin not in allowed and (origin is not None or socket):
-            said = "missing" if origin is None else repr(origin)
-            return connection.respond(HTTPStatus.FORBIDDEN, f"Origin: {said}, expected {' or '.join(allowed)}\n")
+            shown = "missing" if origin is None else repr(origin)
+            return connection.respond(HTTPStatus.FORBIDDEN, f"Origin: {shown}, expected {' or '.join(allowed)}\n")
         if socket:
             return None
         if request.path not in self._documents:
@@ -164,7 +164,7 @@ class PageServer:
         sender = asyncio.create_task(self._send(connection, changed))
         try:
             async for text in connection:
-                self._take(connection, text)
+                self._receive(connection, text)
         except ConnectionClosed:
             pass
         finally:
@@ -172,7 +172,7 @@ class PageServer:
             sender.cancel()
 
     async def _send(self, connection: ServerConnection, changed: asyncio.Event) -> None:
-        """Send changes since the last time, as fast as the client reads."""
+        """Send changes of the hub, as fast as the client reads."""
         generation, rows, version = 0, 0, -1
         with suppress(ConnectionClosed):
             while True:
@@ -190,8 +190,8 @@ class PageServer:
                 if self._hub.version == version:
                     changed.clear()
 
-    def _take(self, connection: ServerConnection, text: str | bytes) -> None:
-        """Check a request and queue its command; every request is answered."""
+    def _receive(self, connection: ServerConnection, text: str | bytes) -> None:
+        """Validate a request and queue its command; every request is answered."""
         number: Any = None
 
         def answer(values: dict[str, Any]) -> None:
@@ -214,7 +214,7 @@ def _fields(text: str | bytes) -> dict[str, Any]:
     """Return the fields of a request.
 
     Raises:
-        ParameterError: It is no JSON object, is nested too deep, or has half a surrogate pair, which is no character.
+        ParameterError: The request is not a JSON object, is nested too deeply, or contains half a surrogate pair.
     """
     try:
         fields = parse_json(text)
