@@ -29,7 +29,7 @@ run: setup ## set up, then fly a scenario over DDS (SCENARIO=case1, ARGS="...")
 test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
 	@if [ -n '$(ARGS)' ]; then $(PYTEST) $(ARGS); exit; fi; \
 	$(PYTEST) -n auto --dist loadfile -m "not (graph or $(NOT_IN_TEST))" && \
-	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -m "graph and not long"
+	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -m "graph and not long" tests/graph
 
 test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damaged" chooses)
 	@$(PYTEST) -n auto --dist loadfile -m long $(ARGS)
@@ -78,8 +78,8 @@ locks: setup ## set up, then write the exact versions of all requirements to con
 	@$(LOCK) --python-version 3.12 requirements{,-jazzy,-test,-viewers,-docs}.txt --output-file constraints-jazzy.txt $(ARGS)
 
 references: lint ## run all tests, then fly the reference bags of bags/reference anew: all or none
-	@$(PYTEST) -n auto -m "not (graph or reference or $(NOT_IN_TEST))" && \
-	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -m "graph and not (reference or long)" && \
+	@$(PYTEST) -n auto --dist loadfile -m "not (graph or reference or $(NOT_IN_TEST))" && \
+	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -m "graph and not (reference or long)" tests/graph && \
 	python3 tools/references.py
 
 bench: setup ## set up, then measure this machine (ARGS="--scale 0.5")

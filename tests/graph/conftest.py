@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from node_processes import Processes
 from ros_domain import own_environment
+from short_campaigns import planned, results, short  # noqa: F401 (fixtures)
 
 
 @pytest.fixture

@@ -1,3 +1,5 @@
+"""Flights of a campaign, flown again alone: in process, and over DDS."""
+
 import pytest
 from ros_domain import own_domain
 
