@@ -157,6 +157,7 @@ def test_a_failed_solve_leaves_the_family():
     assert np.array_equal(results[-1].input, FamilyLaw(DATA).step(far).input)
 
 
+@pytest.mark.long
 def test_a_gain_that_no_longer_fits_is_not_taken():
     law, far = KothareLaw(DESIGN, DATA), 30.0 * STEP
     for _ in range(SOLVE_STEPS):

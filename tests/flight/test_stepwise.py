@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from flights import step_by_step
+from marking import long
 
 from hsv.control.design import ControlDesign
 from hsv.flight.assembly import assemble, flight_parameters
@@ -18,7 +19,8 @@ def components(scenario, **changes):
 
 
 @pytest.mark.parametrize(
-    "scenario", ["case1_uncertain", "case1_derived_no_notch", "case1_rmpc", "case1_integral_heavy", "case2", "case1_qp"]
+    "scenario",
+    ["case1_uncertain", "case1_derived_no_notch", "case1_rmpc", "case1_integral_heavy", "case2", long("case1_qp")],
 )
 def test_steps_equal_the_compiled_loop_bit_for_bit(scenario):
     parts = components(scenario, duration=104.0)

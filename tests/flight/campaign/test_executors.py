@@ -157,6 +157,7 @@ def test_a_batch_that_ends_its_worker_is_named_and_ends_the_campaign_and_not_the
     assert dict(os.environ) == before and not any(map(alive, pids))
 
 
+@pytest.mark.long
 def test_a_stopped_worker_is_reported_and_waited_for(monkeypatch):
     monkeypatch.setattr("hsv.flight.campaign.executors.NOTICE", 0.5)
     notices = []
