@@ -1,7 +1,7 @@
-"""Draws the vehicle beside a running graph, for RViz2: ``ros2 run hsv_bringup airframe``.
+"""A node that draws the vehicle of a running graph in RViz2: ``ros2 run hsv_bringup airframe``.
 
-It publishes the bent airframe as markers, and its frames on /tf where tf2_msgs is installed. Nobody waits for it: it
-subscribes best-effort, and no graph waits for it.
+It publishes the bent airframe as markers, and its frames on /tf where tf2_msgs is installed. It subscribes
+best-effort, so that no graph waits for it.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ PARAMETERS = (
 )
 
 LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Quality of service that keeps the latest message only; a missed one is not drawn."""
+"""Quality of service that keeps only the latest message."""
 
 
 class AirframeNode(ProcessNode):
-    """Converts the state and the actuators of a step into poses of the pieces of the airframe."""
+    """A node that converts state and actuators of a step into poses of the parts of the airframe."""
 
     def __init__(self) -> None:
         super().__init__("airframe")

@@ -1,4 +1,4 @@
-"""The whole graph in one process with one executor: the same nodes, messages and bag, faster."""
+"""All nodes of the graph in one process with one executor; messages and bag are the same, and it is faster."""
 
 from __future__ import annotations
 

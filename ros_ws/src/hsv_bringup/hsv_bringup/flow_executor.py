@@ -1,4 +1,4 @@
-"""An executor for a whole graph in one process, which knows that its messages flow around a loop."""
+"""Executors for a graph in one process, whose messages flow around a loop."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
 
 SWEEPS = 128
-"""Sweeps over all subscriptions between two looks at everything else (services, timers, a wish to stop)."""
+"""Number of sweeps over all subscriptions between checks of services, timers and shutdown."""
 
 BATCH = 0.005
-"""Seconds in which the messages of a batch come: some steps at full speed, a quarter of one in real time."""
+"""Duration (s) of a batch of messages: several steps at full speed, a quarter of a step in real time."""
 
 LOOKS = 8
-"""Batches between two looks at everything else, and without a message after which the next one is waited for."""
+"""Number of batches between checks of everything else; after as many empty batches the executor waits."""
 
 _Subscription = tuple[Callable[..., Any], Any, bool, Callable[[Any], Any]]
-"""What takes a message, with which arguments, and what is called with it."""
+"""The function that takes a message, its two arguments, and the callback."""
 
 
 class FlowExecutor(SingleThreadedExecutor):
-    """Takes messages subscription by subscription, node by node in the order they were added; waits if none came.
+    """An executor that takes messages by subscription, in the order of the nodes, and waits only if there are none.
 
-    Announcements that a node hears once a run are left to the wait set.
+    Latched announcements, received once per run, are left to the wait set.
 
-    With the nodes in the order of the data flow, one sweep is a step of the loop, and nothing is ever waited for: a
-    message published in the same process is there when its reader's turn comes. Where it is not (another middleware),
+    With the nodes in the order of the data flow, one sweep is one step of the loop without waiting, because a message
+    published in the same process has arrived when its subscription is swept. If it has not (with another middleware),
     the wait set of the base class wakes on it.
     """
 
@@ -37,7 +37,7 @@ class FlowExecutor(SingleThreadedExecutor):
         super().__init__()
         self._subscriptions: list[_Subscription] = []
         self._flowing: list[_Subscription] = []
-        """Those that are swept."""
+        """The swept subscriptions."""
 
     def add_node(self, node: Node) -> bool:
         """Add a node with the subscriptions that it has now; later ones are left to the base class."""
@@ -83,20 +83,20 @@ class FlowExecutor(SingleThreadedExecutor):
 
 
 class BatchExecutor(FlowExecutor):
-    """Takes what has come in a while at once, for a node that nobody waits for.
+    """An executor that takes messages in batches, for a node outside the loop.
 
-    To be woken for every message takes longer than to take it, and the processor from those in the loop. Where nothing
-    has come for ``LOOKS`` batches, the wait set of the base class wakes on the next message.
+    Waking for every message would take processor time from the nodes in the loop. After ``LOOKS`` empty batches, the
+    wait set of the base class wakes on the next message.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self._batches = 0
         self._empty = LOOKS
-        """Batches without a message; before the first message, all that there can be."""
+        """Number of consecutive empty batches."""
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Take all that has come, and then let more come; now and then, and where nothing comes, all the rest."""
+        """Take all messages that have arrived and wait for the next batch; check everything else from time to time."""
         self._empty = 0 if self.drain() else self._empty + 1
         if self._empty > LOOKS:
             SingleThreadedExecutor.spin_once(self, timeout_sec)

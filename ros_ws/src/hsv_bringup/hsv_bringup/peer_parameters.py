@@ -16,27 +16,27 @@ from hsv.bags.description import COMPOSED
 from hsv.graph.standstill import Standstill, processor_time_of
 
 GIVE_UP_AFTER = 10.0
-"""Seconds without any progress, of answers or of the silent nodes' processes, after which the bag does without."""
+"""Time (s) without answers or processor time of the silent nodes after which the recorder stops waiting for them."""
 
 _LOOK = 1.0
-"""Seconds between two looks at the processes of this machine."""
+"""Time (s) between checks of the processes of this machine."""
 
 
 class PeerParameters:
     """The parameters of other nodes, collected while the asking node continues."""
 
     def __init__(self, node: Node, names: Mapping[str, str]) -> None:
-        """Begin to ask.
+        """Start the requests.
 
         Args:
-            node: Node that asks.
-            names: Full name of each node to be asked, by its role, which is also that of its executable.
+            node: Node that sends the requests.
+            names: Full names of the other nodes by role, which is also the name of the executable.
         """
         self._peers = {role: _Peer(node, name) for role, name in names.items()}
         self._standstill = Standstill()
         self._looked = -_LOOK
         self.gave_up = False
-        """Whether those that are silent are not waited for any more."""
+        """Whether the wait for silent nodes has ended."""
 
     def silent(self) -> dict[str, str]:
         """Go on asking; return the service that has not answered yet, by role."""
@@ -61,7 +61,7 @@ class PeerParameters:
 
 
 class _Peer:
-    """A node that is asked first which parameters it has, then for their values."""
+    """Requests to a node: first for the names of its parameters, then for their values."""
 
     def __init__(self, node: Node, name: str) -> None:
         self._node = node
@@ -81,7 +81,7 @@ class _Peer:
         return self._list if self._names is None else self._get
 
     def ask(self) -> None:
-        """Send the next request when its service is there, take its answer when that is."""
+        """Send the next request when its service is ready; store the answer when it has arrived."""
         if self.values is not None:
             return
         if self._future is None:

@@ -26,11 +26,11 @@ from hsv_node.parameters import refuse_sim_time, refuse_unknown
 from hsv_node.process import ProcessNode
 
 EXCLUSIVE = (*TOPICS, *PLANT.announces, *RECORDER.announces)
-"""Topics that one node alone may publish in a graph."""
+"""Topics that only one node of a graph may publish."""
 
 
 class PlayerNode(ProcessNode):
-    """Publishes the recorded bytes of a bag; messages of the same simulated time are published together."""
+    """A node that publishes the recorded bytes of a bag; messages of equal simulated time are published together."""
 
     def __init__(self, bag: Bag, topics: Sequence[str], rate: float, paused: bool, delay: float) -> None:
         """Prepare to play.
@@ -65,7 +65,7 @@ class PlayerNode(ProcessNode):
         self._says = self._begins
         """Time of the next warning about slow subscribers."""
         self._anchor: tuple[float, int] | None = None
-        """Wall time (s) and simulated time (ns) from which the pace is counted."""
+        """Wall time (s) and simulated time (ns) at the start of the current pace."""
         self.create_service(Trigger, "~/pause", self._pause)
         self.create_service(Trigger, "~/resume", self._resume)
         self.create_service(Trigger, "~/step", self._step)
@@ -78,7 +78,7 @@ class PlayerNode(ProcessNode):
             self._end()
 
     def wait_timeout(self) -> float:
-        """Wake in time for the next message."""
+        """Return the time (s) to the next message."""
         return 0.25 if self._paused else min(max(self._delay(), 0.0), 0.25)
 
     def _delay(self) -> float:
@@ -135,7 +135,7 @@ class PlayerNode(ProcessNode):
 
 
 def _instants(bag: Bag, topics: Sequence[str]) -> list[tuple[int, list[tuple[str, bytes]]]]:
-    """Return the messages by simulated time (ns); within an instant in the order in which a step is recorded."""
+    """Return the messages by simulated time (ns); at equal times they have the order of a recorded step."""
     gathered: dict[int, list[tuple[str, bytes]]] = {}
     order = [bag.name_of(role) for role in TOPICS]
     for topic in sorted(topics, key=lambda name: order.index(name) if name in order else -1):
@@ -145,7 +145,7 @@ def _instants(bag: Bag, topics: Sequence[str]) -> list[tuple[int, list[tuple[str
 
 
 def _relative(bag: Bag, topic: str) -> str:
-    """Return the name of a topic below the namespace of its bag, where it is there; ROS's own stay where they are."""
+    """Return the name of a topic relative to the namespace of its bag; topics outside it keep their names."""
     own = bag.namespace.rstrip("/") + "/"
     role = next((role for role, name in bag.roles.items() if name == topic), "")
     return topic if role.startswith("/") or not topic.startswith(own) else topic.removeprefix(own)

@@ -50,11 +50,11 @@ CONFIRMATION_INTERVAL = 50
 """Steps between confirmations: a confirmation of every step would halve the speed of the loop."""
 
 TOLD_EVERY = 0.2
-"""Seconds of the wall clock between two lines of numbers."""
+"""Wall time (s) between two lines of numbers."""
 
 
 class RecorderNode(PeerNode):
-    """Writes the messages of a step in a fixed order once all have arrived, so that equal runs give equal bags."""
+    """A node that writes the messages of a step in a fixed order once all have arrived: equal runs give equal bags."""
 
     def __init__(self) -> None:
         super().__init__(RECORDER, "bag")
@@ -63,7 +63,7 @@ class RecorderNode(PeerNode):
         directory = Path(values["bag.directory"] or f"bags/run_{utc}")
         self._tells = values["progress"]
         self._told = 0.0
-        """When the last numbers of the flight were printed, of the wall clock."""
+        """Wall time (s) at which the last numbers of the flight were printed."""
         self._last_step = 0
         self._now = 0
         self._complete = -1
@@ -80,7 +80,7 @@ class RecorderNode(PeerNode):
         for path in attachments:
             self._attach(path.name, path.read_bytes())
         self._asks = not {"design.yaml", "scenario.yaml"} <= {path.name for path in attachments}
-        """Whether the nodes are to be asked for their parameters: nobody else has attached them."""
+        """Whether to request the parameters of the nodes, because they are not attached."""
         self._peers: PeerParameters | None = None
         for topic, kind in (recorded | OTHER_TOPICS).items():
             latched = topic in LATCHED_TOPICS
@@ -114,7 +114,7 @@ class RecorderNode(PeerNode):
         self._nanoseconds_per_step = round(run.period * 1e9)
 
     def end_run(self, how: str) -> None:
-        """Report how the run ended, and what remains to be done by the user."""
+        """Log how the run ended, and the next action of the user."""
         self.get_logger().info(f"{how}{'; Ctrl-C closes the bag' if self._asks else ''}")
 
     def missing(self) -> list[str]:
@@ -188,7 +188,7 @@ class RecorderNode(PeerNode):
             self._tell(messages, final)
 
     def _tell(self, messages: dict[str, bytes], final: bool) -> None:
-        """Print numbers of a step that is written: nobody in the loop waits for it."""
+        """Print numbers of a recorded step; the loop does not wait for this."""
         now = time.monotonic()
         if not self._tells or (now - self._told < TOLD_EVERY and not final):
             return

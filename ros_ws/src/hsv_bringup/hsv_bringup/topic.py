@@ -1,4 +1,4 @@
-"""Prints the topics of a running graph, or the messages of one: ``ros2 run hsv_bringup topic /hsv/state --once``."""
+"""Print the topics of a running graph, or the messages of one: ``ros2 run hsv_bringup topic /hsv/state --once``."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from hsv_node.middleware import message_class
 from hsv_node.roles import node_in_role
 
 DEPTH = 1000
-"""Messages that wait while this process prints."""
+"""Depth of the queue of messages that arrive while this process prints."""
 
 _PUBLISHED = tuple(node.publishes[0] for node in graph() if node.publishes)
-"""A topic of every node."""
+"""Topic that every node publishes."""
 
 _SUBSCRIBERS = {topic: sum(topic in node.subscribes for node in graph()) for topic in TOPICS}
-"""How many nodes of a whole graph subscribe each topic."""
+"""Number of subscribers of each topic in a complete graph."""
 
 
 class Decoder:
-    """Makes columns with units of the messages of a type, as its installed definition states them."""
+    """Conversion of the messages of a type to columns with units, by the installed definition."""
 
     def __init__(self, topic: str, kind: str) -> None:
         """Read the definition.
@@ -46,7 +46,7 @@ class Decoder:
         self._units = units_of(text, self._types.fielddefs, kind)
 
     def decode(self, data: bytes) -> dict[str, Any]:
-        """Return the numbers and texts of a message by field, with the unit in its name, as an export names them."""
+        """Return the numbers and texts of a message by field, with names and units as in an export."""
         columns = Track(self._topic, self._kind, self._types, [0], [data]).columns()
         return {
             name: column[0].item() if hasattr(column[0], "item") else column[0]
@@ -77,7 +77,7 @@ def _print_topics(client: GraphClient, options: argparse.Namespace) -> None:
 
 
 def _topics(client: GraphClient, wanted: str = "") -> dict[str, list[str]]:
-    """Return the topics of the domain with their types, once all are known or ``wanted`` is published.
+    """Return the topics of the domain with their types, when all are known or ``wanted`` is published.
 
     Raises:
         RunError: No node of a graph is there.
@@ -145,7 +145,7 @@ def _resolved(client: GraphClient, name: str) -> str:
 
 
 def _messages(client: GraphClient, name: str, received: list[bytes]) -> Iterator[bytes]:
-    """Yield the messages of a topic as they come, for as long as somebody publishes it.
+    """Yield the messages of a topic as they arrive, as long as it has a publisher.
 
     Raises:
         RunError: None has come.

@@ -1,4 +1,4 @@
-"""Shows on one line where the flight of a running graph is: ``ros2 run hsv_bringup watch``."""
+"""Show the current state of a running flight on one line: ``ros2 run hsv_bringup watch``."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from hsv_bringup.client import GraphClient, OneLineParser, answer, run_client
 from hsv_node.middleware import message_class
 
 EVERY = 0.2
-"""Seconds of the wall clock between two looks."""
+"""Wall time (s) between two updates."""
 
 LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Nobody waits for a viewer: what it does not take in time is gone."""
+"""Quality of service of a viewer: publishers do not wait for it, and it may miss messages."""
 
 _CLEARED = "\r\x1b[K"
-"""Goes back to the beginning of the line, and clears it."""
+"""Control sequence that returns to the start of the line and clears it."""
 
 
 def _watch(client: GraphClient, options: argparse.Namespace) -> None:

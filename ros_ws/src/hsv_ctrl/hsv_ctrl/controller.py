@@ -1,4 +1,4 @@
-"""The node for controllers without a node of their own: any registered one, any class."""
+"""The node of custom controllers, registered or named by their class."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hsv_node.parameters import given
 
 
 class ControllerNode(BlockNode):
-    """Flies the controller that the parameter ``controller`` names: a registered one, or a class.
+    """A node that steps the controller named by the parameter ``controller``: a registered one, or a class.
 
     Raises:
         ParameterError: It names none, or one with a node of its own; or a parameter is wrong, named.

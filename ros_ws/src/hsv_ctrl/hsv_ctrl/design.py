@@ -1,4 +1,4 @@
-"""Declaring a controller design on a node."""
+"""Declare the parameters of a controller design on a node."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ _SOLVER_FAILED = int(NominalStatus.SOLVER_FAILED)
 
 
 class NominalTrajectoryNode(BlockNode):
-    """Turns the measurement into reference and nominal state, and takes commands in flight."""
+    """A node that publishes reference and nominal state for each measurement, and accepts commands in flight."""
 
     def __init__(self) -> None:
         super().__init__(NOMINAL_TRAJECTORY, "trajectory")

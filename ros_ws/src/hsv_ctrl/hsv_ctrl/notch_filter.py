@@ -1,4 +1,4 @@
-"""The notch filter node: filters the pitch rate of every measured state, or of what an estimator makes of it."""
+"""The notch filter node: filters the pitch rate of every measured or estimated state."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hsv_node.parameters import declare, declare_vehicle
 
 
 class NotchFilterNode(BlockNode):
-    """Turns the measurement into the filtered state."""
+    """A node that publishes the filtered state for each measurement."""
 
     def __init__(self) -> None:
         super().__init__(NOTCH_FILTER, "filter")
@@ -25,7 +25,7 @@ class NotchFilterNode(BlockNode):
         self.component = NotchFilter.from_parameters(declare(self, (*table, ESTIMATOR_ENABLED)))
 
     def stepped(self, signals: Signals) -> None:
-        """Report that the node continues."""
+        """Publish the diagnostics."""
         if self.diagnosis_due(signals):
             self.diagnose(signals)
 

@@ -24,7 +24,7 @@ from hsv_node.parameters import declare, declare_vehicle, given
 
 
 class TubeNode(BlockNode):
-    """A controller node with a name of its own, which reports how the error lies in the tube.
+    """A controller node that publishes the position of the error in the tube.
 
     Raises:
         ParameterError: The graph's parameter ``controller`` names another controller.
@@ -39,7 +39,7 @@ class TubeNode(BlockNode):
         self._begin()
 
     def start_run(self, run: Run) -> None:
-        """Begin inside the tube."""
+        """Reset the tube status: the flight starts inside the tube."""
         super().start_run(run)
         self._begin()
 
@@ -80,7 +80,7 @@ class TubeNode(BlockNode):
 
 
 class TubeMpcNode(TubeNode):
-    """Feedback about the nominal trajectory (paper eq. 36); refuses a design that fails its quick claims."""
+    """The node of the feedback about the nominal trajectory (paper eq. 36); refuses a design that fails preflight."""
 
     def __init__(self) -> None:
         super().__init__(TUBE_MPC)
@@ -108,7 +108,7 @@ class TubeMpcNode(TubeNode):
         self.add_on_set_parameters_callback(self._on_change)
 
     def _on_change(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Fly with another ``feedback.tau``, the one parameter that is not read-only, from the next step on."""
+        """Change ``feedback.tau``, the only parameter that is not read-only, from the next step on."""
         for parameter in parameters:
             if parameter.name == TAU.name:
                 values = list(parameter.value)
@@ -126,7 +126,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 class RobustMpcNode(TubeNode):
-    """One gain about the reference; of the nominal trajectory node it takes the reference alone."""
+    """The node of robust MPC: one gain about the reference, which it takes from the nominal trajectory node."""
 
     def __init__(self) -> None:
         super().__init__(ROBUST_MPC)

@@ -1,4 +1,4 @@
-"""Arguments of a node's command line that rclpy does not expose: which parameters are meant for several nodes."""
+"""Command-line arguments that rclpy does not expose: the parameters given for several nodes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PARAMETERS = "ros__parameters"
 
 
 def shared_parameters(words: Sequence[str], several: bool) -> frozenset[str]:
-    """Return the names of the parameters that the arguments of a process give to more than one node.
+    """Return the names of the parameters in the arguments of a process that apply to more than one node.
 
     These are those in a section for every node, such as ``/**``, of a parameter file, and, in a process of ``several``
     nodes, those that are given with ``-p``. ROS has taken the arguments before: what it refuses is not looked at.

@@ -11,10 +11,10 @@ from typing import Any
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 STEP = QoSProfile(depth=256, reliability=ReliabilityPolicy.RELIABLE)
-"""Topics with one message a step: deeper than the plant may run ahead of the recorder."""
+"""Quality of service of the step topics; the queue is deeper than the lead of the plant over the recorder."""
 
 LATCHED = QoSProfile(depth=32, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""Announcements that late joiners must receive."""
+"""Quality of service of announcements, which late subscribers must receive."""
 
 PROFILES = Path(__file__).with_name("fastdds.xml")
 """The settings: how often a node announces itself at first, and when its own threads are woken."""
@@ -37,7 +37,7 @@ def type_name(kind: type) -> str:
 
 
 def prefer_profiles(environment: MutableMapping[str, str] = os.environ, directory: Path | None = None) -> None:
-    """Make Fast DDS read :data:`PROFILES`; to be called before the first node is made.
+    """Make Fast DDS read :data:`PROFILES`; call it before the first node is created.
 
     A file that the ``environment`` names, or that Fast DDS finds in the working ``directory``, has precedence.
     """

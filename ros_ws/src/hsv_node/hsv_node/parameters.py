@@ -86,7 +86,7 @@ def given(node: Node, name: str) -> bool:
 
 
 def refuse_sim_time(node: Node) -> None:
-    """Keep a node that makes the clock from going by it.
+    """Refuse ``use_sim_time`` for a node that publishes the clock.
 
     Raises:
         ParameterError: It was given ``use_sim_time``.
@@ -103,7 +103,7 @@ def refuse_sim_time(node: Node) -> None:
 
 
 def refuse_unknown(node: Node, role: str, of_others: frozenset[str]) -> None:
-    """Refuse parameters that were given to ``node`` and are none of its own.
+    """Refuse parameters given to ``node`` that it does not have.
 
     Args:
         node: A new node, with no more than what ROS has declared.

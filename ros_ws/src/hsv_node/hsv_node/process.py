@@ -14,7 +14,7 @@ from hsv.base.errors import RunError
 from hsv.graph.exclusive import claim_node, claim_topic
 
 LEAVE_WITHIN = 3.0
-"""Seconds for what takes some milliseconds; less than the standstill after which ``hsv run`` says that a node hangs."""
+"""Maximum time (s) to destroy the nodes, which takes milliseconds; ``hsv run`` reports a hung node only later."""
 
 _MONOTONIC = 1
 _NEW_THREAD = 2
@@ -22,22 +22,22 @@ _NEW_THREAD = 2
 
 
 class ProcessNode(Node):
-    """A node with an exit code, and with something to do between messages."""
+    """A node with an exit code and a task between messages, see :meth:`poll`."""
 
     of_others: ClassVar[frozenset[str]] = frozenset()
-    """Names of the parameters that this process was given for several nodes; set before any is made."""
+    """Names of the parameters of this process that apply to several nodes; set before a node is created."""
 
     def __init__(self, name: str, namespace: str | None = None, **options: Any) -> None:
-        """Make the node, with further ``options`` of rclpy's own."""
+        """Create the node with further ``options`` of rclpy."""
         super().__init__(name, namespace=namespace, **options)
         self.exit_code: int | None = None
-        """Set when the node wants to end, to the exit code of the process."""
+        """Exit code of the process, once the node is to end."""
         self.beside: list[ProcessNode] = [self]
         """The nodes of this process."""
         self._claims: list[socket.socket] = []
 
     def claim_name(self, expected: str) -> None:
-        """Keep the node's full name to it: others could not tell two of one name apart.
+        """Reserve the full name of this node, because two nodes of one name cannot be distinguished.
 
         Raises:
             RunError: Another node of this machine has it; ``expected`` says what is due.
@@ -46,7 +46,7 @@ class ProcessNode(Node):
         self._keep(claim_node(self.context.get_domain_id(), name), f"another node is called {name}", expected)
 
     def claim(self, topic: str, expected: str) -> None:
-        """Reserve a topic for this node, before anything is published on it that could disturb another.
+        """Reserve a topic for this node before it publishes.
 
         Raises:
             RunError: Another node of this machine has it; ``expected`` says what is due.
@@ -62,7 +62,7 @@ class ProcessNode(Node):
         self._claims.append(held)
 
     def destroy_node(self) -> None:
-        """Leave name and topics to others."""
+        """Release name and topics."""
         super().destroy_node()
         for held in self._claims:
             held.close()
@@ -72,14 +72,14 @@ class ProcessNode(Node):
         self.exit_code = code
 
     def poll(self) -> None:
-        """Called between messages, at least four times a second until it ends; overridden to watch something."""
+        """Run a task between messages, at least four times per second; for subclasses."""
 
     def stopped(self, signal_number: int) -> int:
-        """Return the exit code after a signal; overridden by nodes whose end is that of the run, which it cut short."""
+        """Return the exit code after a signal; nodes whose end interrupts the run override it."""
         return 0
 
     def close(self) -> None:
-        """Called once before the process ends; overridden where something must be saved."""
+        """Save data once before the process ends; for subclasses."""
 
     def wait_timeout(self) -> float:
         """Return how long (s) to wait for a message before :meth:`poll` is due."""
@@ -87,7 +87,7 @@ class ProcessNode(Node):
 
 
 class _Event(ctypes.Structure):
-    """``struct sigevent``: what happens when a timer has run down."""
+    """``struct sigevent``: the notification of an expired timer."""
 
     _fields_ = (
         ("value", ctypes.c_long),

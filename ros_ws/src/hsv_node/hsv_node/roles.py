@@ -1,4 +1,4 @@
-"""Roles of the graph: a node is identified by what it publishes, whatever it and its topics are called."""
+"""Roles of the graph: a node is identified by the types of its messages, because names may be remapped."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ def full_name(name: str, namespace: str) -> str:
 
 
 def published_types(asking: Node, name: str, namespace: str) -> set[str]:
-    """Return the types of all that a node publishes."""
+    """Return the types of all messages that a node publishes."""
     return {kind for kinds in published(asking, name, namespace).values() for kind in kinds}
 
 
 def published(asking: Node, name: str, namespace: str) -> dict[str, list[str]]:
-    """Return the types of the topics that a node publishes, by full name; none of a node that is not known."""
+    """Return the types of the topics that a node publishes, by full name; empty for an unknown node."""
     return _known(asking.get_publisher_names_and_types_by_node, name, namespace)
 
 
 def services(asking: Node, name: str, namespace: str) -> dict[str, list[str]]:
-    """Return the types of the services that a node offers, by full name; none of a node that is not known."""
+    """Return the types of the services that a node offers, by full name; empty for an unknown node."""
     return _known(asking.get_service_names_and_types_by_node, name, namespace)
 
 

@@ -1,4 +1,4 @@
-"""The fault injector node: between the controller's command and the actuator."""
+"""The fault injector node: applies link and faults to the command of the controller."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from hsv_node.parameters import declare, declare_vehicle
 
 
 class FaultInjectorNode(BlockNode):
-    """Turns the command into that of the actuators, and says which faults act."""
+    """A node that publishes the input of the actuators and the active faults for each command."""
 
     def __init__(self) -> None:
         super().__init__(FAULT_INJECTOR, "faults")
@@ -32,18 +32,18 @@ class FaultInjectorNode(BlockNode):
         self._period = values["period"]
         self._controller = controller_node(self.controller)
         self._due_step = 0
-        """The step that the controller has to answer next."""
+        """Next step for which a command is expected."""
         self.component = self._injector = FaultInjector.from_parameters(values)
         self.create_service(InjectFault, INJECT_FAULT, self._inject)
         self.create_service(ClearFault, CLEAR_FAULT, self._clear)
 
     def start_run(self, run: Run) -> None:
-        """Begin with step 0 and the scheduled faults."""
+        """Reset to step 0 and the scheduled faults."""
         super().start_run(run)
         self._due_step = 0
 
     def on_message(self, topic: str, message: bytes) -> None:
-        """Step; in a run, a step or time other than the expected one ends it."""
+        """Process a command; during a run an unexpected step or time ends the run."""
         if self.announced is not None:
             step, (seconds, nanoseconds) = self.messages[topic].step(message), stamp_of(self._due_step, self._period)
             if step != self._due_step or stamp_in(message) != seconds * 10**9 + nanoseconds:
@@ -53,7 +53,7 @@ class FaultInjectorNode(BlockNode):
         super().on_message(topic, message)
 
     def missing(self) -> list[str]:
-        """Wait for the links; two controllers in them end the run before it begins."""
+        """Return the missing links; end the run if there are two controllers."""
         missing = super().missing()
         if not missing and len(names := self.publishers_of(COMMAND)) > 1:
             self._end_for_two(names)
@@ -79,7 +79,7 @@ class FaultInjectorNode(BlockNode):
         self.finish(1)
 
     def stepped(self, signals: Signals) -> None:
-        """Report whether a fault acts."""
+        """Publish whether a fault acts."""
         if self.diagnosis_due(signals):
             self.diagnose(signals, "faults act" if signals.active_faults else "no fault")
 

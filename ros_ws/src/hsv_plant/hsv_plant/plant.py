@@ -1,4 +1,4 @@
-"""The plant node: owns simulated time, publishes the state of a step and integrates when its input has come."""
+"""The plant node: owns simulated time, publishes the state of a step, and integrates when its input has arrived."""
 
 from __future__ import annotations
 
@@ -45,17 +45,17 @@ from hsv_node.middleware import LATCHED, STEP
 from hsv_node.parameters import declare, declare_vehicle, refuse_sim_time
 
 MAX_AHEAD = 100
-"""Steps that the plant may be ahead of the recorder."""
+"""Maximum number of steps that the plant may be ahead of the recorder."""
 
 LAST_WORDS = 1.0
-"""Seconds for which a plant that ends waits for those whom it has told so; on a run that ends in order, a fraction."""
+"""Maximum time (s) to wait at the end until the other nodes have received the last state; usually much less."""
 
 
 _IN_FLIGHT = tuple(parameter.name for parameter in PACE_PARAMETERS if not parameter.read_only)
 
 
 class PlantNode(LockstepNode):
-    """Publishes measurement, state, forces and clock; one step per message of the actuators."""
+    """A node that publishes measurement, state, forces and clock, one step per message of the actuators."""
 
     def __init__(self) -> None:
         super().__init__(PLANT, "flight")
@@ -65,7 +65,7 @@ class PlantNode(LockstepNode):
         self.plant = Plant.from_parameters(self.values)
         self._peers = [node for node in peers(PLANT, self.controller, self.recorded) if not node.foreign]
         self._foreign_controller = ""
-        """Full name of the controller where it is a node that is not of this bench."""
+        """Full name of an external controller node; empty for other controllers."""
         self._ready: set[str] = set()
         # The measurement first: the other nodes work on it while the rest is published.
         self._answers = [(StepMessages(topic).pack, self.create_step_publisher(topic)) for topic in PLANT.publishes]
@@ -83,20 +83,20 @@ class PlantNode(LockstepNode):
         self._announcer.publish(self._run)
         self._last_state = self.create_publisher(VehicleState, LAST_STATE, LATCHED)
         self._broken_off = ""
-        """Reason for which the run was aborted, if it was."""
+        """Reason why the run was aborted; empty otherwise."""
         self._signals = Signals()
         self._advance()
         self._started = False
         self._recorded_step = -1
         self._answered = False
-        """Whether the actuators' input of this step has come."""
+        """Whether the input of the actuators for this step has arrived."""
         self._flown = False
         self._begun = time.monotonic()
         self._paced_from = self._begun, 0
-        """Wall time (s) and step from which the pace is counted."""
+        """Wall time (s) and step at the start of the current pace."""
         self.add_on_set_parameters_callback(self._on_change)
         self._messages = 0
-        """Answers of the nodes so far: what must not stand still."""
+        """Number of answers of the nodes so far, which must increase."""
         self._standstill = Standstill()
 
     def _on_ready(self, ready: Ready) -> None:
@@ -104,7 +104,7 @@ class PlantNode(LockstepNode):
             self._ready.add(ready.node)
 
     def _on_change(self, parameters: list[RosParameter]) -> SetParametersResult:
-        """Take another pace, or pause: between this step, which is published, and the next."""
+        """Change the pace, or pause, after the current step."""
         step = self._signals.step
         for parameter in parameters:
             if parameter.name in _IN_FLIGHT:
@@ -149,7 +149,7 @@ class PlantNode(LockstepNode):
         self.finish(1)
 
     def _continue(self) -> None:
-        """Take the next step, unless its input, the recorder or the wall clock has to be waited for."""
+        """Execute the next step, unless the plant must wait for its input, the recorder or the wall clock."""
         if self._flown and (not self.recorded or self._recorded_step >= self._signals.step):
             self._land()
         elif self._answered and not self.values["paused"] and self._delay() <= 0.0 and self._room():
@@ -196,7 +196,7 @@ class PlantNode(LockstepNode):
                 self._give_up(waited)
 
     def _limit(self) -> float:
-        """Return the time (s) to wait; where a foreign controller's is shorter, not for the recorder, too."""
+        """Return the time (s) to wait for a peer; a shorter one for an external controller excludes the recorder."""
         limit = float(self.values["step_timeout"])
         return max(limit, STEP_TIMEOUT) if self._foreign_controller and self._behind_recorder() else limit
 
@@ -204,7 +204,7 @@ class PlantNode(LockstepNode):
         return self._flown or not self._room()
 
     def wait_timeout(self) -> float:
-        """Wake in time for the next state when paced."""
+        """Return the time (s) to the next poll, or to the next state in a paced flight."""
         if not self._started:
             return LINK_CHECK
         due = self._answered and self._room() and not self.values["paused"]
@@ -216,7 +216,7 @@ class PlantNode(LockstepNode):
         return 0 if signal_number == signal.SIGINT else 128 + signal_number
 
     def close(self) -> None:
-        """Say how the run ended, here and to the other nodes."""
+        """Log how the run ended, and announce it to the other nodes."""
         if not self._started:
             return
         run, where = f"run {short_id(self._run)}", step_in_words(self._signals.step, self.plant.period)
@@ -248,7 +248,7 @@ class PlantNode(LockstepNode):
         return all(peer.name in self._ready for peer in self._peers)
 
     def _missing(self) -> list[str]:
-        """Return what the start waits for."""
+        """Return the missing conditions for the start."""
         unready = [peer.name for peer in self._peers if peer.name not in self._ready]
         return [f"{name} ({self._readies.topic_name})" for name in unready] or self.missing_links()
 
@@ -269,7 +269,7 @@ class PlantNode(LockstepNode):
         self.finish(1)
 
     def _elsewhere(self) -> list[NodeDescription]:
-        """Return the peers in other processes: those of this one live as long as the plant."""
+        """Return the peers in other processes."""
         here = {node.get_fully_qualified_name() for node in self.beside}
         return [peer for peer in self._peers if self.node_in_role(peer) not in here]
 

@@ -27,7 +27,7 @@ _WHOLE: set[CodeType] = set()
 
 
 def uninterrupted(function: Callable[P, R]) -> Callable[P, R]:
-    """Delay an interruption of ``function``, a short one, until it has returned.
+    """Decorate a short ``function`` so that Ctrl-C takes effect only after it has returned.
 
     So a started process is always recorded before Ctrl-C takes effect. Effective after :func:`take_interrupts`. Longer
     work, and processes that must never receive Ctrl-C, use :func:`ctrl_c_held_back`.

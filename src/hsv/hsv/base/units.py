@@ -75,7 +75,7 @@ def registry() -> pint.UnitRegistry:
 
 
 def is_finite(value: float) -> bool:
-    """Tell whether ``value`` is a number that a double can hold, which a whole one need not be."""
+    """Return whether ``value`` is a finite number in the range of a double; an integer may exceed it."""
     return abs(value) <= sys.float_info.max
 
 
@@ -161,7 +161,7 @@ def si_unit_of(text: object) -> str:
 
 
 def written(value: float, unit: str) -> float | str:
-    """Return a number in ``unit`` as a file has it: a text, where it has a unit. No digit is lost."""
+    """Return a number for a file: a text with its ``unit``, or the number if it has none; no digit is lost."""
     return value if unit == "1" else f"{value!r} {unit}"
 
 

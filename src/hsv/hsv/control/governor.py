@@ -261,7 +261,7 @@ class Governor:
 
 
 class CommandGovernor:
-    """Turns the commands that come in flight into references that go on from the one that is flown."""
+    """A governor that turns commands in flight into references that continue from the current one."""
 
     def __init__(self, governor: Governor, trajectory: NominalTrajectory, vehicle: Vehicle) -> None:
         """Govern the commands of ``trajectory``, which flies the ``vehicle``."""

@@ -22,7 +22,7 @@ ROBUST_MPC_PARAMETERS = (
 
 
 class RobustMpc(Controller):
-    """One of the nominal gains K acts on the whole deviation from the reference; it has no memory."""
+    """Robust MPC: one of the nominal gains K acts on the deviation from the reference; it has no memory."""
 
     PARAMETERS = ROBUST_MPC_PARAMETERS
     in_core = True

@@ -186,7 +186,7 @@ def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int) ->
 
 
 def loop_memory(flights: int) -> np.ndarray:
-    """Return room for what the core keeps of so many flights from step to step, aligned for its registers."""
+    """Return aligned memory for the state of the loop of this number of flights between calls."""
     room = np.zeros(lib.hsv_memory_size(flights) + 64, np.uint8)
     return room[-room.ctypes.data % 64 :]
 

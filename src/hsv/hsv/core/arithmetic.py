@@ -19,7 +19,7 @@ def sine_cosine(x: float) -> tuple[float, float]:
 
 
 tangent: Callable[[float], float] = lib.hsv_tangent
-"""Of an angle (rad) up to 1e5 in magnitude."""
+"""Return the tangent of an angle (rad) up to 1e5 in magnitude."""
 
 arcsine: Callable[[float], float] = lib.hsv_arcsine
 """Angle (rad) from -pi / 2 to pi / 2 whose sine is given, from -1 to 1."""
@@ -28,7 +28,7 @@ arctangent2: Callable[[float, float], float] = lib.hsv_arctangent2
 """Angle (rad) from -pi to pi of the point (x, y), given y first; each zero or of magnitude 1e-140 to 1e140."""
 
 exponential: Callable[[float], float] = lib.hsv_exponential
-"""Of a number up to 700 in magnitude."""
+"""Return the exponential of a number up to 700 in magnitude."""
 
 logarithm: Callable[[float], float] = lib.hsv_logarithm
 """The natural one of a normal positive number."""

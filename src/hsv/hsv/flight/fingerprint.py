@@ -18,7 +18,7 @@ import numpy as np
 from hsv.flight.scenario import Scenario, load_scenario
 
 FORMAT = 1
-"""Version of what is digested, and in which order."""
+"""Version of the contents and the order of the digested data."""
 
 TABLE = "fingerprints.toml"
 
@@ -63,7 +63,7 @@ def as_published(found: str | None, scenario: Scenario | None, design_hash: str)
 
 
 def published_in_words(found: str | None, same: bool | None) -> str:
-    """Return what :func:`as_published` said about a fingerprint, for people."""
+    """Return the result of :func:`as_published` as text."""
     if found is None:
         return "none: steps are missing"
     return {True: "as published", False: "not the published flight of this scenario", None: "none is published"}[same]

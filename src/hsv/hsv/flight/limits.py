@@ -75,7 +75,7 @@ def criteria_not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, flo
 
 
 def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem) -> str:
-    """Return the same without what is not judged."""
+    """Return the verdict sentence without the metrics that are not judged."""
     if not judged:
         return "not judged: the scenario has no limits"
     if all(verdict.within for verdict in judged.values()):

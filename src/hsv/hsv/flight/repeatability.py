@@ -53,7 +53,7 @@ def scenario_of(name: str) -> Scenario:
 
 
 def findings(scenario: Scenario) -> Iterator[Finding]:
-    """Fly ``scenario`` in every way in which it must be the same, and yield what came out.
+    """Fly ``scenario`` in every way that must give the same flight, and yield the findings.
 
     Raises:
         ScenarioError: It cannot be flown.

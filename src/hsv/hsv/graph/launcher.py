@@ -189,12 +189,12 @@ class Launcher:
             time.sleep(_LOOK)
 
     def _await_first_words(self, process: _Process) -> None:
-        """Wait until who watches has said where, and so sees the flight from its start; not where it fails or hangs."""
+        """Wait until the viewer has reported its addresses or failed, so that it sees the flight from the start."""
         while not process.words and process.popen.poll() is None and process.idle() < HUNG_AFTER:
             time.sleep(_LOOK)
 
     def _watch(self, process: _Process, decides: bool) -> None:
-        """Tell a process that does nothing at all; it ends the run only if it ``decides``."""
+        """Report a process that makes no progress; it ends the run only if it ``decides``."""
         idle = process.idle()
         name = process.description.label
         if idle > self._wait_timeout and decides:
@@ -205,7 +205,7 @@ class Launcher:
             self._on_line(name, WARNING + words)
 
     def stop(self) -> None:
-        """End all processes: ask, then force; the plant first, so that the recorder gets everything."""
+        """End all processes with SIGTERM, then SIGKILL; the plant first, so that the recorder receives everything."""
         for number, grace in ((signal.SIGINT, GRACE), (signal.SIGTERM, GRACE / 5), (signal.SIGKILL, GRACE)):
             running = [p for p in reversed(self._processes) if p.popen.poll() is None]
             for process in running:

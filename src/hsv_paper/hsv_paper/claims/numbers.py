@@ -1,4 +1,4 @@
-"""Numbers that judge claims and are not entries of certificates or measures of flights, in the order of the paper.
+"""Computations for claims that neither certificates nor flights provide, in the order of the paper.
 
 A claim names its function in ``claims.toml``. Each returns numbers (SI) and words by name; an array has an element for
 each vehicle, the nominal one first.

@@ -40,14 +40,14 @@ REST = 0.4
 """Time from settling to rest, as a share of the time to settling: a longer one changes nothing."""
 
 TYPICAL = 12.0
-"""Time (s) for which Runge-Kutta steps are as long as in flights; where the time is longer, so are they."""
+"""Longest time (s) with the Runge-Kutta steps of flights; for longer times the steps are longer in proportion."""
 
 
 PERIOD = 0.02
 """T (s), as flown."""
 
 SUBSTEPS = 2
-"""Runge-Kutta steps per period, as flown."""
+"""Runge-Kutta steps per period, as in flights."""
 
 DELAYS = (0.0, 0.1, 0.2)
 """Times (s) after which the effectiveness is known."""

@@ -172,7 +172,7 @@ def sensors(data: SensorData, plan: Plan, reach: float = REACH, of: str = "senso
     """Return the sensor models of the rigid states by name; ideal ones are omitted.
 
     Noise and a Gauss-Markov bias count ``reach`` standard deviations, and so do biases and scales that are drawn once a
-    flight; a quantum counts half; what is late is so exactly.
+    flight. A quantum counts half. Delays are modelled exactly.
     """
     rigid = slice(0, N_RIGID)
     scale = (np.abs(data.scale) + reach * data.scale_sigma)[rigid]

@@ -1,4 +1,4 @@
-"""The engine of campaigns: it flies the missing batches, keeps their results, and estimates what is to come."""
+"""The engine of campaigns: it flies the missing batches, stores their results, and estimates the remaining time."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ _ROWS = 1024
 
 
 class ResultStore:
-    """Stores the batches of one campaign; a stored batch stays whole whatever happens to this process."""
+    """The store of the batches of one campaign; a stored batch is complete even if the process is killed."""
 
     fly = staticmethod(fly_batch)
     time = staticmethod(time_flight)
@@ -42,7 +42,7 @@ class ResultStore:
         """Yield the numbers of the finished batches; only one process at a time may hold a campaign.
 
         Args:
-            restart: Whether to discard what is there.
+            restart: Whether to discard existing batches.
 
         Raises:
             CampaignError: The file or folder belongs to another campaign, cannot be made, or is in use.
@@ -63,7 +63,7 @@ class ResultStore:
             yield {batch for batch in range(len(self._campaign.batches)) if self._is_whole(batch)}
 
     def keep(self, batch: int, content: bytes) -> None:
-        """Keep a finished batch: it is there whole, or not at all.
+        """Store a finished batch atomically.
 
         Raises:
             CampaignError: It cannot be written.
@@ -218,7 +218,7 @@ def locked(path: Path, complaint: str) -> Iterator[None]:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file that is there whole, or not at all.
+    """Write a file atomically.
 
     Raises:
         CampaignError: It cannot be written.
@@ -231,7 +231,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 @contextmanager
 def _writing(path: Path, temporary: Path | None = None) -> Iterator[None]:
-    """Turn what the system refuses into an error that names ``path``; leave no half of a ``temporary`` file."""
+    """Convert system errors to an error that names ``path``, and remove an incomplete ``temporary`` file."""
     try:
         yield
     except OSError as error:

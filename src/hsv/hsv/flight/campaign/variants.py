@@ -1,4 +1,4 @@
-"""Components of flights that differ little from one: what a change leaves as it was is built once and shared."""
+"""Components of flights that differ little from one flight; unchanged components are built once and shared."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class TriedFault:
     channel: str
     kind: str
     parameter: str
-    """A parameter of its kind or occurrence, or :data:`DURATION`"""
+    """Parameter of the fault that is varied: one of its kind or occurrence, or :data:`DURATION`"""
     unit: str
     """Unit of that parameter, as it is written."""
     harmless: float
