@@ -49,11 +49,11 @@ __all__ = [
 
 
 def fly(scenario: Scenario | str) -> Flight:
-    """Return the flight of a scenario, or of the one with this name or path, in this process.
+    """Simulate a scenario, given as an object, a name or a path, in this process.
 
     Raises:
         ScenarioError: Names the field that is wrong, or what is wrong with the design.
-        RunError: A controller of one's own failed; it is named, with the step.
+        RunError: A custom controller failed; the message names it and the step.
     """
     return fly_components(assemble_flight(load(scenario) if isinstance(scenario, str) else scenario))
 

@@ -1,4 +1,4 @@
-"""The hsv-paper command: the paper's figures and claims, what its choices are sensitive to, and physical limits."""
+"""The hsv-paper command: figures and claims of the paper, sensitivity of its choices, and physical limits."""
 
 from __future__ import annotations
 

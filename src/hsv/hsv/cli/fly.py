@@ -551,7 +551,7 @@ def scenario(
 
 
 def _factor(text: str) -> tuple[str, tuple[str, str]]:
-    """Return field, least and largest value of a factor as it is given."""
+    """Return field, minimum and maximum of a factor from its text."""
     field, _, ends = text.partition("=")
     low, dots, high = ends.partition("..")
     if not dots:

@@ -33,7 +33,7 @@ SHOWN_EXCURSIONS = 5
 
 
 class Program(StrEnum):
-    """A viewer that can be asked for."""
+    """Choice of a viewer."""
 
     foxglove = "foxglove"
     lichtblick = "lichtblick"

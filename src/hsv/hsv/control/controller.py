@@ -116,7 +116,7 @@ class Controller(ABC):
     in_core = False
     """Whether the core contains this law; ``kernel`` is then its data"""
     kernel: Any = None
-    """Of other controllers, the :class:`StepKernel` to call; None: call :meth:`unsaturated_input`"""
+    """The :class:`StepKernel` of a controller outside the core; None: call :meth:`unsaturated_input`"""
     library: Any = None
     """The process of the shared library that holds the function, or None, see :mod:`hsv.control.library_process`"""
 

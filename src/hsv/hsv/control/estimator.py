@@ -1,13 +1,12 @@
-"""An estimator of the state for noisy sensors: an extended Kalman filter of constant gain, see ``core/estimator.h``.
+"""State estimator for noisy sensors: an extended Kalman filter with constant gain, see ``core/estimator.h``.
 
-It predicts with the equations of motion of the design's vehicle under the command of the step before, and corrects with
-a gain that is the steady one about the trim where the flight starts. Beside the nine states it estimates an offset of
-each input, which takes up what the model does not know: a fault, another vehicle, wind. Of the measurement it uses the
-five rigid states; the elastic ones are predicted. Its estimate takes the measurement's place for the controller and the
-notch filter. The nominal model is scheduled by altitude and velocity as measured: to wait for the estimate would be a
-hop more in every step.
+The filter predicts with the equations of motion of the design's vehicle under the previous command, and corrects with
+the steady-state gain at the initial trim of the flight. Besides the nine states it estimates an offset of each input,
+which compensates model errors: a fault, another vehicle, wind. It uses the measured rigid states; elastic states are
+predicted. Controller and notch filter receive the estimate instead of the measurement. The nominal model is scheduled
+by the measured altitude and velocity, because waiting for the estimate would delay every step.
 
-The gain is found by iterating the Riccati equation in arithmetic that is the same on every processor.
+The gain is computed by iterating the Riccati equation in arithmetic that is the same on every processor.
 """
 
 from __future__ import annotations

@@ -291,13 +291,13 @@ class CommandGovernor:
         return cls(Governor(trajectory.data, vehicle.decoupled, design.period, bounds), trajectory, vehicle)
 
     def command(self, altitude: float, velocity: float, duration: float = 0.0, blend: float = 0.0) -> tuple[int, float]:
-        """Fly to a point as fast as the tightened inputs permit, once the commands given before are flown.
+        """Add a leg to a point, as fast as the tightened inputs permit, after all earlier commands.
 
         Args:
-            altitude: Of the point, m.
-            velocity: Of the point, m/s.
-            duration: Least length of the ramp, s.
-            blend: Half the time in which the rate changes at a corner, s; 0: :data:`USUAL_BLEND`.
+            altitude: Altitude of the point, m.
+            velocity: Velocity of the point, m/s.
+            duration: Minimum length of the ramp, s.
+            blend: Half-width of the blend at a corner, s; 0: :data:`USUAL_BLEND`.
 
         Returns:
             The first step that differs, and the time (s) at which the reference comes to rest.

@@ -96,7 +96,7 @@ def feedback_gain(
     """Return F such that A_i + B_i F share one Lyapunov function (paper eq. 24), verified after solving.
 
     ``"guaranteed_cost"`` minimises a bound, common to all vertices, of the quadratic cost of the responses to the
-    disturbance columns. ``"feasibility"`` is (24) as printed, which leaves F to the solver's taste; it is for study.
+    disturbance columns. ``"feasibility"`` is (24) as printed, which does not determine F; it is for studies only.
 
     Args:
         A: (r, n, n) vertices.

@@ -65,24 +65,24 @@ def standard_quantiles(shares: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, kw_only=True)
 class Distribution:
-    """A number that is drawn, between ``low`` and ``high`` in ``unit``."""
+    """A random number between ``low`` and ``high``, in ``unit``."""
 
     unit: str
     low: float
     high: float
     kind: str = "uniform"
-    """One of :data:`KINDS`; the mean of each is half-way"""
+    """One of :data:`KINDS`, each symmetric about its mean"""
     whole: bool = False
-    """Whether whole numbers are drawn, all between the ends, both included, with equal chances"""
+    """Whether the number is an integer, drawn with equal probabilities, ends included"""
 
     @property
     def middle(self) -> float:
-        """The mean, rounded down where numbers are whole, which stands for the number where nothing is drawn."""
+        """Mean, rounded down for integers; the value when nothing is drawn."""
         mean = (self.low + self.high) / 2.0
         return float(np.floor(mean)) if self.whole else rounded(mean)
 
     def quantiles(self, shares: np.ndarray) -> np.ndarray:
-        """Return the values below which these ``shares`` (0 to 1) of the distribution lie, to 15 digits."""
+        """Return the quantiles at ``shares`` (0 to 1), rounded to 15 digits."""
         if self.kind == "normal":
             deviation = (self.high - self.low) / (2.0 * TRUNCATION)
             values = (self.low + self.high) / 2.0 + deviation * standard_quantiles(

@@ -39,20 +39,20 @@ def fingerprint(flown: np.ndarray) -> str:
 
 
 def digested(flown: np.ndarray) -> np.ndarray:
-    """Return rows of a history as their fingerprint has them."""
+    """Return rows of a history in the form used for the fingerprint."""
     rows = np.ascontiguousarray(flown, "<f8")
     return np.where(unknown, np.nan, rows) if (unknown := np.isnan(rows)).any() else rows
 
 
 def written(digest: bytes) -> str:
-    """Return a digest as a fingerprint is written."""
+    """Return the text of a fingerprint from its digest."""
     return f"v{FORMAT}:{digest.hex()}"
 
 
 def as_published(found: str | None, scenario: Scenario | None, design_hash: str) -> bool | None:
-    """Tell whether the flight of a scenario with the design of this digest has its published fingerprint.
+    """Return whether the flight of a scenario, with the design of this digest, has its published fingerprint.
 
-    ``None`` where nothing can be said: no fingerprint or scenario, one that is not as it is shipped, another design.
+    ``None``: there is no fingerprint or scenario to compare, or scenario or design differ from the shipped ones.
     """
     entry = _table().get(scenario.name) if scenario else None
     if found is None or scenario is None or entry is None or entry["design_hash"] != design_hash:

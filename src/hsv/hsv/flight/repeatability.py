@@ -1,7 +1,7 @@
-"""Whether a controller flies the same bytes whenever, and beside whatever else, it is flown.
+"""Check that a controller gives the same bits in every flight, alone and together with other flights.
 
-Runs are repeated, campaigns are flown by many processes, and replays go on from where another run stood: all that asks
-of a controller that everything it keeps from step to step is its own, is forgotten in ``reset`` and can be copied.
+Repeated runs, campaigns in many processes and replays from the middle of a run require that the memory of a controller
+belongs to the instance, is cleared by ``reset`` and can be copied.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from hsv.flight.scenario import Scenario, load_scenario, scenario_names
 from hsv.model.signals import PITCH_RATE
 
 FLOWN_BY_DEFAULT = "case1"
-"""The scenario of a controller that is given without one."""
+"""Default scenario for a controller."""
 
 _FLIGHTS = 2
 """Flights at a time in each process under load."""

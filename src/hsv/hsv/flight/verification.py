@@ -67,11 +67,11 @@ class Disturbances(NamedTuple):
 
 
 def disturbances(subject: Subject, flight: Flight) -> Disturbances:
-    """Return the disturbances that acted in a flight, (13)-(18), and its error in the tube, (22).
+    """Return the disturbances in a flight, (13)-(18), and its error in the tube, (22).
 
-    Delta(k) = x(k+1) - [x_r(k+1) + d_r(k)] - A(p) (x - x_r) - B(p) (u - u_r), and of it B_e(p) times the lost elevator
-    is the fault; the rest is written as three held accelerations and what they leave in altitude and pitch angle.
-    Behind actuators u and the lost elevator are mean positions over a period.
+    The disturbance is Delta(k) = x(k+1) - [x_r(k+1) + d_r(k)] - A(p) (x - x_r) - B(p) (u - u_r). Its part B_e(p) times
+    the lost elevator deflection is due to the fault. The rest is represented by three held accelerations and the
+    residuals of altitude and pitch angle. With actuators, u and the lost deflection are mean positions over a period.
     """
     design, vehicle, h = subject.design, subject.vehicle, flight.history
     notch, plan = discretise(design.notch, design.period), flight.plan

@@ -97,10 +97,10 @@ class _Process:
     standstill: Standstill = field(default_factory=Standstill)
     hung: bool = False
     lost: bool = False
-    """Whether it has ended before its time, and the flight goes on without it."""
+    """Whether the process has ended early and the flight continues without it."""
 
     def idle(self) -> float:
-        """Return for how long (s) it has used no processor time; 0 where that cannot be found out."""
+        """Return the time (s) for which the process has used no processor time; 0 if unknown."""
         used = processor_time(self.popen.pid)
         return 0.0 if used is None else self.standstill.look(used)
 
@@ -269,9 +269,9 @@ class Launcher:
 
 
 def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.socket:
-    """Return what keeps domain and namespace to a run of ``nodes``, on this machine, for as long as it is open.
+    """Reserve domain and namespace for a run of ``nodes`` on this machine; return the socket that holds the claim.
 
-    The nodes of two runs would take each other's messages, and both would be lost.
+    The nodes of two runs would receive each other's messages, and both runs would fail.
 
     Raises:
         RunError: Another run has them, or a node that publishes a topic of one of ``nodes``.

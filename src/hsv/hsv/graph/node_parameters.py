@@ -34,5 +34,5 @@ NODE_PARAMETERS: dict[str, tuple[Parameter, ...]] = {
     RECORDER.name: RECORDER_PARAMETERS,
     LIVE.name: LIVE_PARAMETERS,
 }
-"""Parameter tables by node, without that of a controller of one's own. Every node also declares
+"""Parameter tables by node, without those of custom controllers. Every node also declares
 :data:`hsv.bags.infrastructure_parameters.LOCKSTEP_PARAMETERS`."""

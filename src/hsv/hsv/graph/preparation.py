@@ -35,7 +35,7 @@ from hsv.graph.launcher import executable
 _NO_DESIGN = ParameterSections({"design.name": NO_DESIGN})
 
 FOREIGN_STEP_TIMEOUT = 2.5
-"""The same with an external controller."""
+"""Default step timeout (s) with an external controller."""
 
 
 @dataclass(frozen=True)

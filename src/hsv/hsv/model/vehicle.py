@@ -224,7 +224,7 @@ class Vehicle:
 
     @cached_property
     def digest(self) -> str:
-        """The SHA-256 of all but the name; empty for the default vehicle, which old designs are for."""
+        """SHA-256 of all data except the name; empty for the default vehicle, as in old designs."""
         own, default = (_digest(vehicle) for vehicle in (self, load_vehicle()))
         return "" if own == default else own
 

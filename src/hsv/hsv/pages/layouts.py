@@ -166,7 +166,7 @@ def _path(label: str, topic: str, field: str, colour: str = "", size: float = 1.
 
 
 def _split(direction: str, parts: list[Any], first: float = 0.0) -> Any:
-    """Return parts beside or above one another: of equal size, or with ``first`` percent for the first of two."""
+    """Return parts side by side or stacked: of equal size, or with ``first`` percent for the first of two."""
     if len(parts) == 1:
         return parts[0]
     share = first or round(100.0 / len(parts), 3)

@@ -67,7 +67,7 @@ def capitalised(text: str) -> str:
 
 
 def switched(texts: Mapping[UnitSystem, str]) -> Markup:
-    """Return HTML of which the page shows the text of one system of units; equal texts are there once."""
+    """Return HTML with a text for each system of units, of which the page shows one; equal texts are merged."""
     systems: dict[str, list[str]] = {}
     for system, text in texts.items():
         systems.setdefault(text, []).append(system)

@@ -28,7 +28,7 @@ class Viewer:
     source: str
     """Address from which to get it."""
     scene: bool = False
-    """Whether it draws the vehicle in 3-D, from a file that the bag is copied to."""
+    """Whether the viewer draws the vehicle in 3-D, from a copy of the bag."""
 
     def program(self) -> str | None:
         """Return the path of the program, None if it is not installed."""

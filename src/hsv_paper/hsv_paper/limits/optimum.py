@@ -88,7 +88,7 @@ class Problem:
         return np.asarray(self.period + scalar * self.period_slope)
 
     def defects(self, point: Point) -> np.ndarray:
-        """Return what the states miss of the dynamics (9 N), and at the end of rest (9 more then), scaled."""
+        """Return the scaled defects of the dynamics (9 N) and, for a final trim, of rest at the end (9 more)."""
         end, _ = self.transitions(point)
         missing = [(end - point.state[1:]) / STATE_SCALE]
         if self.at_rest:

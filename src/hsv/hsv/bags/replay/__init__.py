@@ -1,1 +1,1 @@
-"""Repeating a recorded run: process by process, or the whole loop, and comparing with what was recorded."""
+"""Replay of a recorded run, process by process or as a complete loop, and comparison with the record."""

@@ -1,4 +1,4 @@
-"""Origin of a bag: the parameters attached to it, and what was changed in flight."""
+"""Parameters of a recorded flight: the attached ones, and their changes in flight."""
 
 from __future__ import annotations
 
@@ -59,13 +59,13 @@ DESIGN, SCENARIO = "design.yaml", "scenario.yaml"
 _OF_THE_RUN = {
     p.name for p in (*PACE_PARAMETERS, *RECORDER_PARAMETERS, *CERTIFICATE_PARAMETERS, *LOCKSTEP_PARAMETERS)
 } - {p.name for p in (*CONTROLLER_PARAMETERS, ESTIMATOR_ENABLED)}
-"""Parameters that say how and where the flight was made, such as its pace and files, and nothing of the flight."""
+"""Parameters of the execution, such as pace and files, which do not change the flight."""
 
 LEAST_ACTIVE_TIME = 10.0
-"""Seconds of simulated time for which the controller must have done something."""
+"""Simulated time (s) in which the controller must have acted."""
 
 ACTIVE_INPUT = 1e-6
-"""Deviation of a command from the reference input (-, rad) from which on the controller does something."""
+"""Smallest deviation (1, rad) of a command from the reference input that counts as an action of the controller."""
 
 
 def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
@@ -130,7 +130,7 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
 
 
 def _attached(bag: Bag, name: str) -> ParameterSections:
-    """Return attached parameters of a flight; of a vehicle that was in a file, which is not read, what it is called."""
+    """Return attached parameters of a flight; a vehicle from a file is represented by its name."""
     sections = ParameterSections.parse(bag.text(name), f"{bag.path}: {name}")
     for flat in (sections.shared, *sections.own.values()):
         if "vehicle.name" in flat:
@@ -139,12 +139,12 @@ def _attached(bag: Bag, name: str) -> ParameterSections:
 
 
 def controller_of(values: ParameterSections) -> str:
-    """Return the controller that these parameters choose, as a scenario names it; nothing is loaded."""
+    """Return the name of the controller in these parameters, without loading it."""
     return str(validate(CONTROLLER_PARAMETERS, values.of(PLANT.name))["controller"])
 
 
 def estimated(values: ParameterSections) -> bool:
-    """Tell whether an estimator flies with these parameters."""
+    """Return whether an estimator is enabled in these parameters."""
     return bool(validate((ESTIMATOR_ENABLED,), values.of(NOTCH_FILTER.name))[ESTIMATOR_ENABLED.name])
 
 
@@ -162,13 +162,13 @@ def complete_steps(bag: Bag, topics: Iterable[str] = ()) -> int:
 
 
 def broken_off(bag: Bag) -> bool:
-    """Whether the run ended before its planned end: killed, interrupted, or recovered from a killed recorder."""
+    """Return whether the run ended before its planned end: killed, interrupted, or recovered from a killed recorder."""
     status = bag.columns(STATE)["status"]
     return not len(status) or int(status[-1]) == 0 or cut_off(bag)
 
 
 def refuse_vacuous(bag: Bag) -> None:
-    """Refuse a bag that would prove nothing.
+    """Refuse a bag whose replay would be meaningless.
 
     Raises:
         RecordingError: The controller was active for less than ten seconds of simulated time, or there is no step.
@@ -208,7 +208,7 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _commands_as_flown(bag: Bag) -> dict[str, Any]:
-    """Return the parameters of the reference that was flown, none where nothing was commanded in flight."""
+    """Return the parameters of the reference in flight; empty without commands in flight."""
     published = [message for _, message in bag.decode(REFERENCE)] if REFERENCE in bag.roles else []
     if not published or published[-1].step == 0:
         return {}
@@ -216,7 +216,7 @@ def _commands_as_flown(bag: Bag) -> dict[str, Any]:
 
 
 def _tau_as_flown(bag: Bag, sections: ParameterSections) -> dict[str, Any]:
-    """Return the parameters of tau that give the recorded factors, none where the attached ones do."""
+    """Return the parameters of tau for the recorded factors; empty if the attached parameters give them."""
     if controller_of(sections) != TUBE_MPC.name:
         return {}
     recorded_status = [status for _, status in bag.decode(TUBE_STATUS)]

@@ -1,4 +1,4 @@
-"""The processes that a replay can repeat, with the tolerance of each."""
+"""The processes that can be replayed, with their tolerances."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _TOLERANCES = {
     "controller": (1e-10, "a custom controller may call libraries that round as their processor does"),
     "fault_injector": (0.0, "one multiplication, the same on every processor"),
 }
-"""Tolerance of every node, absolute and relative at once, and its reason."""
+"""Absolute and relative tolerance of each node, and the reason for it."""
 
 
 @dataclass(frozen=True)
@@ -38,32 +38,32 @@ class Process:
 
     @property
     def tolerance(self) -> float:
-        """Tolerance within which numbers count as equal, absolute and relative at once."""
+        """Absolute and relative tolerance within which numbers count as equal."""
         return _TOLERANCES[self.node.name][0]
 
     @property
     def reason(self) -> str:
-        """The reason for the tolerance."""
+        """Reason for the tolerance."""
         return _TOLERANCES[self.node.name][1]
 
     @property
     def restarts(self) -> bool:
-        """Whether it is the plant: every step starts from the recorded state and input of the previous one."""
+        """Whether every step starts from the recorded state and input of the previous step, as for the plant."""
         return self.block is VEHICLE
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Topics that one step needs."""
+        """Topics that a step subscribes to."""
         return (*self.node.subscribes, STATE) if self.restarts else self.node.subscribes
 
     @property
     def delayed(self) -> tuple[str, ...]:
-        """Inputs that a step takes from the previous step; the first step has none."""
+        """Topics of which a step uses the message of the previous step; the first step has none."""
         return () if self.restarts else self.node.delayed
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Topics that one step gives."""
+        """Topics that a step publishes."""
         return self.node.publishes
 
 

@@ -171,8 +171,8 @@ def with_models(problem: TubeProblem, models: Sequence[Model]) -> TubeProblem:
 def sensors(data: SensorData, plan: Plan, reach: float = REACH, of: str = "sensor") -> dict[str, Model]:
     """Return the sensor models of the rigid states by name; ideal ones are omitted.
 
-    Noise and a Gauss-Markov bias count ``reach`` standard deviations, and so do biases and scales that are drawn once a
-    flight. A quantum counts half. Delays are modelled exactly.
+    Noise, Gauss-Markov biases, and random biases and scale factors are bounded by ``reach`` standard deviations, and
+    quantisation by half a quantum. Delays are modelled exactly.
     """
     rigid = slice(0, N_RIGID)
     scale = (np.abs(data.scale) + reach * data.scale_sigma)[rigid]

@@ -261,9 +261,9 @@ def _start(found: InvariantSet, error: np.ndarray) -> float:
 
 
 def reaches(found: InvariantSet, design: ControlDesign, plan: Plan) -> list[Reach]:
-    """Return the reach of each actuator that ``design`` knows, over the set ``found`` and along ``plan``.
+    """Return the range of positions and rates of each actuator of ``design``, in the set ``found`` along ``plan``.
 
-    Positions and rates count on every substep on which limits act.
+    Positions and rates are evaluated at every substep, where the limits act.
     """
     system, disturbance, known = found.problem.system, found.problem.disturbance, design.actuator_sets
     flown, commands = plan.actuators(design)

@@ -73,14 +73,13 @@ class FlightVariants:
         )
 
     def perturbed(self, perturbation: Mapping[str, float], seed: int) -> Components | None:
-        """Return the components of a flight that differs in its perturbation and its seed alone.
+        """Return the components of a flight that differs only in perturbation and seed, as in most campaigns.
 
-        That is what most campaigns vary; it is cheap, as nothing else depends on it. ``None`` where a change is none
-        that its parameter admits: who reads such a scenario, or builds its plant, is told which.
+        ``None`` if a change is not admissible; reading the scenario or building the plant then gives the error.
 
         Args:
             perturbation: Relative changes of the nominal vehicle's parameters, by name.
-            seed: Of what is random in the flight.
+            seed: Seed of the flight.
         """
         if not all(_CHANGES[name].admits(change) for name, change in perturbation.items()):
             return None

@@ -30,11 +30,11 @@ class Moment(StrEnum):
 
 
 OBSERVED = 0.5
-"""Share of the scenario's duration for which a flight goes on after the start of the fault, at either time."""
+"""Length of a flight after the start of the fault, as a share of the scenario's duration."""
 
 
 DURATION = "duration"
-"""The severity of a fault that ends by itself: for how long it acts, in place of a parameter of its kind."""
+"""Name of the severity of a temporary fault: its duration, instead of a parameter of its kind."""
 
 
 @dataclass(frozen=True)
@@ -46,17 +46,17 @@ class TriedFault:
     parameter: str
     """Parameter of the fault that is varied: one of its kind or occurrence, or :data:`DURATION`"""
     unit: str
-    """Unit of that parameter, as it is written."""
+    """Unit in which the parameter is written."""
     harmless: float
-    """Value at severity 0, in that unit"""
+    """Value at severity 0, in this unit"""
     worst: float
     """Value at severity 1"""
     values: tuple[float, float, float]
     """Mild, medium, severe"""
     fixed: Mapping[str, Any] = field(default_factory=dict)
-    """Further parameters, as a scenario has them"""
+    """Further parameters as in a scenario"""
     geometric: bool = False
-    """Whether equal steps of severity are equal ratios of values: of ranges over decades, without 0."""
+    """Whether equal steps of severity are equal ratios of values, for ranges over decades."""
 
     @property
     def whole(self) -> bool:
