@@ -313,7 +313,7 @@ class Bag:
         self.namespace = namespace_of(self.roles)
 
     def _read_file(self, scan: Scan) -> tuple[int, int, int, dict[str, Any]]:
-        """Add the contents of a file; return the numbers of messages, orphans and attachments, and rosbag2's metadata."""
+        """Add the contents of a file; return the numbers of messages, orphans, attachments, and rosbag2's metadata."""
         unpack, size = MESSAGE_HEADER.unpack_from, MESSAGE_HEADER.size
         schemas: dict[int, Schema] = {}
         channels: dict[int, Channel] = {}
