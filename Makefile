@@ -32,6 +32,7 @@ test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
 	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -m "graph and not long" tests/graph
 
 test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damaged" chooses)
+	@$(INSTALL) --requirement requirements-docs.txt
 	@$(PYTEST) -n auto --dist loadfile -m long $(ARGS)
 
 fuzz: setup ## set up, then give 10 000 mutated files to every reader (ARGS="--fuzz-inputs 1000" for fewer)

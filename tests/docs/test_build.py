@@ -1,4 +1,4 @@
-"""The documentation builds without a warning, where its tools are installed (make docs), and can be searched."""
+"""The documentation builds without a warning and can be searched; make docs and make test-long install its tools."""
 
 import json
 import subprocess
