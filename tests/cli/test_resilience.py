@@ -52,6 +52,11 @@ def test_the_worst_flight_flies_by_itself_as_it_did(resilience, hsv):
     assert lost[0]["time_to_loss_s"] is not None and whole[0]["time_to_loss_s"] is None
 
 
+def test_a_type_stands_for_all_faults_of_this_type(resilience):
+    cells = resilience("--json", controllers="short.toml", faults="rate_limit,drift").json["cells"]
+    assert {cell["fault"] for cell in cells} == {"elevator_rate_limit", "elevator_drift"}
+
+
 def test_what_is_there_is_not_flown_anew_and_more_flies_beside_it(resilience):
     assert resilience("--json", controllers="short.toml", faults="elevator_loss").json["cases_flown_now"] == 2
     assert resilience("--json", controllers="short.toml", faults="elevator_loss").json["cases_flown_now"] == 0

@@ -27,7 +27,7 @@ HERE = {
     "hsv info bags/first bags/second",
     "hsv report bags/case1* --out all.html",
     "hsv plot bags/first",
-    "hsv report bags/first bags/second --out comparison.html",
+    "hsv report bags/first bags/second --out bags/second/comparison.html",
     'hsv trim --altitude "85500 ft" --velocity "7900 ft/s" --units paper',
     "hsv linearise --coupling derived",
     "hsv design baseline",

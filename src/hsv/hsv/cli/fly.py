@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import time
 from enum import StrEnum
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -561,7 +562,7 @@ def _factor(text: str) -> tuple[str, tuple[str, str]]:
 
 def resilience(
     controllers: Annotated[str, Option(help="Scenarios, separated by commas; default: Tube-MPC, robust MPC.")] = "",
-    faults: Annotated[str, Option(help="Faults to try, separated by commas; default: all (see --list).")] = "",
+    faults: Annotated[str, Option(help="Faults (see --list) or their types, with commas between; default: all.")] = "",
     out: Annotated[Path, Option(help="Folder for report, worst flights, results.")] = Path("resilience"),
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
@@ -587,7 +588,7 @@ def resilience(
     if listed:
         print_titles({name: parameter_words(name) for name in TRIED}, json)
         return
-    campaign = plan(_names(controllers) or CONTROLLERS, _names(faults) or tuple(TRIED))
+    campaign = plan(_names(controllers) or CONTROLLERS, _tried(faults) or tuple(TRIED))
     check_folder(out, "out")
     store = CaseStore(out, campaign)
     with (
@@ -617,6 +618,14 @@ def resilience(
 
 def _names(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",")) if text else ()
+
+
+def _tried(text: str) -> tuple[str, ...]:
+    """Return the faults to try; a type of ``hsv list faults`` stands for all faults of this type."""
+    from hsv.flight.resilience.faults import TRIED
+
+    named = [[fault for fault, tried in TRIED.items() if tried.kind == name] or [name] for name in _names(text)]
+    return tuple(dict.fromkeys(chain.from_iterable(named)))
 
 
 def _cells(results: ResilienceResults) -> list[dict[str, Any]]:
