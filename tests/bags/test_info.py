@@ -46,7 +46,8 @@ def described(kit: SimpleNamespace, tmp_path: Path) -> dict[str, object]:
 
 def test_description(described: dict[str, object]) -> None:
     described = json.loads(json.dumps(described, allow_nan=False))
-    assert described["complete"] and described["messages"] == 300
+    assert described["messages"] == 300
+    assert not described["complete"] and described["warnings"][0].startswith("no topic /clock")
     assert described["duration_s"] == pytest.approx(0.99)
     assert described["custom_data"] == {"scenario": "case1", "seed": "3"}
     assert described["attachments"] == [{"name": "scenario.toml", "media_type": "application/toml", "size_bytes": 5}]

@@ -13,9 +13,10 @@ import zstandard
 from marking import long
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
-from rosbag2_bags import converted, recorded
+from rosbag2_bags import converted, numbered, out_of_order, recorded
 from rosbags.rosbag2 import CompressionMode
 
+from hsv.bags.description import ROSOUT, TRANSIENT_LOCAL, resolved
 from hsv.bags.reader import Bag
 
 Hsv = Callable[..., Any]
@@ -42,11 +43,11 @@ def _reindexed(path: Path) -> Path:
 
 
 FORMS: dict[str, Callable[[Path], Path]] = {
-    "split": lambda path: recorded(REFERENCE, path, files=3, wall=False),
-    "split, zstd by file": lambda path: recorded(REFERENCE, path, files=2, wall=False, mode="file", compression="zstd"),
-    "lz4 by file": lambda path: recorded(REFERENCE, path, wall=False, mode="file", compression="lz4"),
-    "lz4 by message": lambda path: recorded(REFERENCE, path, wall=False, mode="message", compression="lz4"),
-    "lz4 chunks": lambda path: recorded(REFERENCE, path, wall=False, chunks=CompressionType.LZ4),
+    "split": lambda path: recorded(REFERENCE, path, files=3, begin=None),
+    "split, zstd by file": lambda path: recorded(REFERENCE, path, files=2, begin=None, compressed="file zstd"),
+    "lz4 by file": lambda path: recorded(REFERENCE, path, begin=None, compressed="file lz4"),
+    "lz4 by message": lambda path: recorded(REFERENCE, path, begin=None, compressed="message lz4"),
+    "lz4 chunks": lambda path: recorded(REFERENCE, path, begin=None, chunks=CompressionType.LZ4),
     "zstd by file": lambda path: converted(REFERENCE, path, CompressionMode.FILE),
     "zstd by message": lambda path: converted(REFERENCE, path, CompressionMode.MESSAGE),
     "converted": lambda path: converted(REFERENCE, path),
@@ -109,8 +110,13 @@ def test_tables_and_pages_are_the_same(hsv: Hsv, tmp_path: Path, form: str) -> N
         assert len(parts[0]) > 100 and parts[0].replace("case1", "") == parts[1].replace("case1", ""), start
 
 
-def test_wall_clock_log_times_change_nothing(hsv: Hsv, tmp_path: Path) -> None:
-    path = recorded(REFERENCE, tmp_path / "wall", files=2)
+@pytest.mark.parametrize(
+    "form",
+    [{}, {"begin": 2**63 - 10**10}, {"stored": out_of_order}, {"qos": numbered}, {"qos": lambda profiles: []}],
+    ids=["wall time", "more than signed integers hold", "out of order", "numbered profiles", "no profiles"],
+)
+def test_wall_clock_log_times_change_nothing(hsv: Hsv, tmp_path: Path, form: dict[str, Any]) -> None:
+    path = recorded(REFERENCE, tmp_path / "wall", files=2, **form)
     ran, expected = hsv("info", str(path), "--json"), hsv("info", str(REFERENCE), "--json")
     assert ran.code == 0 and ran.err == ""
     for name in TIMELESS:
@@ -121,7 +127,10 @@ def test_wall_clock_log_times_change_nothing(hsv: Hsv, tmp_path: Path) -> None:
     same = hsv("diff", str(REFERENCE), str(path))
     assert same.code == 0 and same.out.endswith("messages: identical\n")
     original, bag = Bag(REFERENCE), Bag(path)
+    assert bag.complete
     for topic in original.topics:
+        latched = topic in map(resolved, TRANSIENT_LOCAL)
+        assert (bag.qos(topic).durability == "transient_local") == latched or topic == ROSOUT, topic
         # What has no stamp of its own counts for the step before, which may be one of another topic of that step.
         assert np.abs(bag.times(topic) - original.times(topic)).max(initial=0) <= 20_000_000, topic
 
@@ -132,11 +141,13 @@ def test_a_fifth_of_the_steps_is_missing(hsv: Hsv, tmp_path: Path) -> None:
     path = recorded(
         REFERENCE,
         tmp_path / "lossy",
-        kept=lambda topic, time: (
-            not topic.startswith(("/hsv/", "/clock"))
+        stored=lambda messages: [
+            row
+            for row, (topic, time) in enumerate(messages)
+            if not topic.startswith(("/hsv/", "/clock"))
             or topic in ("/hsv/run", "/hsv/ready")
             or time // period not in lost
-        ),
+        ],
     )
     said = f"lacks 400 of 2001 steps on all topics, the first at t = {min(lost) * 0.02:.2f} s"
     for command, *words in (

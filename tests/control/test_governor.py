@@ -14,6 +14,7 @@ from hsv.control.design import find_design, read_design
 from hsv.control.governor import (
     AT_REST,
     KEPT_FREE,
+    NOTICE,
     USUAL_BLEND,
     Beginning,
     CommandGovernor,
@@ -234,12 +235,18 @@ def flying(values=None, design=DESIGN, steps=IN_FLIGHT):
 def test_a_command_in_flight_is_flown_and_forgotten_with_the_run():
     trajectory, governor = flying()
     planned = trajectory.reference
-    first, end = governor.command(*NEAR, duration=1.5, blend=SHORT_BLEND)
-    assert (first, end) == (IN_FLIGHT, pytest.approx((IN_FLIGHT + 10) * PERIOD + 1.5 + SHORT_BLEND))
-    flown = [trajectory.step(planned.final_state).reference[:2] for _ in range(120)]
-    assert np.array_equal(flown[0], START) and np.array_equal(flown[-1], NEAR)
+    notice = round(NOTICE / PERIOD)
+    first, plan = governor.command(*NEAR, duration=1.5, blend=SHORT_BLEND)
+    assert first == IN_FLIGHT + notice
+    # The flight goes on while the command is planned.
+    flown = [trajectory.step(planned.final_state).reference[:2] for _ in range(notice)]
+    reference = plan()
+    assert reference.end == pytest.approx((first + 10) * PERIOD + 1.5 + SHORT_BLEND)
+    trajectory.change_reference(reference)
+    flown += [trajectory.step(planned.final_state).reference[:2] for _ in range(120)]
+    assert np.array_equal(flown[: notice + 1], [START] * (notice + 1)) and np.array_equal(flown[-1], NEAR)
     next_first, _ = governor.command(*START, duration=1.5, blend=SHORT_BLEND)
-    assert next_first == IN_FLIGHT + 120
+    assert next_first == first + 120 + notice
     trajectory.reset()
     assert trajectory.reference is planned and trajectory.next_step == 0
 

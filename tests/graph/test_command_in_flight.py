@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hsv_msgs.msg import Reference
 from injected_fault import last_line
 from node_processes import Processes, fly_until, short_scenario
 from waiting import output_of
@@ -33,6 +34,9 @@ def test_points_are_commanded_recorded_and_repeated(processes: Processes, tmp_pa
     refused = processes.run("hsv", "command", "200000 ft", "8000 ft/s")
     assert refused.returncode == 2
     assert "altitude = 60960 m: expected" in last_line(refused)
+    refused = processes.run("hsv", "command", "85302 ft", "7874 ft/s", "--blend", "0.02 s")
+    assert refused.returncode == 2
+    assert "no reference to 26000 m and 2400 m/s fits" in last_line(refused)
     taken = []
     for point in (("86000 ft", "8120 ft/s"), ("86100 ft", "8150 ft/s")):
         done = processes.run("hsv", "command", *point, "--blend", "1.5 s", "--json")
@@ -48,8 +52,13 @@ def test_points_are_commanded_recorded_and_repeated(processes: Processes, tmp_pa
     bag = Bag(bag_path)
     published = [message for _, message in bag.decode("/hsv/reference")]
     first, second = (answer["step"] for answer in taken)
-    assert [message.step for message in published] == [0, first, second]
-    planned, once, twice = (np.array([getattr(message, name) for name in COLUMNS]).T for message in published)
+    flown, planning, rejected = Reference.FLOWN, Reference.PLANNING, Reference.REJECTED
+    assert [message.status for message in published] == [flown, planning, rejected, *[planning, flown] * 2]
+    assert [message.step for message in published] == [0, first, first, first, first, second, second]
+    corners = [np.array([getattr(message, name) for name in COLUMNS]).T for message in published]
+    planned, once, twice = (corners[row] for row in (0, 4, 6))
+    for row, unchanged in ((1, planned), (2, planned), (3, planned), (5, once)):
+        assert np.array_equal(corners[row], unchanged)
     assert np.array_equal(once[: len(planned)], planned) and np.array_equal(twice[: len(once)], once)
     assert np.array_equal(twice[-1, 1:], [26243.28, 2484.12, 1.5])
     assert [answer["end_s"] for answer in taken] == pytest.approx([once[-1, 0] + 1.5, twice[-1, 0] + 1.5])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -61,3 +63,12 @@ def test_discovery_must_be_on(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     with pytest.raises(ParameterError, match="ROS_AUTOMATIC_DISCOVERY_RANGE='OFF': expected LOCALHOST"), launcher():
         pass
+
+
+def test_a_network_is_needed() -> None:
+    isolated = ("unshare", "--map-root-user", "--net")
+    if subprocess.run([*isolated, "true"], check=False).returncode:
+        pytest.skip("this machine permits no network of its own")
+    words = [sys.executable, "-c", "from hsv.graph.exclusive import ros_domain; ros_domain()"]
+    done = subprocess.run([*isolated, *words], capture_output=True, text=True, check=False)
+    assert "ParameterError: network interface lo: down, expected up" in done.stderr

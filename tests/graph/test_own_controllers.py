@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,7 +14,7 @@ from pathlib import Path
 import pytest
 from injected_fault import last_line
 from marking import long
-from node_processes import Processes
+from node_processes import Processes, fly_until, short_scenario
 from ros_domain import own_environment
 from waiting import exit_code_of, output_of, wait_until
 
@@ -107,6 +109,31 @@ def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes: P
         assert len(lines) == 4, replayed.stdout
 
 
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("pace", ["1", "0"], ids=["real time", "full speed"])
+@pytest.mark.parametrize("controller", ["tube_mpc", "node:hsv_example_node/regulator"])
+def test_commands_in_flight_beside_four_busy_processes(processes: Processes, controller: str, pace: str) -> None:
+    busy = [processes.start(sys.executable, "-c", "while True: pass") for _ in range(4)]
+    path = short_scenario(processes.folder, duration=3600, fault=6)
+    path.write_text(f'controller = "{controller}"\n{path.read_text()}')
+    bags = [processes.folder / name for name in "abcde"]
+    for bag in bags:
+        flight = processes.start("hsv", "run", path, "--bag", bag, "--real-time-factor", pace, "--no-report")
+        fly_until(flight, bag, 50)
+        done = processes.run("hsv", "command", "86000 ft", "8120 ft/s", "--json")
+        assert done.returncode == 0, done.stdout
+        fly_until(flight, bag, json.loads(last_line(done))["step"] + 150)
+        flight.send_signal(signal.SIGINT)
+        said = output_of(flight)
+        assert flight.returncode == 130, said
+    for process in busy:
+        process.kill()
+    for bag in bags:
+        replayed = processes.run("hsv", "replay", bag, "--rerun")
+        assert replayed.returncode == 0 and "identical in every byte" in replayed.stdout, replayed.stdout
+
+
 @pytest.mark.parametrize(
     ("how", "words"),
     [
@@ -129,6 +156,13 @@ def test_a_node_that_goes_wrong_is_named_and_the_bag_is_whole(processes: Process
     # What was not a number is recorded, and flown no further.
     assert bag.complete and complete_steps(bag) == WRONG_STEP + (how == "nan")
     assert (exit_code_of(foreign) == -9) if how == "killed" else foreign.poll() is None
+
+
+def test_a_controller_that_is_slow_is_named(processes: Processes) -> None:
+    path = scenario(processes.folder, "lqr", 'controller = "wrong_controller:SlowLqr"')
+    words = ("--step-timeout", "3", "--no-report", "--bag", processes.folder / "slow")
+    done = processes.run("hsv", "run", path, *words)
+    assert done.returncode == 1 and "; all nodes answer, controller last\n" in done.stdout, done.stdout
 
 
 @pytest.mark.parametrize(

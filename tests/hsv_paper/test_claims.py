@@ -92,6 +92,8 @@ def test_numbers_are_shown_in_the_paper_s_units():
     assert shown(math.inf, "s") == "not by the end"
     assert shown(math.inf, "1") == "unbounded"
     assert shown(math.nan, "s") == "not defined"
+    assert Reading("x", 1.0000312, "1", at_most=1.0).measured() == "1.00003"
+    assert Reading("x", 0.9999688, "1", at_most=1.0).measured() == "1"
     assert Reading("x", 0.0, "rad", at_most=math.pi / 360.0).threshold() == "at most 0.5 deg"
     assert Reading("x", 0.0, "dB", at_least=20.0).threshold() == "at least 20 dB"
 

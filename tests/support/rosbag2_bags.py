@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import lz4.frame
@@ -22,17 +22,31 @@ COMPRESS: dict[str, Callable[[bytes], bytes]] = {
     "lz4": lz4.frame.compress,
 }
 
-Kept = Callable[[str, int], bool]
-"""From topic and log time of the source to whether a message is recorded."""
+Stored = Callable[[list[tuple[str, int]]], Sequence[int]]
+"""From topics and log times of the source to the rows that are recorded, in the order in which they are stored."""
 
 
-def everything(topic: str, time: int) -> bool:
-    return True
+def everything(messages: list[tuple[str, int]]) -> Sequence[int]:
+    return range(len(messages))
 
 
-def wall_times(count: int) -> np.ndarray:
-    """Return when so many messages of a flight are received: in their order, and unevenly."""
-    return WALL_TIME + np.cumsum(np.random.default_rng(5).integers(1_000, 4_000_000, count))
+def out_of_order(messages: list[tuple[str, int]]) -> Sequence[int]:
+    return np.random.default_rng(6).permutation(len(messages)).tolist()
+
+
+def wall_times(count: int, begin: int) -> np.ndarray:
+    """Return when so many messages of a flight are received from ``begin`` on: in their order, and unevenly."""
+    passed = np.cumsum(np.random.default_rng(5).integers(1_000, 4_000_000, count))
+    return np.uint64(begin) + passed.astype(np.uint64)
+
+
+NUMBERS = {"keep_last": 1, "reliable": 1, "transient_local": 1, "volatile": 2, "automatic": 1}
+"""Numbers that rosbag2 of Humble and Iron writes for the words of a quality of service."""
+
+
+def numbered(profiles: list[dict[str, object]]) -> list[dict[str, object]]:
+    """Return the profiles of a topic as Humble and Iron write them."""
+    return [{key: NUMBERS.get(str(value), value) for key, value in profile.items()} for profile in profiles]
 
 
 def recorded(
@@ -40,11 +54,11 @@ def recorded(
     target: Path,
     *,
     files: int = 1,
-    mode: str = "",
-    compression: str = "",
+    compressed: str = "",
     chunks: CompressionType = CompressionType.NONE,
-    kept: Kept = everything,
-    wall: bool = True,
+    stored: Stored = everything,
+    begin: int | None = WALL_TIME,
+    qos: Callable[[list[dict[str, object]]], list[dict[str, object]]] = list,
 ) -> Path:
     """Write ``source`` as ``ros2 bag record`` does: no attachments, no checksums, log time is the wall's.
 
@@ -52,49 +66,44 @@ def recorded(
         source: A bag of one file.
         target: Bag directory to write.
         files: Number of files into which it is split.
-        mode: ``file`` or ``message``: what is compressed.
-        compression: ``zstd`` or ``lz4``.
+        compressed: What is compressed and how, such as ``file zstd`` or ``message lz4``.
         chunks: How MCAP itself compresses.
-        kept: What is recorded; the rest is missed.
-        wall: Whether log time is the wall's, else that of the source.
+        stored: Which messages are stored, and in which order.
+        begin: Log time of the wall at which the recording begins; None for the log times of the source.
+        qos: Changes the profiles of a topic.
     """
+    mode, _, compression = compressed.partition(" ")
     with Reader(source) as reader:
         found = [(c, time, bytes(data)) for c, time, data in reader.messages()]
         connections = list(reader.connections)
         texts = {t["topic_metadata"]["name"]: t for t in _information(source)["topics_with_message_count"]}
-    received = wall_times(len(found)) if wall else [time for _, time, _ in found]
-    missed = [kept(c.topic, time) for c, time, _ in found]
+    received = [time for _, time, _ in found] if begin is None else wall_times(len(found), begin).tolist()
     target.mkdir()
     entries = []
-    parts = np.array_split(np.arange(len(found)), files)
+    parts = np.array_split(stored([(c.topic, time) for c, time, _ in found]), files)
     for number, rows in enumerate(parts):
         path = target / f"{target.name}_{number}.mcap"
-        count = 0
         with path.open("wb") as stream:
             writer = Writer(stream, chunk_size=300_000, compression=chunks, enable_crcs=False)
             writer.start(profile="ros2")
             channels = {}
             for c in connections:
                 schema = writer.register_schema(c.msgtype, "ros2msg", c.msgdef.data.encode())
-                qos = yaml.safe_dump(texts[c.topic]["topic_metadata"]["offered_qos_profiles"])
-                metadata = {"offered_qos_profiles": qos, "topic_type_hash": c.digest}
+                profiles = yaml.safe_dump(qos(texts[c.topic]["topic_metadata"]["offered_qos_profiles"]))
+                metadata = {"offered_qos_profiles": profiles, "topic_type_hash": c.digest}
                 channels[c.topic] = writer.register_channel(c.topic, "cdr", schema, metadata)
             for row in rows:
-                if missed[row]:
-                    data = COMPRESS[compression if mode == "message" else ""](found[row][2])
-                    writer.add_message(channels[found[row][0].topic], int(received[row]), data, int(received[row]))
-                    count += 1
+                data = COMPRESS[compression if mode == "message" else ""](found[row][2])
+                writer.add_message(channels[found[row][0].topic], received[row], data, received[row])
             writer.finish()
         if mode == "file":
             whole = path.read_bytes()
             path.unlink()
             path = path.with_name(f"{path.name}.{compression}")
             path.write_bytes(COMPRESS[compression](whole))
-        span = (
-            {"nanoseconds_since_epoch": int(received[rows[0]])},
-            {"nanoseconds": int(received[rows[-1]] - received[rows[0]])},
-        )
-        entries.append({"path": path.name, "starting_time": span[0], "duration": span[1], "message_count": count})
+        times = [received[row] for row in rows]
+        span = {"nanoseconds_since_epoch": min(times)}, {"nanoseconds": max(times) - min(times)}
+        entries.append({"path": path.name, "starting_time": span[0], "duration": span[1], "message_count": len(rows)})
     information = _information(source) | {
         "relative_file_paths": [entry["path"] for entry in entries],
         "files": entries,

@@ -1,4 +1,4 @@
-"""The example's regulator, which goes wrong: ``python3 wrong_controller.py killed|hung|wrong_step|nan STEP``."""
+"""The examples' regulators, which go wrong: ``python3 wrong_controller.py killed|hung|wrong_step|nan STEP``."""
 
 from __future__ import annotations
 
@@ -10,6 +10,22 @@ import time
 
 import rclpy
 from hsv_example_node.regulator import Regulator
+from hsv_lqr import Lqr
+
+
+class SlowLqr(Lqr):
+    """Takes some seconds for its hundredth step."""
+
+    SECONDS = 4.0
+
+    def reset(self):
+        self.steps = 0
+        super().reset()
+
+    def step(self, inputs):
+        self.steps += 1
+        time.sleep(self.SECONDS if self.steps == 100 else 0.0)
+        return super().step(inputs)
 
 
 def main(how: str, step: int) -> None:

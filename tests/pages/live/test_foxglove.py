@@ -13,7 +13,7 @@ NAMES = {resolved(topic): kind for topic, kind in TOPICS.items()}
 
 @pytest.fixture
 def server():
-    server = FoxgloveServer(0, NAMES)
+    server = FoxgloveServer(0, NAMES, ["/hsv/actuator"])
     yield server
     server.close()
 
@@ -39,6 +39,22 @@ def test_topics_come_with_their_definitions_and_bytes(server, messages):
     for topic in NAMES:
         if topic != "/clock":
             assert client.messages[topic] == [(t, data) for name, t, data in sent if resolved(name) == topic]
+
+
+def test_a_latched_topic_is_sent_to_a_client_that_comes_late_and_to_no_other(server):
+    server.send("/hsv/actuator", 1, b"earlier run")
+    server.start_run()
+    sent = [(2, b"one"), (3, b"two")]
+    for time, data in sent:
+        server.send("/hsv/actuator", time, data)
+    clients = []
+    for _ in range(2):
+        clients.append(FoxgloveClient(server.port))
+        wait_until(lambda: len(clients[-1].messages["/hsv/actuator"]) == len(sent))
+    server.send("/hsv/actuator", 4, b"three")
+    for client in clients:
+        wait_until(lambda client=client: client.messages["/hsv/actuator"][-1][0] == 4)
+        assert client.messages["/hsv/actuator"] == [*sent, (4, b"three")]
 
 
 def test_a_new_run_begins_a_new_session(server):

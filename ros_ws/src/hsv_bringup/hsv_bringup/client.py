@@ -18,7 +18,7 @@ from rclpy.utilities import remove_ros_args
 from hsv.bags.description import PLANT, NodeDescription
 from hsv.base.errors import HsvError, RunError
 from hsv.base.files import json_text
-from hsv.graph.exclusive import is_published
+from hsv.graph.exclusive import is_published, ros_domain
 from hsv.graph.standstill import Standstill
 from hsv_node import roles
 from hsv_node.main import take_signals
@@ -209,6 +209,7 @@ def run_client(
     code = 1
     try:
         take_signals(signal.default_int_handler)
+        ros_domain()
         rclpy.init(args=arguments, signal_handler_options=rclpy.SignalHandlerOptions.NO)
         clients.append(GraphClient(name))
         act(clients[0], options)

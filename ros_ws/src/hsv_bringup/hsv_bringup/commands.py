@@ -8,19 +8,19 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from hsv_msgs.msg import Actuator, Fault
+from hsv_msgs.msg import Actuator, Fault, Reference
 from hsv_msgs.srv import ClearFault, InjectFault, SetCommand
-from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.msg import Log, SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter as RosParameter
 
-from hsv.bags.description import FAULT_INJECTOR, NOMINAL_TRAJECTORY
+from hsv.bags.description import FAULT_INJECTOR, NOMINAL_TRAJECTORY, ROSOUT
 from hsv.bags.messages import fault_in
 from hsv.base.errors import ParameterError, RunError
 from hsv.graph.settable import find, parse, step_in
 from hsv.model.faults.injector import read_parameters
 from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
-from hsv_node.middleware import STEP
+from hsv_node.middleware import LATCHED, STEP
 
 
 def _inject(client: GraphClient, options: argparse.Namespace) -> None:
@@ -84,15 +84,33 @@ def fault(args: Sequence[str] | None = None) -> int:
 def _command(client: GraphClient, options: argparse.Namespace) -> None:
     run = client.find_run()
     fields = {name: getattr(options, name) for name in ("altitude", "velocity", "duration", "blend")}
+    published: list[Reference] = []
+    topic = client.topic_of(NOMINAL_TRAJECTORY, Reference)
+    client.create_subscription(Reference, topic, published.append, LATCHED)
+    logged: list[Log] = []
+    client.create_subscription(Log, ROSOUT, logged.append, LATCHED)
     response = client.call(NOMINAL_TRAJECTORY, SetCommand, SetCommand.Request(**fields))
     if not response.success:
         raise ParameterError(response.message)
     time, values = acting_from(run, response.step)
-    answer(
-        f"{response.message}, {time}",
-        {"message": response.message, **values, "end_s": round(response.end, 9)},
-        options.json,
-    )
+
+    def planned() -> list[Reference]:
+        """Return what has been published since this plan was announced."""
+        announced = [(m.status, m.step) == (Reference.PLANNING, response.step) for m in published]
+        return published[len(published) - announced[::-1].index(True) :] if any(announced) else []
+
+    client.wait_for(lambda: planned() or not client.count_publishers(topic), f"the plan ({topic})", for_ever=True)
+    if not planned():
+        raise RunError("the flight has ended before the plan was known")
+    reference = planned()[0]
+    if reference.status == Reference.REJECTED:
+        rejected = f"rejected {response.message}: "
+        client.wait_for(lambda: any(log.msg.startswith(rejected) for log in logged), f"the reason ({ROSOUT})")
+        reasons = [log.msg.removeprefix(rejected) for log in logged if log.msg.startswith(rejected)]
+        raise ParameterError(reasons[-1] if reasons else f"{rejected}the log of the node has the reason")
+    end = reference.times[-1] + reference.blends[-1]
+    message = f"{response.message}, at rest at {end:.2f} s"
+    answer(f"{message}, {time}", {"message": message, **values, "end_s": round(end, 9)}, options.json)
 
 
 def set_command(args: Sequence[str] | None = None) -> int:

@@ -108,7 +108,7 @@ class LiveNode(ProcessNode):
         self._names = {topic: self.resolve_topic_name(topic) for topic in self._kinds}
         self.hub = Hub(self._decode, {"title": values["live.title"], "bag": values["live.bag"]})
         names = {self._names[topic]: kind for topic, kind in (TOPICS | OTHER_TOPICS).items()}
-        self.foxglove = FoxgloveServer(values["live.port"], names)
+        self.foxglove = FoxgloveServer(values["live.port"], names, [self._names[topic] for topic in LATCHED_TOPICS])
         layout = foxglove_layout(lambda topic: self._names.get(topic) or self.resolve_topic_name(topic))
         self.page = PageServer(values["live.page_port"], self.hub, layout)
         self._run: Run | None = None

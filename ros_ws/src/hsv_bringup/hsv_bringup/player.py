@@ -21,7 +21,7 @@ from hsv.bags.topic import Qos
 from hsv.base.errors import ParameterError, RecordingError
 from hsv_node.lockstep import LOG_INTERVAL
 from hsv_node.main import run_node
-from hsv_node.middleware import message_class
+from hsv_node.middleware import LATCHED, message_class
 from hsv_node.parameters import refuse_sim_time, refuse_unknown
 from hsv_node.process import ProcessNode
 
@@ -164,7 +164,7 @@ def _message_class(bag: Bag, topic: str) -> Any:
 def _profile(qos: Qos) -> QoSProfile:
     reliable, latched = qos.reliability == "reliable", qos.durability == "transient_local"
     return QoSProfile(
-        depth=max(qos.depth, 1),
+        depth=max(qos.depth, LATCHED.depth if latched else 1),  # rosbag2 records 0 where it was not known
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )

@@ -25,6 +25,7 @@ from hsv.bags.description import (
     RECORDER_PROGRESS,
     STATE,
     TOPICS,
+    TRANSIENT_LOCAL,
     TUBE_STATUS,
     controller_node,
     graph,
@@ -83,7 +84,7 @@ class RecorderNode(PeerNode):
         """Whether to request the parameters of the nodes, because they are not attached."""
         self._peers: PeerParameters | None = None
         for topic, kind in (recorded | OTHER_TOPICS).items():
-            latched = topic in LATCHED_TOPICS
+            latched = topic in TRANSIENT_LOCAL
             qos = Qos(depth=LATCHED.depth, durability="transient_local") if latched else Qos(depth=STEP.depth)
             self.bag.add_topic(Topic(self._names[topic], kind, definition(kind), type_hash(kind), qos))
         self._order = tuple(self._names[topic] for topic in recorded)

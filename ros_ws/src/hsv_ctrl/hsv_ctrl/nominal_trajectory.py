@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 
 from hsv_msgs.msg import Reference, Run
 from hsv_msgs.srv import SetCommand
 
 from hsv.bags.description import NOMINAL_TRAJECTORY, REFERENCE, SET_COMMAND
 from hsv.bags.messages import FRAME, stamp_of
-from hsv.base.errors import HsvError
+from hsv.base.errors import GovernorError, HsvError
+from hsv.control.governor import CommandGovernor
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory
+from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.flight.blocks import Signals
 from hsv_ctrl.design import declare_design
 from hsv_node.block import BlockNode
@@ -21,9 +24,16 @@ from hsv_node.parameters import declare_vehicle
 
 _SOLVER_FAILED = int(NominalStatus.SOLVER_FAILED)
 
+_PLAN_LOOK = 0.02
+"""Seconds between two looks at a plan that is being computed."""
+
 
 class NominalTrajectoryNode(BlockNode):
-    """A node that publishes reference and nominal state for each measurement, and accepts commands in flight."""
+    """A node that publishes reference and nominal state for each measurement, and accepts commands in flight.
+
+    A command is planned in a thread. It is announced with the first step that it changes, and the flight waits at that
+    step until the plan is known; so the flight does not depend on how long the plan takes.
+    """
 
     def __init__(self) -> None:
         super().__init__(NOMINAL_TRAJECTORY, "trajectory")
@@ -32,6 +42,11 @@ class NominalTrajectoryNode(BlockNode):
         self._period = self._values["period"]
         self.component = self._trajectory = NominalTrajectory.from_parameters(self._values, self._design)
         self._failed = False
+        self._planner = ThreadPoolExecutor(1)
+        self._plan: Future[ReferenceTrajectory] | None = None
+        """The plan that is being computed."""
+        self._first, self._words = 0, ""
+        """The first step that the plan changes, and the command in words."""
         self._references = self.create_publisher(Reference, REFERENCE, LATCHED)
         self.create_service(SetCommand, SET_COMMAND, self._command)
 
@@ -39,6 +54,7 @@ class NominalTrajectoryNode(BlockNode):
         """Start a new nominal trajectory."""
         super().start_run(run)
         self._failed = False
+        self._plan = None
         self._publish_reference(0)
 
     def stepped(self, signals: Signals) -> None:
@@ -54,29 +70,51 @@ class NominalTrajectoryNode(BlockNode):
                 gain_index=signals.gain_index,
             )
 
-    def _command(self, request: SetCommand.Request, response: SetCommand.Response) -> SetCommand.Response:
-        # Not at the top: only who is commanded in flight needs it, and every start would load it.
-        from hsv.control.governor import CommandGovernor
+    def holds(self, step: int) -> bool:
+        """Return whether ``step`` needs a plan that is still being computed."""
+        return self._plan is not None and step >= self._first
 
+    def poll(self) -> None:
+        """Fly a plan once it is known."""
+        super().poll()
+        if self._plan is not None and self._plan.done():
+            plan, self._plan = self._plan, None
+            self._take(plan)
+            self.answer(self._trajectory.next_step)
+
+    def wait_timeout(self) -> float:
+        """Look more often for a plan that is being computed."""
+        return _PLAN_LOOK if self._plan is not None else super().wait_timeout()
+
+    def _command(self, request: SetCommand.Request, response: SetCommand.Response) -> SetCommand.Response:
         try:
+            if self._plan is not None:
+                raise GovernorError("the command before is still being planned: expected one at a time")
             governor = CommandGovernor.from_parameters(self._values, self._design, self._trajectory)
-            response.step, response.end = governor.command(
-                request.altitude, request.velocity, request.duration, request.blend
-            )
+            self._first, plan = governor.command(request.altitude, request.velocity, request.duration, request.blend)
         except HsvError as error:
             response.success, response.message = False, str(error)
             return response
-        response.success = True
-        response.message = (
-            f"to {request.altitude:.6g} m and {request.velocity:.6g} m/s from step {response.step} on, at rest at "
-            f"{response.end:.2f} s"
-        )
-        self.get_logger().info(response.message)
-        self._publish_reference(response.step)
+        self._plan = self._planner.submit(plan)
+        self._words = f"to {request.altitude:.6g} m and {request.velocity:.6g} m/s from step {self._first} on"
+        response.success, response.message, response.step = True, self._words, self._first
+        self.get_logger().info(f"plans {self._words}")
+        self._publish_reference(self._first, Reference.PLANNING)
         return response
 
-    def _publish_reference(self, step: int) -> None:
-        message = Reference(step=step, **self._trajectory.reference.columns)
+    def _take(self, plan: Future[ReferenceTrajectory]) -> None:
+        try:
+            reference = plan.result()
+        except HsvError as error:
+            self.get_logger().warning(f"rejected {self._words}: {error}")
+            self._publish_reference(self._first, Reference.REJECTED)
+            return
+        self._trajectory.change_reference(reference)
+        self.get_logger().info(f"{self._words}, at rest at {reference.end:.2f} s")
+        self._publish_reference(self._first)
+
+    def _publish_reference(self, step: int, status: int = Reference.FLOWN) -> None:
+        message = Reference(step=step, status=status, **self._trajectory.reference.columns)
         message.header.frame_id = FRAME
         message.header.stamp.sec, message.header.stamp.nanosec = stamp_of(step, self._period)
         self._references.publish(message)

@@ -49,13 +49,21 @@ class BlockNode(PeerNode):
     def stepped(self, signals: Signals) -> None:
         """Called after each step; overridden to report on it."""
 
+    def holds(self, step: int) -> bool:
+        """Return whether ``step`` has to wait although its messages are there; overridden by a node that plans."""
+        return False
+
     def on_message(self, topic: str, message: bytes) -> None:
         """Step as soon as all messages of a step have arrived."""
-        signals = self.signals
         step = self.messages[topic].step(message)
         self._received[topic] = step, message
-        due = self._due(step + self._delays[topic])
-        if not due:
+        self.answer(step + self._delays[topic])
+
+    def answer(self, step: int) -> None:
+        """Take ``step`` and publish its messages, if all that it needs has arrived and nothing holds it."""
+        signals = self.signals
+        due = self._due(step)
+        if not due or self.holds(step):
             return
         try:
             for name in due:

@@ -18,6 +18,7 @@ from rclpy.utilities import remove_ros_args
 
 from hsv.base.errors import HsvError, ParameterError
 from hsv.base.processes import ignore_ctrl_c_at_end
+from hsv.graph.exclusive import ros_domain
 from hsv_node.arguments import check_names, shared_parameters
 from hsv_node.middleware import prefer_profiles
 from hsv_node.process import ProcessNode, ends_with
@@ -56,6 +57,7 @@ def run_nodes(
         others = remove_ros_args(words)[1:]
         if others and not own_arguments:
             raise ParameterError(f"argument {others[0]!r}: expected only those that follow --ros-args")
+        ros_domain()
         prefer_profiles()
         rclpy.init(args=words, signal_handler_options=rclpy.SignalHandlerOptions.NO)
     except rclpy_implementation.UnknownROSArgsError as error:

@@ -9,7 +9,7 @@ import uuid
 from collections.abc import Sequence
 
 import rclpy
-from hsv_msgs.msg import Ready, RecorderProgress, Run, VehicleState
+from hsv_msgs.msg import Ready, RecorderProgress, Reference, Run, VehicleState
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import ListParameters
 from rclpy.client import Client
@@ -26,6 +26,7 @@ from hsv.bags.description import (
     READY,
     RECORDER,
     RECORDER_PROGRESS,
+    REFERENCE,
     RUN,
     STATE,
     NodeDescription,
@@ -73,6 +74,9 @@ class PlantNode(LockstepNode):
         self.create_step_subscription(ACTUATOR, self._on_actuator)
         self._readies = self.create_subscription(Ready, READY, self._on_ready, LATCHED)
         self._confirmations = self.create_subscription(RecorderProgress, RECORDER_PROGRESS, self._on_progress, STEP)
+        self._references = self.create_subscription(Reference, REFERENCE, self._on_reference, LATCHED)
+        self._planning = False
+        """Whether nominal_trajectory is computing the plan of a command."""
         self._run = Run(
             run_id=uuid.uuid4().hex,
             period=self.plant.period,
@@ -102,6 +106,9 @@ class PlantNode(LockstepNode):
     def _on_ready(self, ready: Ready) -> None:
         if ready.run_id == self._run.run_id:
             self._ready.add(ready.node)
+
+    def _on_reference(self, reference: Reference) -> None:
+        self._planning = reference.status == Reference.PLANNING
 
     def _on_change(self, parameters: list[RosParameter]) -> SetParametersResult:
         """Change the pace, or pause, after the current step."""
@@ -189,8 +196,9 @@ class PlantNode(LockstepNode):
             self._try_start()
         else:
             self._continue()
-            # While the run is paused, or the pace delays the next step, no node can be late.
-            waits = self.values["paused"] or (self._answered and self._delay() > 0.0)
+            # While the run is paused, a command is planned, or the pace delays the next step, no node can be late.
+            planning = self._planning and self._references.get_publisher_count() > 0
+            waits = self.values["paused"] or planning or (self._answered and self._delay() > 0.0)
             waited = self._standstill.look(time.monotonic() if waits else self._messages)
             if waited > self._limit():
                 self._give_up(waited)
@@ -260,10 +268,13 @@ class PlantNode(LockstepNode):
             if behind_recorder
             else (FAULT_INJECTOR, self.resolve_topic_name(ACTUATOR))
         )
-        silent = unresponsive(self, self._elsewhere())
+        silent, slowest = unresponsive(self, self._elsewhere())
         if not silent and not behind_recorder and self._foreign_controller:
             silent = [self._foreign_controller]
-        blame = f"no answer from {', '.join(silent)}" if silent else "all nodes answer, one of them is stuck"
+        if silent:
+            blame = f"no answer from {', '.join(silent)}"
+        else:
+            blame = "all nodes answer, " + (f"{slowest} last" if slowest else "one of them is stuck")
         self.get_logger().fatal(f"step {step}: no {topic} (from {source.name}) for {waited:.1f} s; {blame}")
         self._broken_off = blame
         self.finish(1)
@@ -283,18 +294,20 @@ class PlantNode(LockstepNode):
         self.finish(EXIT_DIVERGED if signals.status is FlightStatus.DIVERGED else 0)
 
 
-def unresponsive(node: LockstepNode, peers: Sequence[NodeDescription], wait: float = 2.0) -> list[str]:
+def unresponsive(
+    node: LockstepNode, peers: Sequence[NodeDescription], wait: float = 2.0
+) -> tuple[list[str], str | None]:
     """Return the ``peers`` whose parameter service does not answer while no other does for ``wait`` (s).
 
-    Every node has that service, so that a hung process is told from one that only waits for somebody else.
+    Every node has that service, and a node that computes answers late: the last peer to answer is returned as well.
     """
     # The remappings of the command line do not apply to the helper.
     helper = rclpy.create_node(f"{node.get_name()}_liveness", context=node.context, use_global_arguments=False)
     try:
         clients: dict[str, Client] = {}
         futures: dict[str, Future] = {}
-        standstill, answers = Standstill(), 0
-        while standstill.look((len(futures), answers)) < wait and answers < len(peers):
+        standstill, answered = Standstill(), list[str]()
+        while standstill.look((len(futures), len(answered))) < wait and len(answered) < len(peers):
             for peer in peers:
                 if peer.name not in clients and (name := node.node_in_role(peer)):
                     clients[peer.name] = helper.create_client(ListParameters, f"{name}/list_parameters")
@@ -302,8 +315,8 @@ def unresponsive(node: LockstepNode, peers: Sequence[NodeDescription], wait: flo
                 if peer_name not in futures and client.service_is_ready():
                     futures[peer_name] = client.call_async(ListParameters.Request())
             rclpy.spin_once(helper, timeout_sec=0.05)
-            answers = sum(future.done() for future in futures.values())
-        return [peer.name for peer in peers if peer.name not in futures or not futures[peer.name].done()]
+            answered += [name for name, future in futures.items() if future.done() and name not in answered]
+        return [peer.name for peer in peers if peer.name not in answered], answered[-1] if answered else None
     finally:
         helper.destroy_node()
 

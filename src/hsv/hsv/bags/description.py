@@ -105,6 +105,9 @@ OTHER_TOPICS = {
 Topics with a leading slash belong to ROS: they have the same name in every namespace.
 """
 
+TRANSIENT_LOCAL = (*LATCHED_TOPICS, ROSOUT)
+"""Topics whose publishers keep messages for late subscribers: the announcements, and the log of every ROS node."""
+
 LAST_STATE = "hsv/last_state"
 """Latched topic of the last state of a run, one message per run. Its status is finished, diverged, or running if the
 run was broken off. It is not recorded, because the bag contains the state."""

@@ -43,24 +43,24 @@ def describe(bag: Bag) -> dict[str, Any]:
     """Return the contents and events of a bag; callers add to the dictionary, for example metrics.
 
     Returns:
-        ``path``, ``folder``, ``complete``, ``warnings`` (texts), ``start_s``, ``duration_s``, ``messages``, ``topics``,
-        ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None without a published value),
-        ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one entry per interval),
-        ``equipment`` (deviations of sensors, links, effectors and air from the ideal, SI), ``step_times`` (wall times
-        of the steps of the control law in ms, by node, and the control period), ``saturation``, ``tube`` and
-        ``not_covered`` (texts: properties of the flight outside the certificate of its design). The last seven are None
-        if their topic is missing, ``not_covered`` also if parameters are. Other times are simulated times in seconds;
-        ``end_s`` is None for an interval that lasts until the end of the bag.
+        ``path``, ``folder``, ``warnings`` (texts), ``complete`` (whether there are none), ``start_s``, ``duration_s``,
+        ``messages``, ``topics``, ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None
+        without a published value), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
+        entry per interval), ``equipment`` (deviations of sensors, links, effectors and air from the ideal, SI),
+        ``step_times`` (wall times of the steps of the control law in ms, by node, and the control period),
+        ``saturation``, ``tube`` and ``not_covered`` (texts: properties of the flight outside the certificate of its
+        design). The last seven are None if their topic is missing, ``not_covered`` also if parameters are. Other times
+        are simulated times in seconds; ``end_s`` is None for an interval that lasts until the end of the bag.
     """
     start, end = bag.span
-    fingerprint = _fingerprint(bag)
+    fingerprint, warnings = _fingerprint(bag), bag_warnings(bag)
     topics = [_topic(bag, name) for name in sorted(bag.topics)]
     faults = _faults(bag) if ACTUATOR in bag.roles else None
     return {
         "path": str(bag.path),
         "folder": str(bag.folder),
-        "complete": bag.complete,
-        "warnings": bag_warnings(bag),
+        "complete": not warnings,
+        "warnings": warnings,
         "start_s": start / 1e9,
         "duration_s": (end - start) / 1e9,
         "messages": sum(topic["messages"] for topic in topics),

@@ -16,7 +16,7 @@ from rosbags.interfaces.typing import ConstValue
 from rosbags.typesys.store import Typestore
 
 from hsv.bags.columns import Columns
-from hsv.bags.description import INTERFACE_VERSION, ROOT, RUN, TOPICS, resolved
+from hsv.bags.description import INTERFACE_VERSION, ROOT, RUN, TOPICS, TRANSIENT_LOCAL, resolved
 from hsv.bags.files import find_files, read_file, read_message
 from hsv.bags.metadata import (
     CUSTOM_DATA,
@@ -63,6 +63,12 @@ class _Recorded:
     schema: Schema
     log_times: list[int] = field(default_factory=list)
     messages: list[bytes] = field(default_factory=list)
+
+    def sort(self) -> None:
+        """Put the messages into the order of their log times: MCAP does not demand it of a file."""
+        order = sorted(range(len(self.log_times)), key=self.log_times.__getitem__)
+        self.log_times = [self.log_times[row] for row in order]
+        self.messages = [self.messages[row] for row in order]
 
 
 @dataclass
@@ -155,10 +161,10 @@ class Bag:
         recorded, name = self._of(topic), self.name_of(topic)
         if name in self._step_topics:
             return self._stamps(name, recorded.messages)
-        log_times = np.array(recorded.log_times, np.int64)
+        log_times = np.array(recorded.log_times, np.uint64)
         received, stamps = self._clock
-        if np.array_equal(received, stamps):
-            return log_times  # the recorder used simulated time
+        if np.array_equal(received.astype(np.int64), stamps):
+            return log_times.astype(np.int64)  # the recorder used simulated time
         before = np.searchsorted(received, log_times, side="right") - 1
         return np.asarray(stamps[np.maximum(before, 0)])
 
@@ -221,8 +227,10 @@ class Bag:
         return self._text(self._of(topic).schema)
 
     def qos(self, topic: str) -> Qos:
-        """Return the offered quality of service of a topic; the default if it is not recorded."""
-        return Qos.from_yaml(self._of(topic).channel.metadata.get("offered_qos_profiles", ""))
+        """Return the recorded quality of service of a topic, or else that with which the graph offers it."""
+        latched = self.name_of(topic) in map(self.name_of, TRANSIENT_LOCAL)
+        usual = Qos(durability="transient_local" if latched else "volatile")
+        return Qos.from_yaml(self._of(topic).channel.metadata.get("offered_qos_profiles", ""), usual)
 
     def constants(self, topic: str) -> dict[str, ConstValue]:
         """Return the constants in the recorded definition of a topic's type."""
@@ -276,13 +284,14 @@ class Bag:
         return frozenset(name for role, name in self.roles.items() if role in TOPICS)
 
     @cached_property
-    def _clock(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _clock(self) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:
         """Log times (n,) of all messages of steps, ascending, and the latest stamp (n,) up to each of them, ns."""
         steps = sorted(self._step_topics)
-        received = np.concatenate([np.array([], np.int64), *(self._topics[topic].log_times for topic in steps)])
+        log_times = (np.array(self._topics[topic].log_times, np.uint64) for topic in steps)
+        received = np.concatenate([np.array([], np.uint64), *log_times])
         stamps = np.concatenate([np.array([], np.int64), *(self.times(topic) for topic in steps)])
         order = np.argsort(received, kind="stable")
-        return received[order].astype(np.int64), np.maximum.accumulate(stamps[order].astype(np.int64))
+        return received[order], np.maximum.accumulate(stamps[order].astype(np.int64))
 
     def _read(self) -> None:
         metadata = read_metadata(self.folder)
@@ -305,6 +314,8 @@ class Bag:
             self.loss.counted &= expected is not None or not scan.damages
             self.loss.messages += max((scan.indexed if expected is None else expected) - found, orphans, 0)
             self.loss.attachments += max(statistics.attachment_count - attachments, 0) if statistics else 0
+        for recorded in self._topics.values():
+            recorded.sort()
         self.loss.counted &= not self.loss.files
         self.custom_data = self.custom_data or custom_data(recorded_by)
         self.distro = str(recorded_by.get("ros_distro") or DISTRO)

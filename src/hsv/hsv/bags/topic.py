@@ -49,10 +49,9 @@ class Qos:
         }
 
     @classmethod
-    def from_yaml(cls, text: str) -> Qos:
-        """Return the first profile in a text as from :meth:`as_yaml`, with defaults for missing entries."""
-        profiles = readable_profiles(text) or [{}]
-        given = {key: value for key, value in profiles[0].items() if key in cls.__dataclass_fields__}
+    def from_yaml(cls, text: str, usual: Qos) -> Qos:
+        """Return the first profile in a text as from :meth:`as_yaml`, with the entries of ``usual`` for missing ones."""
+        given = (_readable_profiles(text, usual) or [usual.as_dict()])[0]
         for key, value in given.items():
             if isinstance(value, dict):
                 given[key] = int(value["sec"]) * 10**9 + int(value["nsec"])
@@ -63,39 +62,44 @@ class Qos:
         return yaml.safe_dump([self.as_dict()], sort_keys=False)
 
 
-def readable_profiles(text: str) -> list[dict[str, Any]]:
-    """Return the profiles in the metadata of a channel, with defaults for damaged entries; empty if unreadable."""
+def _readable_profiles(text: str, usual: Qos) -> list[dict[str, Any]]:
+    """Return the profiles in the metadata of a channel, with those of ``usual`` for damaged entries."""
     try:
         profiles = parse_yaml(text)
     except DocumentError:
         return []
     if not isinstance(profiles, list) or not all(isinstance(profile, dict) for profile in profiles):
         return []
-    usual = Qos().as_dict()
-    return [{key: _sound(key, profile.get(key), default) for key, default in usual.items()} for profile in profiles]
+    return [
+        {key: _sound(key, profile.get(key), value) for key, value in usual.as_dict().items()} for profile in profiles
+    ]
 
 
 def repaired_profiles(text: str) -> str:
     """Return the ``text`` of profiles, repaired if it is damaged; empty if it cannot be repaired."""
-    profiles = readable_profiles(text)
+    profiles = _readable_profiles(text, Qos())
     if not profiles:
         return ""
     return text if profiles == parse_yaml(text) else yaml.safe_dump(profiles, sort_keys=False)
 
 
 _WORDS = {
-    "history": {"keep_last", "keep_all", "system_default", "unknown"},
-    "reliability": {"reliable", "best_effort", "system_default", "best_available", "unknown"},
-    "durability": {"volatile", "transient_local", "system_default", "best_available", "unknown"},
-    "liveliness": {"automatic", "manual_by_topic", "system_default", "best_available", "unknown"},
+    "history": ("system_default", "keep_last", "keep_all", "unknown"),
+    "reliability": ("system_default", "reliable", "best_effort", "unknown", "best_available"),
+    "durability": ("system_default", "transient_local", "volatile", "unknown", "best_available"),
+    "liveliness": ("system_default", "automatic", "manual_by_node", "manual_by_topic", "unknown", "best_available"),
 }
+"""The words of rosbag2; Humble and Iron write their numbers, the positions here, as rmw counts them."""
 
 
 def _sound(key: str, value: Any, default: Any) -> Any:
     if isinstance(default, dict):
         times = value if isinstance(value, dict) else {}
         return value if all(isinstance(times.get(part), int) for part in default) else default
-    return value if isinstance(value, type(default)) and value in _WORDS.get(key, (value,)) else default
+    words = _WORDS.get(key, (value,))
+    if type(value) is int and key in _WORDS and 0 <= value < len(words):
+        return words[value]
+    return value if isinstance(value, type(default)) and value in words else default
 
 
 @dataclass(frozen=True, slots=True)

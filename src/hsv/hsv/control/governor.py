@@ -10,7 +10,7 @@ can.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
@@ -35,6 +35,10 @@ AFTERWARDS = 10.0
 
 USUAL_BLEND = 2.0
 """Half the time (s) in which the rate changes at a corner, by default."""
+
+NOTICE = 2.0
+"""Simulated time (s) between a command in flight and the first step that it changes. A plan takes 0.1 to 2 s of
+processor time, so that a flight at real-time pace does not wait for it."""
 
 KEPT_FREE = 1e-3
 """Share of U minus F Z that is kept free on every side: in flight the plan is scheduled by what is measured."""
@@ -156,10 +160,18 @@ class Governor:
         """
         half = self._half(blend)
         last = corners[-1]
-        first = max(self._steps(leg.start), beginning.step, self._steps(last.time) + 1 - half)
+        first = max(self.first_change(corners, leg.start, blend), beginning.step)
         turn = Corner(self._seconds(first + half), last.altitude, last.velocity, self._seconds(half))
         known = [*corners, turn]
         return self._reference([*known, self._corner(known, leg, half, "command", beginning)], beginning), first
+
+    def first_change(self, corners: Sequence[Corner], start: float, blend: float) -> int:
+        """Return the first step that changes when a leg is requested for ``start`` (s), after the last of ``corners``.
+
+        Raises:
+            GovernorError: The ``blend`` (s) is not above zero.
+        """
+        return max(self._steps(start), self._steps(corners[-1].time) + 1 - self._half(blend))
 
     def trajectory(self, corners: Sequence[Corner]) -> ReferenceTrajectory:
         """Return the trims along ``corners``.
@@ -263,9 +275,9 @@ class Governor:
 class CommandGovernor:
     """A governor that turns commands in flight into references that continue from the current one."""
 
-    def __init__(self, governor: Governor, trajectory: NominalTrajectory, vehicle: Vehicle) -> None:
-        """Govern the commands of ``trajectory``, which flies the ``vehicle``."""
-        self._governor, self._trajectory, self._vehicle = governor, trajectory, vehicle
+    def __init__(self, governor: Governor, trajectory: NominalTrajectory, vehicle: Vehicle, period: float) -> None:
+        """Govern the commands of ``trajectory``, which flies the ``vehicle`` with this ``period`` (s)."""
+        self._governor, self._trajectory, self._vehicle, self._period = governor, trajectory, vehicle, period
 
     @classmethod
     def from_parameters(
@@ -288,10 +300,13 @@ class CommandGovernor:
         vehicle = Vehicle.from_parameters(values)
         actuators = actuator_data(values, vehicle.decoupled, design.period)
         bounds = input_bounds(design.plan_bounds, actuators)
-        return cls(Governor(trajectory.data, vehicle.decoupled, design.period, bounds), trajectory, vehicle)
+        governor = Governor(trajectory.data, vehicle.decoupled, design.period, bounds)
+        return cls(governor, trajectory, vehicle, design.period)
 
-    def command(self, altitude: float, velocity: float, duration: float = 0.0, blend: float = 0.0) -> tuple[int, float]:
-        """Add a leg to a point, as fast as the tightened inputs permit, after all earlier commands.
+    def command(
+        self, altitude: float, velocity: float, duration: float = 0.0, blend: float = 0.0
+    ) -> tuple[int, Callable[[], ReferenceTrajectory]]:
+        """Check a command that adds a leg to a point, as fast as the tightened inputs permit, after all earlier ones.
 
         Args:
             altitude: Altitude of the point, m.
@@ -300,10 +315,12 @@ class CommandGovernor:
             blend: Half-width of the blend at a corner, s; 0: :data:`USUAL_BLEND`.
 
         Returns:
-            The first step that differs, and the time (s) at which the reference comes to rest.
+            The first step that the command changes, at least :data:`NOTICE` ahead, and the function that plans it. The
+            function takes 0.1 to 2 s and may be called in another thread while the flight goes on up to that step;
+            it returns the new reference, or raises a GovernorError if none fits.
 
         Raises:
-            GovernorError: A number out of its range, or no reference fits; the reference stays as it was.
+            GovernorError: A number out of its range, or a command before the flight.
         """
         ranges = {
             "altitude": (altitude, "m", self._vehicle.altitude_range),
@@ -323,11 +340,12 @@ class CommandGovernor:
                 f"altitude = {altitude:.6g} m, velocity = {velocity:.6g} m/s: expected another point than the command "
                 "before"
             )
-        found, first = self._governor.continued(
-            corners,
-            Leg(0.0, duration, altitude, velocity),
-            blend or USUAL_BLEND,
-            Beginning(trajectory.next_step, trajectory.deviation),
-        )
-        trajectory.change_reference(self._governor.trajectory(found.corners))
-        return first, found.end
+        blend = blend or USUAL_BLEND
+        beginning = Beginning(trajectory.next_step, trajectory.deviation)
+        leg = Leg(beginning.step * self._period + NOTICE, duration, altitude, velocity)
+
+        def plan() -> ReferenceTrajectory:
+            found, _ = self._governor.continued(corners, leg, blend, beginning)
+            return self._governor.trajectory(found.corners)
+
+        return self._governor.first_change(corners, leg.start, blend), plan

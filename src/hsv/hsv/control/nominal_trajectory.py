@@ -94,7 +94,7 @@ class NominalTrajectory:
         return self._deviation.copy()
 
     def change_reference(self, reference: ReferenceTrajectory) -> None:
-        """Fly ``reference`` from the next step on, until :meth:`reset`; up to there it is that flown so far."""
+        """Fly ``reference`` until :meth:`reset`; it equals the reference so far in every step flown."""
         self.reference = reference
 
     def reset(self) -> None:

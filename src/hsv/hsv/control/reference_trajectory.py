@@ -197,6 +197,11 @@ class ReferenceTrajectory:
         return along
 
     @property
+    def end(self) -> float:
+        """Time at which the reference comes to rest, s."""
+        return self.corners[-1].time + self.corners[-1].blend
+
+    @property
     def final_state(self) -> np.ndarray:
         """x_r (9) after the last command."""
         return np.asarray(self.data.state[-1])

@@ -50,16 +50,19 @@ def written(digest: bytes) -> str:
 
 
 def as_published(found: str | None, scenario: Scenario | None, design_hash: str) -> bool | None:
-    """Return whether the flight of a scenario, with the design of this digest, has its published fingerprint.
+    """Return whether a flight has a published fingerprint, of whatever scenario.
 
-    ``None``: there is no fingerprint or scenario to compare, or scenario or design differ from the shipped ones.
+    ``None``: there is no fingerprint or, for an unpublished one, no scenario to compare, or scenario or design (by its
+    digest) differ from the shipped ones.
     """
+    if any(found == entry["fingerprint"] for entry in _table().values()):
+        return True
     entry = _table().get(scenario.name) if scenario else None
     if found is None or scenario is None or entry is None or entry["design_hash"] != design_hash:
         return None
     if load_scenario(scenario.name).parameters() != scenario.parameters():
         return None
-    return bool(found == entry["fingerprint"])
+    return False
 
 
 def published_in_words(found: str | None, same: bool | None) -> str:

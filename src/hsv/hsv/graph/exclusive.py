@@ -22,26 +22,24 @@ _LONGEST_NAME = 100
 
 
 def ros_domain() -> int:
-    """Return the ROS domain of this process.
+    """Return the ROS domain of this process, in which nodes can find each other.
 
     Raises:
-        ParameterError: ROS_DOMAIN_ID is not such a number; rcl would read 025 as an octal one, and -1 as 0.
+        ParameterError: ROS_DOMAIN_ID is not such a number (rcl would read 025 as an octal one, and -1 as 0), discovery
+            is switched off, or there is no network.
     """
     text = os.environ.get("ROS_DOMAIN_ID") or "0"
     if not re.fullmatch(r"0|[1-9][0-9]*", text) or int(text) > LAST_DOMAIN:
         raise ParameterError(f"ROS_DOMAIN_ID={text!r}: expected a whole number from 0 to {LAST_DOMAIN}")
-    return int(text)
-
-
-def require_discovery() -> None:
-    """Check that processes can find each other.
-
-    Raises:
-        ParameterError: Discovery is switched off.
-    """
     name = "ROS_AUTOMATIC_DISCOVERY_RANGE"
     if (value := os.environ.get(name, "")).upper() == "OFF":
         raise ParameterError(f"{name}={value!r}: expected LOCALHOST or SUBNET, so that the nodes find each other")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+        try:
+            asking.connect(("127.0.0.1", 9))
+        except OSError:
+            raise ParameterError("network interface lo: down, expected up, so that the nodes find each other") from None
+    return int(text)
 
 
 def claim_namespace(domain: int, namespace: str) -> socket.socket | None:

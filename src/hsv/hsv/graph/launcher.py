@@ -30,7 +30,7 @@ from hsv.bags.description import (
 )
 from hsv.base.errors import RunError
 from hsv.base.processes import end_with_parent, uninterrupted
-from hsv.graph.exclusive import claim_namespace, is_published, require_discovery, ros_domain
+from hsv.graph.exclusive import claim_namespace, is_published, ros_domain
 from hsv.graph.snapshot import Snapshot
 from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
 
@@ -275,9 +275,8 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
 
     Raises:
         RunError: Another run has them, or a node that publishes a topic of one of ``nodes``.
-        ParameterError: The environment names no domain, or switches discovery off.
+        ParameterError: The environment names no domain, or one in which nodes cannot find each other.
     """
-    require_discovery()
     domain = ros_domain()
     where = f"ROS_DOMAIN_ID={domain}{f' and namespace {namespace}' if namespace != ROOT else ''}"
     held = claim_namespace(domain, namespace)

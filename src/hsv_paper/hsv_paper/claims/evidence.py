@@ -132,12 +132,12 @@ def certified(entry: str) -> np.ndarray:
     return np.array(found)
 
 
-def shown(value: float, unit: str, units: UnitSystem = UnitSystem.paper) -> str:
+def shown(value: float, unit: str, units: UnitSystem = UnitSystem.paper, digits: int = 4) -> str:
     """Return a number (SI) with its unit, by default the paper's; an infinite time is beyond the end of the flight."""
     if not math.isfinite(value):
         return "not defined" if math.isnan(value) else "not by the end" if unit == "s" else "unbounded"
     number, name = in_system(value, unit, units)
-    return f"{number:.4g}" + ("" if name == "1" else f" {name}")
+    return f"{number:.{digits}g}" + ("" if name == "1" else f" {name}")
 
 
 def nominal(table: Table, measure: str) -> float:

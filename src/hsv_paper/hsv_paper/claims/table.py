@@ -56,14 +56,21 @@ class Reading:
     """Name of the actuators between command and vehicle; empty for the paper's, if the claim names none."""
 
     def measured(self, units: UnitSystem = UnitSystem.paper) -> str:
-        """Return the number with its unit."""
-        return shown(self.value, self.unit, units)
+        """Return the number with its unit, and with enough digits that rounding does not hide a violated threshold."""
+        written = (shown(self.value, self.unit, units, digits) for digits in range(4, 18))
+        limit = shown(self._limit, self.unit, units)
+        return next(text for text in written if self.holds or text != limit)
 
     def threshold(self, units: UnitSystem = UnitSystem.paper) -> str:
         """Return the threshold in words."""
-        word, limit = ("least", self.at_least) if self.at_most is None else ("most", self.at_most)
+        word = "least" if self.at_most is None else "most"
+        return f"at {word} {shown(self._limit, self.unit, units)}"
+
+    @property
+    def _limit(self) -> float:
+        limit = self.at_least if self.at_most is None else self.at_most
         assert limit is not None
-        return f"at {word} {shown(limit, self.unit, units)}"
+        return limit
 
     @property
     def holds(self) -> bool:

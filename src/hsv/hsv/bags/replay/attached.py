@@ -209,10 +209,11 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
 
 def _commands_as_flown(bag: Bag) -> dict[str, Any]:
     """Return the parameters of the reference in flight; empty without commands in flight."""
-    published = [message for _, message in bag.decode(REFERENCE)] if REFERENCE in bag.roles else []
-    if not published or published[-1].step == 0:
+    published = bag.decode(REFERENCE) if REFERENCE in bag.roles else ()
+    flown = [message for _, message in published if message.status == bag.constant(REFERENCE, "FLOWN")]
+    if not flown or flown[-1].step == 0:
         return {}
-    return {f"reference.{name}": np.asarray(getattr(published[-1], name)).tolist() for name in COLUMNS}
+    return {f"reference.{name}": np.asarray(getattr(flown[-1], name)).tolist() for name in COLUMNS}
 
 
 def _tau_as_flown(bag: Bag, sections: ParameterSections) -> dict[str, Any]:

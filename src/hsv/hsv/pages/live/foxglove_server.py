@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import foxglove
+from foxglove.websocket import ChannelView, Client, ServerListener
 
 from hsv.bags.definitions import definition
 from hsv.base.errors import ParameterError
 from hsv.graph.addresses import HOST
 
 
-class FoxgloveServer:
+class FoxgloveServer(ServerListener):
     """A read-only server of topics for Foxglove and Lichtblick; a slow client misses messages and delays no others."""
 
-    def __init__(self, port: int, topics: Mapping[str, str]) -> None:
+    def __init__(self, port: int, topics: Mapping[str, str], latched: Iterable[str] = ()) -> None:
         """Start the server.
 
         Args:
             port: Port on this machine; 0: any free port.
             topics: Types of the topics by full name.
+            latched: Topics of which a client that subscribes later receives the earlier messages, too.
 
         Raises:
             ParameterError: The port is in use.
@@ -28,6 +30,8 @@ class FoxgloveServer:
         """
         # Suppress messages about clients that connect and disconnect.
         foxglove.set_log_level(logging.CRITICAL)
+        self._latched: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in latched}
+        """Times and bytes of the messages of the run on the latched topics."""
         # Keep the context, because its channels are closed with it.
         self._context = foxglove.Context()
         self._channels = {
@@ -40,7 +44,9 @@ class FoxgloveServer:
             for name, kind in topics.items()
         }
         try:
-            self._server = foxglove.start_server(name="hsv", host=HOST, port=port, context=self._context)
+            self._server = foxglove.start_server(
+                name="hsv", host=HOST, port=port, context=self._context, server_listener=self
+            )
         except RuntimeError:
             raise ParameterError(f"live.port = {port}: in use, expected a free port of this machine") from None
 
@@ -51,10 +57,19 @@ class FoxgloveServer:
 
     def send(self, topic: str, time: int, data: bytes) -> None:
         """Send a serialized message of simulated ``time`` (ns) to all subscribers of its topic."""
+        if topic in self._latched:
+            self._latched[topic].append((time, data))
         self._channels[topic].log(data, log_time=time)
 
+    def on_subscribe(self, client: Client, channel: ChannelView) -> None:
+        """Send the earlier messages of a latched topic to a client that subscribes."""
+        for time, data in list(self._latched.get(channel.topic, ())):
+            self._channels[channel.topic].log(data, log_time=time, sink_id=client.id)
+
     def start_run(self) -> None:
-        """Reset the clients for a new run."""
+        """Forget the previous run, here and in the clients."""
+        for messages in self._latched.values():
+            messages.clear()
         self._server.clear_session()
 
     def close(self) -> None:
