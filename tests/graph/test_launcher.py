@@ -10,7 +10,7 @@ import pytest
 
 from hsv.bags.description import COMPOSED, ROOT, TUBE_MPC, NodeDescription
 from hsv.base.errors import ParameterError, RunError
-from hsv.graph.exclusive import claim_topic
+from hsv.graph.exclusive import claim
 from hsv.graph.launcher import Launcher
 
 # A number that no graph can have and no other test run takes: only its name is held.
@@ -42,8 +42,8 @@ def test_domain_and_namespace_belong_to_one_run(namespace: str) -> None:
 @pytest.mark.usefixtures("domain")
 @pytest.mark.parametrize("node", [TUBE_MPC, COMPOSED], ids=lambda node: node.name)
 def test_a_node_that_runs_by_hand_is_named(node: NodeDescription) -> None:
-    held = claim_topic(DOMAIN, "/veh1/hsv/command")
-    assert held is not None and claim_topic(DOMAIN, "/veh1/hsv/command") is None
+    held = claim("topic", DOMAIN, "/veh1/hsv/command")
+    assert held is not None and claim("topic", DOMAIN, "/veh1/hsv/command") is None
     refused = "publishes /veh1/hsv/command already: expected no other tube_mpc there"
     with held, pytest.raises(RunError, match=refused), launcher("/veh1", node):
         pass

@@ -15,7 +15,7 @@ from waiting import wait_until
 
 from hsv.bags.reader import Bag
 from hsv.bags.topic import Topic
-from hsv.graph.exclusive import claim_topic
+from hsv.graph.exclusive import claim
 
 pytestmark = pytest.mark.graph
 
@@ -81,7 +81,7 @@ def test_a_message_type_that_is_not_installed_is_named(processes: Processes, bag
 @pytest.mark.long
 def test_topics_of_a_graph_that_is_there_are_not_played(processes: Processes, bag: Path) -> None:
     domain = int(processes.environment["ROS_DOMAIN_ID"])
-    held = claim_topic(domain, "/hsv/state")
+    held = claim("topic", domain, "/hsv/state")
     assert held is not None
     with held:
         done = processes.run("hsv", "play", bag)

@@ -17,7 +17,7 @@ from rclpy.parameter import Parameter as RosParameter
 from hsv.bags.description import FAULT_INJECTOR, NOMINAL_TRAJECTORY, ROSOUT
 from hsv.bags.messages import fault_in
 from hsv.base.errors import ParameterError, RunError
-from hsv.graph.settable import find, parse, step_in
+from hsv.graph.node_parameters import find, parse, step_in
 from hsv.model.faults.injector import read_parameters
 from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
 from hsv_node.middleware import LATCHED, STEP

@@ -37,7 +37,7 @@ from hsv.bags.description import (
 )
 from hsv.bags.infrastructure_parameters import LIVE_PARAMETERS
 from hsv.bags.messages import stamp_in
-from hsv.graph.settable import SETTABLE, step_in
+from hsv.graph.node_parameters import SETTABLE, step_in
 from hsv.graph.standstill import Standstill
 from hsv.pages.layouts import foxglove_layout
 from hsv.pages.live.commands import Change, Command, Inject

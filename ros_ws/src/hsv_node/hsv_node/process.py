@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 from rclpy.node import Node
 
 from hsv.base.errors import RunError
-from hsv.graph.exclusive import claim_node, claim_topic
+from hsv.graph.exclusive import claim
 
 LEAVE_WITHIN = 3.0
 """Maximum time (s) to destroy the nodes, which takes milliseconds; ``hsv run`` reports a hung node only later."""
@@ -43,7 +43,7 @@ class ProcessNode(Node):
             RunError: Another node of this machine has it; ``expected`` says what is due.
         """
         name = self.get_fully_qualified_name()
-        self._keep(claim_node(self.context.get_domain_id(), name), f"another node is called {name}", expected)
+        self._keep("node", name, f"another node is called {name}", expected)
 
     def claim(self, topic: str, expected: str) -> None:
         """Reserve a topic for this node before it publishes.
@@ -52,11 +52,12 @@ class ProcessNode(Node):
             RunError: Another node of this machine has it; ``expected`` says what is due.
         """
         name = self.resolve_topic_name(topic)
-        self._keep(claim_topic(self.context.get_domain_id(), name), f"another node publishes {name}", expected)
+        self._keep("topic", name, f"another node publishes {name}", expected)
 
-    def _keep(self, held: socket.socket | None, taken: str, expected: str) -> None:
+    def _keep(self, kind: str, name: str, taken: str, expected: str) -> None:
+        domain = self.context.get_domain_id()
+        held = claim(kind, domain, name)
         if held is None:
-            domain = self.context.get_domain_id()
             self.destroy_node()
             raise RunError(f"{taken} in ROS domain {domain}: expected {expected}")
         self._claims.append(held)

@@ -1,8 +1,8 @@
-"""Exclusive roles: in a ROS domain, one run per namespace and one publisher per topic; one flight per processor.
+"""What belongs to one process of this machine: in a ROS domain, nodes, topics and the namespace of a run; and ports.
 
-Each is a name that one process of this machine can bind, an abstract socket: taken at once, before the second has sent
-anything, and free as soon as its process is gone, however that ended. On other machines of the same domain nothing is
-known of it.
+Each name in a domain is an abstract socket, which one process can bind: it is taken at once, before a second process
+has sent anything, and free as soon as its process is gone, however that ended. Other machines of the domain do not know
+of it.
 """
 
 from __future__ import annotations
@@ -12,10 +12,15 @@ import os
 import re
 import socket
 
-from hsv.base.errors import ParameterError
+from hsv.base.errors import ParameterError, reason
 
 LAST_DOMAIN = 232
 """The highest domain whose ports are below 65536."""
+
+HOST = "127.0.0.1"
+"""The only address on which the servers of the live view accept connections."""
+
+_LAST_PORT = 65535
 
 _LONGEST_NAME = 100
 """Bytes; the system takes 107."""
@@ -36,26 +41,27 @@ def ros_domain() -> int:
         raise ParameterError(f"{name}={value!r}: expected LOCALHOST or SUBNET, so that the nodes find each other")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
         try:
-            asking.connect(("127.0.0.1", 9))
+            asking.connect((HOST, 9))
         except OSError:
             raise ParameterError("network interface lo: down, expected up, so that the nodes find each other") from None
     return int(text)
 
 
-def claim_namespace(domain: int, namespace: str) -> socket.socket | None:
-    """Return what keeps a namespace of ``domain`` to one run while it is open; None if another run has it."""
-    # The root namespace is the domain itself.
-    return _bound("hsv_domain", domain, namespace.rstrip("/"))
+def claim(kind: str, domain: int, name: str) -> socket.socket | None:
+    """Return what keeps a name to one process of this machine while it is open; None if another process has it.
 
-
-def claim_topic(domain: int, topic: str) -> socket.socket | None:
-    """Return what keeps ``topic`` (its full name) to one publisher while it is open; None if another node has it."""
-    return _bound("hsv_topic", domain, topic)
-
-
-def claim_node(domain: int, name: str) -> socket.socket | None:
-    """Return what keeps the full ``name`` of a node to one process while it is open; None if another node has it."""
-    return _bound("hsv_node", domain, name)
+    Args:
+        kind: ``node``, ``topic``, or ``domain`` for a namespace, which belongs to one run.
+        domain: The ROS domain.
+        name: Full name of the node, topic or namespace.
+    """
+    held = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    try:
+        held.bind(_address(kind, domain, name))
+    except OSError:
+        held.close()
+        return None
+    return held
 
 
 def is_published(domain: int, topic: str) -> bool:
@@ -63,24 +69,42 @@ def is_published(domain: int, topic: str) -> bool:
     # To bind it would refuse a node that claims it in the same instant.
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asking:
         try:
-            asking.connect(_address("hsv_topic", domain, topic))
+            asking.connect(_address("topic", domain, topic))
         except ConnectionRefusedError:
             return False
     return True
 
 
-def _address(kind: str, number: int, name: str) -> str:
-    text = f"{kind}_{number}{name}"
+def _address(kind: str, domain: int, name: str) -> str:
+    text = f"hsv_{kind}_{domain}{name}"
     if len(text) > _LONGEST_NAME:
-        text = f"{kind}_{number}_{hashlib.sha256(name.encode()).hexdigest()}"
+        text = f"hsv_{kind}_{domain}_{hashlib.sha256(name.encode()).hexdigest()}"
     return f"\0{text}"
 
 
-def _bound(kind: str, number: int, name: str) -> socket.socket | None:
-    held = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-    try:
-        held.bind(_address(kind, number, name))
-    except OSError:
-        held.close()
-        return None
-    return held
+def origins(port: int) -> list[str]:
+    """Return the origins of the page that is served on ``port``, as browsers name them."""
+    return [f"http://{name}:{port}" for name in (HOST, "localhost")]
+
+
+def ports(first: int) -> tuple[int, int]:
+    """Return the ports of Foxglove's server and of the page: ``first`` and the next one, or with 0 any two free ones.
+
+    Raises:
+        ParameterError: One of them is none, or in use.
+    """
+    if not 0 <= first < _LAST_PORT:
+        raise ParameterError(f"live-port = {first}: expected 1 to {_LAST_PORT - 1}, or 0 for any free ones")
+    chosen = (first, first + 1 if first else 0)
+    for port in chosen:
+        with socket.socket() as tried:
+            # What has just been left is free: the servers take it, too.
+            tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                tried.bind((HOST, port))
+            except OSError as error:
+                raise ParameterError(
+                    f"live-port = {first}: port {port}: {reason(error).lower()}, expected two free ports, this and the "
+                    "next, or 0 for any"
+                ) from None
+    return chosen

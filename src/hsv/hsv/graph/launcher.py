@@ -30,7 +30,7 @@ from hsv.bags.description import (
 )
 from hsv.base.errors import RunError
 from hsv.base.processes import end_with_parent, uninterrupted
-from hsv.graph.exclusive import claim_namespace, is_published, ros_domain
+from hsv.graph.exclusive import claim, is_published, ros_domain
 from hsv.graph.snapshot import Snapshot
 from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
 
@@ -279,7 +279,7 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
     """
     domain = ros_domain()
     where = f"ROS_DOMAIN_ID={domain}{f' and namespace {namespace}' if namespace != ROOT else ''}"
-    held = claim_namespace(domain, namespace)
+    held = claim("domain", domain, namespace.rstrip("/"))
     if held is None:
         raise RunError(f"another run has {where}: expected a separate domain or namespace for every run")
     for node in graph() if COMPOSED in nodes else nodes:

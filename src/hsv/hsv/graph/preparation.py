@@ -29,7 +29,7 @@ from hsv.control.design import (
 from hsv.control.library import library_digest, library_record
 from hsv.flight.assembly import assemble_flight, blamed_on, own_parameters
 from hsv.flight.scenario import Scenario, parse_scenario, scenario_text, with_controller
-from hsv.graph.addresses import ports
+from hsv.graph.exclusive import ports
 from hsv.graph.launcher import executable
 
 _NO_DESIGN = ParameterSections({"design.name": NO_DESIGN})

@@ -10,7 +10,7 @@ from hsv.bags.description import FAULT_INJECTOR, NodeDescription
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter
 from hsv.base.units import parse_quantity
-from hsv.graph.settable import SETTABLE, parse
+from hsv.graph.node_parameters import SETTABLE, parse
 from hsv.model.faults.table import CHANNELS, FAULT_KINDS, Fault, read_fault
 
 

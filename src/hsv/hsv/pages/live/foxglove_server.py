@@ -10,7 +10,7 @@ from foxglove.websocket import ChannelView, Client, ServerListener
 
 from hsv.bags.definitions import definition
 from hsv.base.errors import ParameterError
-from hsv.graph.addresses import HOST
+from hsv.graph.exclusive import HOST
 
 
 class FoxgloveServer(ServerListener):

@@ -6,7 +6,7 @@ from itertools import groupby
 from typing import Any
 
 from hsv.base.units import UnitSystem
-from hsv.graph.addresses import origins
+from hsv.graph.exclusive import origins
 from hsv.model.faults.table import CHANNELS, FAULT_KINDS
 from hsv.pages.engine import Plot, render
 from hsv.pages.live.hub import Hub

@@ -19,7 +19,7 @@ from websockets.http11 import Request, Response
 
 from hsv.base.errors import DocumentError, HsvError, ParameterError, reason
 from hsv.base.files import json_text, parse_json
-from hsv.graph.addresses import HOST, origins
+from hsv.graph.exclusive import HOST, origins
 from hsv.pages.live.commands import Command, read_command
 from hsv.pages.live.hub import Hub
 from hsv.pages.live.page import live_page
