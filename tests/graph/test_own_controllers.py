@@ -123,7 +123,7 @@ def test_commands_in_flight_beside_four_busy_processes(processes: Processes, con
         fly_until(flight, bag, 50)
         done = processes.run("hsv", "command", "86000 ft", "8120 ft/s", "--json")
         assert done.returncode == 0, done.stdout
-        fly_until(flight, bag, json.loads(last_line(done))["step"] + 150)
+        fly_until(flight, bag, json.loads(last_line(done))["step"] + 600)
         flight.send_signal(signal.SIGINT)
         said = output_of(flight)
         assert flight.returncode == 130, said
