@@ -50,7 +50,7 @@ class Qos:
 
     @classmethod
     def from_yaml(cls, text: str, usual: Qos) -> Qos:
-        """Return the first profile in a text as from :meth:`as_yaml`, with the entries of ``usual`` for missing ones."""
+        """Return the first profile in a text as from :meth:`as_yaml`; missing entries are those of ``usual``."""
         given = (_readable_profiles(text, usual) or [usual.as_dict()])[0]
         for key, value in given.items():
             if isinstance(value, dict):

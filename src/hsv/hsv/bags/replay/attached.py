@@ -157,7 +157,8 @@ def complete_steps(bag: Bag, topics: Iterable[str] = ()) -> int:
         RecordingError: A topic is missing.
     """
     stamps = [bag.times(topic) for topic in topics or [topic for topic in TOPICS if topic in bag.roles]]
-    present = np.all([np.isin(expected_stamps(bag), stamp) for stamp in stamps], axis=0)
+    expected = expected_stamps(bag)
+    present = np.all([np.isin(expected, stamp) for stamp in stamps], axis=0)
     return min(*map(len, stamps), len(present) if present.all() else int(np.argmin(present)))
 
 
