@@ -41,7 +41,7 @@ else:
 
 
 MAX_BYTES = 2**22
-"""Size of the largest text that is read; designs and certificates have less than a thirtieth of it."""
+"""Maximum size of a text, bytes; designs and certificates are at least thirty times smaller."""
 
 MAX_LEVELS = 64
 """Depth of tables and lists."""

@@ -24,9 +24,9 @@ class Parameter:
     description: str
     """Short description."""
     unit: str = ""
-    """SI unit, empty where it has none."""
+    """SI unit; empty for a dimensionless parameter."""
     minimum: float = -math.inf
-    """Least admissible number (of every element)."""
+    """Smallest admissible value of the number or of each element."""
     maximum: float = math.inf
     """Largest admissible number (of every element)."""
     choices: tuple[str, ...] = ()

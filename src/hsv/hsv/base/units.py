@@ -137,7 +137,7 @@ def readable(value: float, unit: str, system: UnitSystem = UnitSystem.metric) ->
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """Return ``value`` with so many significant digits, and all that it has before the decimal point up to 999999."""
+    """Return ``value`` with ``digits`` significant digits; integer parts up to 999999 are complete."""
     return f"{value:.0f}" if float(f"1e{digits - 1}") <= abs(value) < 999999.5 else f"{value:.{digits}g}"
 
 
@@ -166,7 +166,7 @@ def written(value: float, unit: str) -> float | str:
 
 
 def percent(share: float) -> str:
-    """Return a share as a file has it, in percent. No digit is lost."""
+    """Return a share in percent for a file, without loss of digits."""
     return f"{Decimal(repr(share)).scaleb(2).normalize():f} %"
 
 
@@ -227,7 +227,7 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
 
 @lru_cache(maxsize=4096)
 def _converted(text: str, unit: str) -> float | None:
-    """Return a quantity in ``unit``, ``None`` where its own is of another dimension; campaigns read the same often."""
+    """Return a quantity in ``unit``, or ``None`` if the dimensions differ; cached for campaigns."""
     number, written = _number_and_unit(text)
     (square, dimension), (wanted_square, wanted) = _squared(written), _squared(unit)
     return _scaled(number, square / wanted_square) if dimension == wanted else None

@@ -1,1 +1,1 @@
-"""Benchmarks: the library and the graph against the same work done by other means, timed in the same run."""
+"""Benchmarks: library and graph compared with other implementations of the same work, timed in the same run."""

@@ -88,7 +88,7 @@ def read_run(path: Path) -> RecordedRun:
 
 
 def changes(figures: Sequence[Figure], run: RecordedRun) -> list[Change]:
-    """Return the changes of figures since a recorded run, for those that the run has.
+    """Return the changes of the figures contained in a recorded run.
 
     A change counts where it is more than :data:`RESOLUTION` and the percentiles do not overlap; else it is zero.
     """

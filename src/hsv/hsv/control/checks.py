@@ -58,7 +58,7 @@ class Subject:
         return found
 
     def count(self, field: str, limit: int) -> int:
-        """Return a number of samples, sequences or steps; a hostile file gets no more than ``limit``.
+        """Return a number of samples, sequences or steps, at most ``limit`` to guard against hostile files.
 
         Raises:
             DesignError: It is no such number.
@@ -70,7 +70,7 @@ class Subject:
 
     @cached_property
     def vehicle(self) -> Vehicle:
-        """The vehicle in the certificate; where there is none, the default one."""
+        """The vehicle in the certificate, or the default vehicle."""
         values = self.certificate["inputs"].get("vehicle")
         if not isinstance(values, dict | None):
             raise DesignError(f"inputs.vehicle = {values!r}: expected the parameters of a vehicle")

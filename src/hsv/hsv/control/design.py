@@ -144,7 +144,7 @@ class PlanBounds:
 
     @property
     def lower(self) -> np.ndarray:
-        """Least inputs (2) inside both."""
+        """Smallest inputs (2) inside both bounds."""
         return np.maximum(self.input_minimum, self.region_minimum[:2])
 
     @property
@@ -154,7 +154,7 @@ class PlanBounds:
 
     @property
     def pitch_acceleration(self) -> tuple[float, float]:
-        """Least and largest rate of change of the nominal pitch rate, rad/s^2."""
+        """Minimum and maximum of the nominal pitch acceleration, rad/s^2."""
         return float(self.region_minimum[2]), float(self.region_maximum[2])
 
 
@@ -233,7 +233,7 @@ def shaped(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np.n
 
 
 def positive(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the same, of values above zero."""
+    """Return the array of a parameter whose values must be positive."""
     array = shaped(values, name, shape)
     if not np.all(array > 0.0):
         raise DesignError(f"parameter {name} = {array.tolist()}: expected values above zero")
@@ -286,13 +286,13 @@ class ControlDesign:
     tau: np.ndarray = field(default_factory=lambda: np.ones(N_RIGID))
     """Factor (5) of each rigid state's feedback that the design flies with."""
     tau_minimum: np.ndarray = field(default_factory=lambda: np.ones(N_RIGID))
-    """Least factor (5) for which the feedback is certified, up to 1."""
+    """Smallest certified factors tau (5) of the feedback; the certificate covers the range up to 1."""
     interpolated: bool = False
     """Whether the nominal gain between two ellipsoids is one between theirs: then u_n is continuous."""
     filtered: bool = False
-    """Whether the feedback acts on the filtered pitch rate less that of the plan through the same filter (eq. 48)."""
+    """Whether the pitch-rate feedback subtracts the plan's pitch rate after the same notch filter (eq. 48)."""
     modified: bool = False
-    """Whether the parameters differ from those that were written (their digest does not match)."""
+    """Whether the parameters were changed after the design was written, by their digest."""
 
     def adjusted_gain(self, tau: np.ndarray) -> np.ndarray:
         """Return F (2, 9) with each rigid state's column times its factor ``tau`` (5) (paper eq. 48, eq. 54)."""
@@ -432,7 +432,7 @@ _POSITIVE = ("nominal_state_scale", "nominal_input_scale", "nominal_input_bound"
 
 
 def design_of(values: Mapping[str, Any]) -> ControlDesign | None:
-    """Return the design in the flat parameters of a flight, ``None`` where there is none.
+    """Return the design in the flat parameters of a flight, or ``None``.
 
     Raises:
         DesignError: See :meth:`ControlDesign.from_parameters`.
@@ -612,7 +612,7 @@ def certificate_path(design_file: Path) -> Path:
 
 
 def find_certificate(design: str, named: str = "") -> Path | None:
-    """Return the certificate ``named``, by default the one of the design's own file; None if there is none.
+    """Return the path of the certificate ``named``, by default the one next to the design file; None without one.
 
     Args:
         design: Name of the design, or path of its parameter file.

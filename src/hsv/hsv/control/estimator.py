@@ -58,7 +58,7 @@ _SENSED = ("sensors.set", *(f"sensors.{name}.noise" for name in STATE_NAMES[:N_R
 """Parameters of the noise of the sensors."""
 
 _SETTLED = 1e-12
-"""Relative change of the gain in an iteration, at most, where it is steady."""
+"""Largest relative change per iteration of a converged gain."""
 _MAX_ITERATIONS = 100_000
 
 

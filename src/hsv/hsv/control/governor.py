@@ -45,7 +45,7 @@ KEPT_FREE = 1e-3
 
 
 class Leg(NamedTuple):
-    """The way to a point: altitude (m), velocity (m/s); ``start`` (s) of the request, least ``duration`` (s)."""
+    """A leg to a point: altitude (m), velocity (m/s), time ``start`` (s) of the request, minimum ``duration`` (s)."""
 
     start: float
     duration: float
@@ -150,7 +150,7 @@ class Governor:
     def continued(
         self, corners: Sequence[Corner], leg: Leg, blend: float, beginning: Beginning
     ) -> tuple[GovernedReference, int]:
-        """Return the fastest reference that goes on from ``corners`` over one more leg, and its first step that is new.
+        """Return the fastest reference that continues ``corners`` by one leg, and its first new step.
 
         All steps before are those of ``corners`` in every bit. The leg begins when requested, but not before the last
         of the corners, nor so early that a step before ``beginning`` would change.
@@ -224,7 +224,7 @@ class Governor:
         return end(fits)
 
     def _problem(self, corners: Sequence[Corner], beginning: Beginning) -> str:
-        """Return why the plan of a reference does not fit, nothing where it does."""
+        """Return the reason why the plan of a reference does not fit; empty if it does."""
         try:
             plan, _, held = self._planned(corners, beginning)
         except TrimError as error:

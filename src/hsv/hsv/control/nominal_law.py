@@ -73,13 +73,13 @@ class NominalLaw(Protocol):
 
 
 def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
-    """Return x' P x over the first states, as many as P (s, s) has rows."""
+    """Return x' P x for the first s states, with P (s, s)."""
     n = len(ellipsoid)
     return float(lib.hsv_level(doubles(vector(ellipsoid), n, n), n, doubles(vector(x[:n]), n)))
 
 
 class FamilyLaw:
-    """The nested family: the gain of the smallest ellipsoid that holds x_n, the outermost where none does.
+    """The nested family: the gain of the smallest ellipsoid with x_n, or of the outermost if x_n lies in none.
 
     Or, interpolated, one between it and that of the next ellipsoid inside.
     """

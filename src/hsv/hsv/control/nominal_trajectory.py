@@ -53,7 +53,7 @@ class NominalTrajectory:
     def __init__(
         self, design: ControlDesign | None, reference: ReferenceTrajectory, law: NominalLaw | None = None
     ) -> None:
-        """Fly ``law``, the design's nested family where none is given; without a design the reference alone."""
+        """Use ``law``, by default the nested family of the design; without a design there is only the reference."""
         self.reference = reference
         self.data = nominal_data(design) if design else NO_NOMINAL
         self.law = law or FamilyLaw(self.data)

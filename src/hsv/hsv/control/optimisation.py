@@ -184,7 +184,7 @@ def lqr_whitening(A: np.ndarray, B: np.ndarray, state_scale: np.ndarray, input_s
 
 
 GAP = 1e-3
-"""Share by which the cost of the answer is above the least one, but for a factor of at most the root of 2."""
+"""Relative gap between the cost of the solution and the minimum, up to a factor of at most the root of 2."""
 
 _INSIDE = (1e-5, 1e-4, 1e-3, 1e-8)
 """Least eigenvalue of the inequalities required of a start; the first for which the solver returns one inside.
@@ -193,7 +193,7 @@ What it calls inaccurate may be off by 1e-5; where there is little room, less ha
 """
 
 _STEPS = 500
-"""Newton steps after which the search is given up; some twenty to eighty are taken."""
+"""Maximum number of Newton steps; about twenty to eighty are needed."""
 
 _CONVERGED = 1e-7
 """Newton decrement after which one more step leaves nothing but rounding."""
@@ -246,7 +246,7 @@ class _Inequality:
 def minimise(
     unknowns: Sequence[Unknown], cost: Cost, inequalities: Inequalities, name: str
 ) -> tuple[list[np.ndarray], SolverReport]:
-    """Return the unknown matrices on the central path, about :data:`GAP` above the least cost.
+    """Return the unknown matrices on the central path, about :data:`GAP` above the minimum cost.
 
     Args:
         unknowns: Unknown matrices.
@@ -337,7 +337,7 @@ def _inside(c: np.ndarray, found: list[_Inequality], name: str) -> tuple[np.ndar
 
 
 def _factors(found: list[_Inequality], x: np.ndarray) -> list[np.ndarray] | None:
-    """Return the Cholesky factors of all inequalities at ``x``, or None where one does not hold strictly."""
+    """Return the Cholesky factors of all inequalities at ``x``, or None if one does not hold strictly."""
     try:
         return [np.linalg.cholesky(one.at(x)) for one in found]
     except np.linalg.LinAlgError:

@@ -236,7 +236,7 @@ class TubeLaw(Controller):
         return np.asarray(self.kernel.gains[active_gain(self.kernel, self._next)])
 
     def reset(self) -> None:
-        """Start a new run: with the factor set last, and with the scheduled changes to come."""
+        """Reset for a new run: the current factor stays, and the scheduled changes will be applied."""
         self._next = 0
         self._arrange([(0, self._tau), *self._scheduled])
 

@@ -81,7 +81,7 @@ def _pointers(kind: str) -> dict[str, _Pointer]:
 
 @cache
 def _fields(kind: str) -> dict[str, Any]:
-    """Return the types of the fields of a struct but those that count the elements of arrays."""
+    """Return the types of the fields of a struct, except the fields that count elements of arrays."""
     counts = {dimension.counts for pointer in _pointers(kind).values() for dimension in pointer.shape}
     return {name: field.type for name, field in ffi.typeof(kind).fields if name not in counts}
 
@@ -117,7 +117,7 @@ def dtype(kind: str) -> np.dtype[Any]:
 
 
 def vector(value: Any) -> np.ndarray:
-    """Return ``value`` as an array of float64 without gaps: itself where it is one."""
+    """Return ``value`` as a contiguous array of float64, without a copy if it is one."""
     return np.ascontiguousarray(value, float)
 
 
@@ -142,7 +142,7 @@ def records(kind: str, array: np.ndarray) -> Any:
 
 @cache
 def instruction_set() -> str:
-    """Return which instructions the core uses: the widest of this processor, or those that ``HSV_CORE`` names.
+    """Return the instruction set of the core: the widest of this processor, or the one in ``HSV_CORE``.
 
     Elsewhere than on x86-64 there is one set, called as the first one.
 
@@ -162,7 +162,7 @@ def lanes() -> int:
 
 
 def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int) -> int:
-    """Fly the steps ``start`` ... ``stop`` - 1 of one flight, or of as many as :func:`lanes`.
+    """Simulate the steps ``start`` ... ``stop`` - 1 of one flight, or of :func:`lanes` flights at a time.
 
     Args:
         flights: Structs ``hsv_flight``.
@@ -306,7 +306,7 @@ class Data:
 
     @property
     def struct(self) -> Struct:
-        """The data as the core takes them, the same in all threads."""
+        """The struct for the core, shared by all threads."""
         return vars(self).get("_struct") or vars(self).setdefault("_struct", Struct(self.KIND, self))
 
     @property

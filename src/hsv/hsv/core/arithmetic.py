@@ -54,10 +54,10 @@ def solve(A: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 SEED_PARAMETER = Parameter("seed", 0, "key of all random numbers of the flight", "", 0, 2**53)
-"""Up to 2^53, which every file format that a flight goes through keeps."""
+"""Seed of a flight, at most 2^53, which all file formats represent exactly."""
 
 LARGEST = float(np.sqrt(106.0 * 0.6931471805599453))
-"""The greatest normal number, 8.57: Box and Muller take the logarithm of 2^-53 at least."""
+"""Largest magnitude of a normal number, 8.57: the logarithm in Box and Muller has an argument of at least 2^-53."""
 
 
 def philox(counter: tuple[int, int, int, int], key: tuple[int, int]) -> tuple[int, int, int, int]:

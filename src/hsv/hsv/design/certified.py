@@ -48,7 +48,7 @@ class CertifiedDesign(Subject):
 
     @property
     def lag_feedback(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Least and largest feedback (2 each) to the lag of the plan; none where actuators are ideal."""
+        """Minimum and maximum (2 each) of the feedback to the lag of the plan; None for ideal actuators."""
         lag = self.certificate["tube"]["tightening"].get("lag_feedback")
         return (np.array(lag["lower"]), np.array(lag["upper"])) if lag else None
 
@@ -142,7 +142,7 @@ class Plan:
         return np.maximum(np.maximum(bounds.lower - lower, upper - bounds.upper), 0.0)
 
     def actuators(self, design: ControlDesign) -> tuple[np.ndarray, np.ndarray]:
-        """Return the states (k, a) of the actuators that ``design`` knows as the plan and its lag move them, no error.
+        """Return the states (k, a) of the actuators of ``design`` along the plan and its lag, without an error.
 
         And the commands (k, 2) that move them: the plan's, and the feedback to its lag.
         """

@@ -20,7 +20,7 @@ from hsv.model.signals import N_RIGID
 
 @dataclass(frozen=True)
 class Row:
-    """One set, or why there is none (``note``); half-widths and feedback in SI.
+    """A row of the comparison: a set with half-widths and feedback, SI, or the reason why there is none (``note``).
 
     ``size``: geometric mean of the half-widths of the rigid states over their scales. ``lower`` and ``upper`` (2): the
     tightened bounds of u_n + u_r, where anything is left.

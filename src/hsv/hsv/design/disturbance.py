@@ -105,7 +105,7 @@ class ChannelModel:
 
     @cached_property
     def actuators(self) -> SampledActuators | None:
-        """The actuators that the design knows."""
+        """The actuators of the design."""
         known = self.design.actuator_sets
         return sampled_actuators(known, self.design.period) if known else None
 
@@ -160,7 +160,7 @@ def decompose(
     lost: np.ndarray,
     through: np.ndarray,
 ) -> Signals:
-    """Return the disturbances of a flight; sums run over columns one after the other, with the same bits everywhere.
+    """Return the disturbances of a flight; sums run over columns in a fixed order, with the same bits on every machine.
 
     Args:
         polytope: The design's model.

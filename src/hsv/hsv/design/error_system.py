@@ -105,7 +105,7 @@ def _with_actuators(
 
 
 def union(first: ErrorSystem, *others: ErrorSystem) -> ErrorSystem:
-    """Return the system that may switch between the vertices of all; its feedback F is that of the ``first``."""
+    """Return the system that may switch between the vertices of all systems, with the feedback F of the ``first``."""
     systems = (first, *others)
     A, B, G = (np.concatenate([getattr(s, name) for s in systems]) for name in ("A", "B", "G"))
     return replace(first, A=A, B=B, G=G)

@@ -91,7 +91,7 @@ class FlightPoint(_Table):
 
 
 class StateScale(RigidScale):
-    """Sizes of all nine states that count as equal."""
+    """Scales of all nine states."""
 
     elastic_coordinate_1: ElasticCoordinate = Positive
     elastic_rate_1: ElasticRate = Positive
@@ -260,7 +260,7 @@ class AdjustableInputs(_Table):
 
 
 class ActuatorInputs(_Table):
-    """The actuators that the design knows, by name; a channel without one is where its command is.
+    """The actuators of the design by name; a channel without one is ideal.
 
     Their dynamics become states of the error system. Their stops are taken to be those of the vehicle.
     """
@@ -326,7 +326,7 @@ class DesignInputs(_Table):
 
     @property
     def actuators(self) -> tuple[str, ...]:
-        """Names of the actuators that the design knows."""
+        """Names of the actuators of the design."""
         return self.actuator.names() if self.actuator else ()
 
     @property

@@ -23,7 +23,7 @@ _KEPT_OFF = 0.05
 
 @dataclass(frozen=True)
 class TightenedInputs:
-    """Least and largest nominal input u_n + u_r (2 each), trim included, that leave room for the feedback; SI."""
+    """Minimum and maximum (2 each) of the nominal input u_n + u_r that leave room for the feedback, SI."""
 
     lower: np.ndarray
     upper: np.ndarray

@@ -71,7 +71,7 @@ class MeasuredSet:
     certified: dict[str, Any]
     bounds: TightenedInputs
     lag: tuple[np.ndarray, np.ndarray] | None
-    """Least and largest feedback (2 each) to the lag of the plan, where the design knows its actuators."""
+    """Minimum and maximum (2 each) of the feedback to the lag of the plan; None for ideal actuators."""
 
     def report(self) -> dict[str, Any]:
         """Return disturbances, set and tightened inputs, for JSON."""

@@ -68,7 +68,7 @@ def findings(scenario: Scenario) -> Iterator[Finding]:
 
 
 def from_copied_state(parts: Components, flight: Flight) -> str:
-    """Step the controller along a ``flight`` of its own, from half-way on in turns with a copy of it.
+    """Step the controller along a recorded ``flight``; in the second half, alternate with a copy of it.
 
     Returns:
         Where an answer differs first from that of the flight, and whose it is; empty: nowhere.

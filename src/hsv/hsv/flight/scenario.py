@@ -76,7 +76,7 @@ class Scenario(Table):
     robust_mpc: RobustMpcTable = RobustMpcTable()
     fault: tuple[FaultTable, ...] = ()
     seed: Annotated[StrictInt, Field(ge=0, le=SEED_PARAMETER.maximum)] = 0
-    """Key of all random numbers"""
+    """Seed of all random numbers"""
     equipment: dict[str, Any] = Field(default_factory=dict)
     """Parameters of real hardware, SI; in a file, the tables of actuators, air, sensors, links and estimators"""
     own: dict[str, dict[str, Any]] = Field(default_factory=dict)

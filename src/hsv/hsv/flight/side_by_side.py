@@ -23,10 +23,10 @@ Result = TypeVar("Result")
 
 
 class FlightGroup:
-    """Flies up to :func:`hsv.core.lanes` flights at a time, in pieces, and keeps the memory for that."""
+    """A group of up to :func:`hsv.core.lanes` simultaneous flights, simulated in pieces, with their memory."""
 
     def __init__(self, rows: int) -> None:
-        """Make room for pieces of so many ``rows``."""
+        """Allocate memory for pieces of at most ``rows`` steps."""
         self.lanes = lanes()
         self.history = History.over(np.empty((self.lanes, rows * History.numbers())), rows)
         self._memory = core.loop_memory(self.lanes)
@@ -45,7 +45,7 @@ class FlightGroup:
         return all(_same(first, other) for other in others)
 
     def begin(self, components: Sequence[Components], rows: int, tube_set: Struct | None = None) -> None:
-        """Prepare the flights of ``components``, of so many ``rows``; spare lanes fly the last one again.
+        """Prepare the flights of ``components`` with ``rows`` steps; spare lanes repeat the last flight.
 
         ``tube_set``: the invariant set whose level is computed, if any.
         """
@@ -70,7 +70,7 @@ class FlightGroup:
         return int(self._flights[i].pointer.ended)
 
     def worst(self, i: int) -> float:
-        """Return the greatest level so far of the flight in a lane."""
+        """Return the largest level so far of the flight in a lane."""
         return float(self._flights[i].pointer.worst)
 
 
@@ -109,7 +109,7 @@ def fly_perturbed(
     job: Callable[[Mapping[str, float], Flight], Result],
     progress: Callable[[int], None] = lambda done: None,
 ) -> list[Result]:
-    """Return ``job`` of every flight, in order, flown side by side in as many threads as there are processors.
+    """Return ``job`` of every flight in order; the flights are simulated in one thread per processor.
 
     Args:
         components: Of the flight of the nominal vehicle.

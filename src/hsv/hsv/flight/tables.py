@@ -78,7 +78,7 @@ class Reading:
         return written(drawn.middle, drawn.unit)
 
     def fault(self, name: str, row: dict[str, Any]) -> dict[str, Any]:
-        """Return a fault in a file as :class:`FaultTable` has it, its parameters in a table of their own.
+        """Return a fault of a file in the form of :class:`FaultTable`, with its parameters in a nested table.
 
         Raises:
             ScenarioError, QuantityError: Names the field that is wrong.
@@ -164,7 +164,7 @@ def envelope(limits: tuple[float, float], unit: str) -> str:
 
 
 def _ends_and_mean(text: object, unit: str, info: ValidationInfo) -> tuple[tuple[float, float], float]:
-    """Return the least and the largest value of a number or distribution, and the mean, in ``unit``."""
+    """Return minimum, maximum and mean of a number or distribution, in ``unit``."""
     name = str(info.field_name)
     if isinstance(text, dict):
         drawn = _reading(info).distribution(text, unit, name)

@@ -22,7 +22,7 @@ from hsv.flight.trust import require_path_inside
 
 @dataclass(frozen=True)
 class ReplayedFlight:
-    """A replayed flight: its outcome in the campaign and now (SI), and the bag where it was recorded."""
+    """A replayed flight: its outcomes in the campaign and in the replay (SI), and the bag of the replay."""
 
     flight: int
     recorded: Outcome

@@ -35,7 +35,7 @@ from hsv.graph.snapshot import Snapshot
 from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
 
 GRACE = 20.0
-"""Seconds between asking a process to end and forcing it; only :data:`HUNG_AFTER` where it does nothing at all."""
+"""Time (s) between SIGTERM and SIGKILL for a process; only :data:`HUNG_AFTER` if it makes no progress."""
 
 WARNING = "[WARN] "
 """Prefix of warnings of ROS nodes and of the launcher."""

@@ -52,12 +52,12 @@ class PreparedRun:
     step_timeout: float
     """Wall time (s) to wait for a node that does nothing."""
     folder: tempfile.TemporaryDirectory[str] | None
-    """Holds the parameter files, and is gone with this object; ``None``: they are in a folder of the caller's."""
+    """Temporary folder of the parameter files, removed with this object; ``None``: a folder of the caller."""
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How a scenario is flown; none of it changes a number of the flight."""
+    """Options of the execution of a run, which do not change the numbers of the flight."""
 
     real_time_factor: float | None = None
     """Simulated over wall time; 0: as fast as possible; None: 0, with a live view 1."""

@@ -20,11 +20,11 @@ class Snapshot:
     time: float
     altitude: float
     velocity_error: float
-    """Velocity less its reference"""
+    """Error of the velocity, m/s"""
     tube_level: float | None
     """Level in the tube, at most 1 inside; ``None`` for a controller or a design without a tube."""
     faults: tuple[str, ...]
-    """Channel and type of those that are active"""
+    """Channel and type of each active fault"""
 
     @classmethod
     def of(cls, state: Any, nominal: Any, status: Any | None, actuator: Any) -> Self:

@@ -46,7 +46,7 @@ COEFFICIENTS: dict[str, dict[str, str]] = {
 """SI units of the coefficients of the equations of motion, by the tables of a vehicle file."""
 
 COEFFICIENT_UNITS = {name: unit for table in COEFFICIENTS.values() for name, unit in table.items()}
-"""All of them, in the order of :class:`VehicleParameters`, which ends with inertial coupling and limits."""
+"""Units of all coefficients, in the order of :class:`VehicleParameters`."""
 
 POSITIVE = frozenset(
     {
@@ -125,12 +125,12 @@ class VehicleParameters(NamedTuple):
 
     @property
     def input_minimum(self) -> np.ndarray:
-        """Least fuel equivalence ratio and elevator deflection (rad): the lower ends of U (paper eq. 29)."""
+        """Smallest fuel equivalence ratio and elevator deflection (rad): the lower bounds of U (paper eq. 29)."""
         return np.array([self.fuel_equivalence_ratio_minimum, self.elevator_deflection_minimum])
 
     @property
     def input_maximum(self) -> np.ndarray:
-        """Largest fuel equivalence ratio and elevator deflection (rad): the upper ends of U (paper eq. 29)."""
+        """Largest fuel equivalence ratio and elevator deflection (rad): the upper bounds of U (paper eq. 29)."""
         return np.array([self.fuel_equivalence_ratio_maximum, self.elevator_deflection_maximum])
 
     def decoupled(self) -> VehicleParameters:
@@ -156,7 +156,7 @@ class VehicleParameters(NamedTuple):
 
 @lru_cache(maxsize=64)
 def vehicle_struct(vehicle: VehicleParameters) -> Struct:
-    """Return the parameters as the core takes them."""
+    """Return the parameters as the struct of the core."""
     return Struct("hsv_vehicle", vehicle)
 
 

@@ -175,7 +175,7 @@ class Plant:
         substeps: int = 2,
         equipment: Mapping[str, object] | None = None,
     ) -> None:
-        """Take the vehicle from its ``initial`` trim through so many ``steps`` of a ``period`` (s).
+        """Prepare a flight from the ``initial`` trim over ``steps`` periods (s).
 
         Args:
             vehicle: Parameters.

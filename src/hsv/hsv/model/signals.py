@@ -34,7 +34,7 @@ VARYING = -1
 
 
 class SignalType(NamedTuple):
-    """Numbers that go from block to block."""
+    """Type of a signal between blocks: name, unit and size."""
 
     name: str
     unit: str
@@ -42,7 +42,7 @@ class SignalType(NamedTuple):
     size: int
 
     def of_size(self, size: int) -> SignalType:
-        """Return the same with so many numbers."""
+        """Return the signal type with another size."""
         return self._replace(size=size)
 
 

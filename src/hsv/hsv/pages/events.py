@@ -35,7 +35,7 @@ _DIAGNOSTIC_LEVELS = {1: "warning", 2: "error", 3: "error"}
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened; ``end`` is None where it lasted until the end, equal to ``start`` for an instant."""
+    """An event; ``end`` is None if it lasts until the end of the flight, and ``start`` for an instant."""
 
     start: float
     end: float | None

@@ -52,7 +52,7 @@ def unit_html(unit: str) -> str:
 
 
 def number(value: float, digits: int = 5) -> str:
-    """Return ``value`` with so many significant digits and a true minus sign."""
+    """Return ``value`` with ``digits`` significant digits and a typographic minus sign."""
     return f"{value:.{digits}g}".replace("-", "−")
 
 

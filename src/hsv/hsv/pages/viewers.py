@@ -22,11 +22,11 @@ class Viewer:
     arguments: Callable[[Path, Path | None], list[str]]
     """Function from the MCAP file and the layout to the arguments of the program."""
     layout: str
-    """File name of the layout; empty where there is none."""
+    """File name of the layout; empty without one."""
     imports: bool
     """Whether the layout has to be imported in the program by hand."""
     source: str
-    """Address from which to get it."""
+    """Address of the download."""
     scene: bool = False
     """Whether the viewer draws the vehicle in 3-D, from a copy of the bag."""
 

@@ -188,7 +188,7 @@ def refuse_vacuous(bag: Bag) -> None:
 
 
 def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
-    """Return the fault parameters that give the recorded active set, the attached schedule changed where it was not."""
+    """Return the fault parameters for the recorded active faults: the attached schedule with changes in flight."""
     injector = FaultInjector.from_parameters(values)
     command = np.zeros(2)
     changed = False

@@ -37,7 +37,7 @@ REACH = 3.0
 """Standard deviations of noise and turbulence that count as their bound: one sample in 370 is beyond."""
 
 LARGEST_REACH = float(np.ceil(1e3 * LARGEST)) / 1e3
-"""Bound of all normal numbers, rounded up to three decimals."""
+"""Bound of the magnitude of a normal number, rounded up to three decimals."""
 
 N_SCHEDULING = 2
 """The nominal model is scheduled by the first states, altitude and velocity."""
@@ -106,7 +106,7 @@ def entering(system: ErrorSystem) -> np.ndarray:
 
 
 def delayed(system: ErrorSystem, late: np.ndarray) -> ErrorSystem:
-    """Return ``system`` with rigid states that are seen so many steps ``late`` (5): samples under way are states."""
+    """Return ``system`` with rigid states measured ``late`` (5) steps later; delayed samples become states."""
     columns, n, extra = entering(system), len(system.names), int(late.sum())
     room = ((0, 0), (0, extra), (0, 0))
     A, B, G = np.pad(system.A, ((0, 0), (0, extra), (0, extra))), np.pad(system.B, room), np.pad(system.G, room)

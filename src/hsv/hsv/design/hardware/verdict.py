@@ -75,7 +75,7 @@ class Reach:
         return f"{self.channel}: {'; '.join(words)}"
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for JSON, a limit that is none as ``None``."""
+        """Return the range for JSON; an infinite limit is ``None``."""
         numbers = {name: None if value == np.inf else value for name, value in vars(self).items()}
         return numbers | {"inactive": self.inactive}
 
@@ -121,7 +121,7 @@ class Verdict:
         return self.room is not None and bool(self.room.min() > 0.0) and self.start <= 1.0
 
     def limited(self) -> Verdict:
-        """Return the verdict on the same actuators with their limits: certified where no limit is reached."""
+        """Return the verdict for the actuators with their limits: certified if no limit is reached."""
         limited = replace(self, name=f"{self.name}, limits of actuators", without_limits=self)
         if not (self.certified and all(reach.inactive for reach in self.reaches)):
             limited = replace(limited, half_width=None, feedback=None, room=None, shares=None)

@@ -1,4 +1,4 @@
-"""Sequences of disturbances that drive the error far: no certificate can be below what they attain."""
+"""Counter-examples: sequences of disturbances whose reach is a lower bound of every certificate."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LONGEST = 10_000
 
 @dataclass(frozen=True)
 class CounterExamples:
-    """For each output row the vertex and the disturbances that drive it farthest of all at a constant vertex.
+    """For each output row the vertex and the disturbance sequence with the largest reach at a constant vertex.
 
     ``half_range`` (7): half the distance between what the sequence and its opposite make of zero error, SI; ``vertex``
     (7); ``steps`` (7) lengths of the sequences. Rows are those of :meth:`TubeProblem.output_rows`.

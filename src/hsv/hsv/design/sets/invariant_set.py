@@ -143,7 +143,7 @@ class InvariantSet:
 def ellipsoid(
     problem: TubeProblem, state_scale: np.ndarray, input_scale: np.ndarray, contractions: list[float]
 ) -> InvariantSet:
-    """Return the ellipsoid with the least sum of squares of scaled half-widths and feedback (for paper eq. 26).
+    """Return the ellipsoid with the smallest sum of squares of scaled half-widths and feedback (for paper eq. 26).
 
     Args:
         problem: Error system and disturbances.

@@ -152,7 +152,7 @@ def _level(Q: np.ndarray, v: np.ndarray) -> float:
 def star_norms(
     problem: TubeProblem, centre: np.ndarray, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> StarNorms:
-    """Return the ellipsoids that bound each output row the least.
+    """Return the ellipsoids with the smallest bound of each output row.
 
     Args:
         problem: Error system and disturbances.
@@ -177,7 +177,7 @@ def star_norms(
 
 
 def _least(A: np.ndarray, g: np.ndarray, row: np.ndarray, contractions: Sequence[float]) -> tuple[np.ndarray, float]:
-    """Return the Q that bounds ``row`` the least, and its contraction.
+    """Return the Q with the smallest bound of ``row``, and its contraction.
 
     At which contraction that is, the vertices tell one by one: the Gramian of each bounds every Q of all from below.
     """
@@ -193,7 +193,7 @@ def _least(A: np.ndarray, g: np.ndarray, row: np.ndarray, contractions: Sequence
 
 
 def _solve(A: np.ndarray, g: np.ndarray, row: np.ndarray, contraction: float) -> np.ndarray:
-    """Return the Q of the least row Q row' at one contraction.
+    """Return the Q that minimises row Q row' at one contraction.
 
     Raises:
         DesignError: There is none.

@@ -60,12 +60,12 @@ class TriedFault:
 
     @property
     def whole(self) -> bool:
-        """Whether the parameter is a whole number."""
+        """Whether the parameter is an integer."""
         return any(p.name == self.parameter and p.whole for p in FAULT_KINDS[self.kind].parameters)
 
     @property
     def resolution(self) -> float:
-        """Severity to which the boundary is found: that of all, or a whole number's step."""
+        """Resolution of the boundary in severity: the common one, or one step of an integer parameter."""
         return max(RESOLUTION, 1.0 / abs(self.worst - self.harmless) if self.whole else 0.0)
 
     def value(self, severity: float) -> float:
@@ -84,7 +84,7 @@ class TriedFault:
         return (value - self.harmless) / (self.worst - self.harmless)
 
     def row(self, value: float, start: float) -> dict[str, Any]:
-        """Return the fault as a scenario has it, from ``start`` (s) on."""
+        """Return the fault as in a scenario, with its ``start`` (s)."""
         own = {"channel": self.channel, "type": self.kind, **self.fixed, "start": written(start, "s")}
         if self.parameter == DURATION:
             return {**own, "stop": written(rounded(start + value), self.unit)}

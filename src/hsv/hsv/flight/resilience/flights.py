@@ -93,7 +93,7 @@ class SubjectRunner:
         return fly(self._variants.components(parse_scenario(text, self._subject.name)))
 
     def without(self, vehicle: int) -> FlightData:
-        """Return the flight without a fault, with which the others are compared; errors as :meth:`fly`."""
+        """Return the flight without a fault for comparison; errors as for :meth:`fly`."""
         if vehicle not in self._without:
             self._without[vehicle] = self.fly(vehicle).data()
         return self._without[vehicle]
@@ -111,7 +111,7 @@ class SubjectRunner:
         return FlownFault(severity, value, vehicle, survived, attitude, altitude, recovery, loss, None)
 
     def survives(self, fault: TriedFault, severity: float) -> bool:
-        """Return whether the nominal vehicle comes to the end of its flight."""
+        """Return whether the nominal vehicle finishes its flight."""
         try:
             return self.fly(0, fault, fault.value(severity)).status is FlightStatus.FINISHED
         except ControllerError:

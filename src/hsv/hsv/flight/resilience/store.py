@@ -21,7 +21,7 @@ Outcome = tuple[tuple[FlownFault, ...], Boundary]
 
 
 class CaseStore:
-    """Stores the results of a campaign's cases; those of other campaigns may be in the same folder."""
+    """The store of the results of a campaign's cases; several campaigns can share a folder."""
 
     fly = staticmethod(fly_case)
     time = staticmethod(time_flight)
@@ -63,7 +63,7 @@ class CaseStore:
         """Do nothing: the results are the files of the cases."""
 
     def space(self, flights: int, batches: int) -> int:
-        """Return the disk space (bytes) that so many cases take."""
+        """Return the disk space (bytes) of a number of cases."""
         return _SPACE * batches
 
     def read(self, case: Case) -> Outcome | None:

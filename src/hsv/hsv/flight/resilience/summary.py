@@ -47,14 +47,14 @@ class Cell:
 
     @property
     def recovery_time(self) -> float | None:
-        """Longest time to recovery, s; None where not every flight recovers."""
+        """Longest time to recovery, s; None if a flight does not recover."""
         times = [flight.recovery_time if flight.survived else None for flight in self.flights]
         known = [time for time in times if time is not None]
         return max(known) if len(known) == len(times) else None
 
     @property
     def time_to_loss(self) -> float | None:
-        """Shortest time to the loss of a flight, s; None where none was lost."""
+        """Shortest time to the loss of a flight, s; None if no flight was lost."""
         return min((f.time_to_loss for f in self.flights if f.time_to_loss is not None), default=None)
 
 
@@ -143,7 +143,7 @@ def said_boundary(fault: TriedFault, boundary: Boundary) -> str:
 
 
 def said_boundaries(fault: TriedFault, boundaries: Mapping[Moment, Boundary]) -> list[str]:
-    """Return in words how far the nominal vehicle survives at each time; once, where that is the same."""
+    """Return the survived range of the nominal vehicle at each time as texts; equal texts are given once."""
     return list(dict.fromkeys(said_boundary(fault, boundaries[moment]) for moment in Moment))
 
 

@@ -110,7 +110,7 @@ class FaultInjector:
         return cls(scheduled, *flown)
 
     def with_seed(self, seed: int) -> FaultInjector:
-        """Return the same schedule for a flight of another ``seed``."""
+        """Return an injector with the same schedule and another ``seed``."""
         other = copy(self)
         other.seed = seed
         other.reset()

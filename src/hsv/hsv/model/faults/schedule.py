@@ -46,7 +46,7 @@ def fault_rows(
     period: float,
     earlier: FaultRows | None = None,
 ) -> FaultRows:
-    """Return the faults of some ``sides`` among those that are scheduled, in the order of their composition.
+    """Return the scheduled faults of the given ``sides`` in the order of composition.
 
     Args:
         sides: Names of sides, see :mod:`hsv.model.faults.table`.
@@ -79,7 +79,7 @@ def _sorted_rows(sides: tuple[str, ...], scheduled: tuple[tuple[Fault, int, int]
 
 
 def fault_memory(count: int) -> np.ndarray:
-    """Return the memory of so many faults before they act."""
+    """Return the initial memory of ``count`` faults."""
     memory = np.zeros(count, dtype("hsv_fault_memory"))
     memory["last"] = memory["onset"] = _NOT_YET
     return memory
