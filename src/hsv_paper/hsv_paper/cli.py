@@ -31,7 +31,7 @@ _FLIGHTS = Path("bags/study")
 _COLOURS = {"holds": "green", "holds under conditions": "yellow", "does not hold": "red"}
 
 _NAME, _LOCATION = 43, 11
-"""Widths of the columns of names and locations: with the longest verdict they fill the 80 of a terminal."""
+"""Widths of the columns of names and locations; with the longest verdict a line has 80 characters."""
 
 
 def main() -> None:

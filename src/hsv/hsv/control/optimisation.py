@@ -187,7 +187,7 @@ GAP = 1e-3
 """Relative gap between the cost of the solution and the minimum, up to a factor of at most the root of 2."""
 
 _INSIDE = (1e-5, 1e-4, 1e-3, 1e-8)
-"""Least eigenvalue of the inequalities required of a start; the first for which the solver returns one inside.
+"""Smallest eigenvalues of the inequalities to require of a start, tried in order until the solver returns one inside.
 
 What it calls inaccurate may be off by 1e-5; where there is little room, less has to do.
 """

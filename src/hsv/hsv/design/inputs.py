@@ -107,7 +107,7 @@ class FilterScale(_Sizes):
 
 
 class GridInputs(_Table):
-    """Vertices at grid points over the envelope, weights linear between them."""
+    """Vertices at grid points over the envelope, with bilinear weights."""
 
     altitude_vertices: int = Field(ge=2, le=20)
     velocity_vertices: int = Field(ge=2, le=20)

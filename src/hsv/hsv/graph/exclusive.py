@@ -48,7 +48,7 @@ def ros_domain() -> int:
 
 
 def claim(kind: str, domain: int, name: str) -> socket.socket | None:
-    """Return what keeps a name to one process of this machine while it is open; None if another process has it.
+    """Reserve a name for one process of this machine; return the open claim, or None if another process has it.
 
     Args:
         kind: ``node``, ``topic``, or ``domain`` for a namespace, which belongs to one run.

@@ -71,8 +71,7 @@ _COMPLEX_STEP = 1e-40
 class VehicleParameters(NamedTuple):
     """All constants of the equations of motion and the limits of inputs and angles, SI (kg, m, s, N, rad).
 
-    Field names are those of a vehicle file, :mod:`hsv.model.vehicle`; the shipped ones are slices 0.3048 m deep. A
-    named tuple, so that compiled functions take it.
+    Field names are those of a vehicle file, :mod:`hsv.model.vehicle`; the shipped vehicles are slices 0.3048 m deep.
     """
 
     mass: float

@@ -12,7 +12,7 @@ from hsv.base.units import UnitSystem, in_system
 from hsv.pages.text import number
 
 STRETCHES = 400
-"""Stretches of the axis of which a curve keeps its smallest and largest value, so that no peak is lost."""
+"""Number of intervals of the axis; a curve keeps its minimum and maximum in each, so that no peak is lost."""
 
 WIDTH, HEIGHT = 1000.0, 100.0
 """Size of the drawing; the page scales it."""

@@ -29,7 +29,7 @@ METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
 MAX_SAMPLES = 10**7
 
 _MAX_HYPERCUBE = 10**6
-"""Largest number of samples of a Latin hypercube, which every worker has to draw and keep whole"""
+"""Largest number of samples of a Latin hypercube, which every worker draws and keeps completely"""
 
 _BATCHES = 256
 """Number of batches to aim at"""
