@@ -218,7 +218,7 @@ def test_flights_in_threads_share_no_state():
         ({"controller": "lqr.so"}, r"controller = 'lqr.so': no symbol, expected path/lib.so:symbol"),
         ({"controller": "./7:lqr"}, r"controller = '\./7:lqr': cannot be read \(No such .*expected a shared library"),
         ({"controller": "tube_mcp"}, r"controller = 'tube_mcp': expected one of .*did you mean 'tube_mpc'"),
-        ({"controller": "nowhere:Class"}, r"cannot be loaded, ModuleNotFoundError: No module named 'nowhere'"),
+        ({"controller": "nowhere:Class"}, r"No module named 'nowhere' \(PYTHONPATH=FOLDER:\$PYTHONPATH finds"),
         ({"controller": "math:nothing"}, r"cannot be loaded, AttributeError"),
         ({"controller": "math:cos"}, r"has no PARAMETERS, from_parameters, expected a class of a controller"),
         ({"controller": f"{__name__}:Listed"}, r"Listed': PARAMETERS: expected hsv.base.parameters.Parameter, each"),

@@ -171,7 +171,7 @@ def generate_launch_description():
     )
     return LaunchDescription([
         DeclareLaunchArgument("flight", description="what to fly"),
-        ExecuteProcess(cmd=["sleep", "4"]),
+        ExecuteProcess(cmd=["sleep", "20"]),  # longer than hsv prepare takes
         TimerAction(period=1.0, actions=[sil]),
     ])
 """

@@ -79,6 +79,8 @@ def controller_class(name: str) -> ControllerClass:
     # External code may raise anything while it is imported.
     except Exception as error:
         words = " ".join(str(error).split())
+        if isinstance(error, ModuleNotFoundError) and error.name == module:
+            words += f" (PYTHONPATH=FOLDER:$PYTHONPATH finds {module}.py in FOLDER)"
         raise ParameterError(f"controller = {name!r}: cannot be loaded, {type(error).__name__}: {words}") from error
     lacking = [a for a in ("PARAMETERS", "from_parameters") if not hasattr(found, a)]
     if lacking:
