@@ -102,9 +102,11 @@ class Answering:
         ((0.1,), r"^own, step 7: .*answered \(0\.1,\)"),
         ((0.1, 0.2, 0.3), r"^own, step 7: .*answered \(0\.1, 0\.2, 0\.3\)"),
         (None, r"^own, step 7: .*answered None"),
+        ((0.1 + 0.0j, 0.2), r"^own, step 7: .*answered \(\(0\.1\+0j\), 0\.2\)"),
+        (np.array([0.1, 0.2j]), r"^own, step 7: .*answered array"),
         (("a", "b"), r"^own, step 7: .*answered \('a', 'b'\)"),
-        (ValueError("two\nlines"), r"^own, step 7: ValueError: two lines$"),
-        (SystemExit("bye"), r"^own, step 7: SystemExit: bye$"),
+        (ValueError("two\nlines"), r"^own, step 7: ValueError: two lines \(test_controller.py:\d+\)$"),
+        (SystemExit("bye"), r"^own, step 7: SystemExit: bye \(test_controller.py:\d+\)$"),
     ],
 )
 def test_what_is_no_answer_is_an_error_with_its_step(answer, message):

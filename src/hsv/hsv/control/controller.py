@@ -22,9 +22,11 @@ from __future__ import annotations
 
 import copy
 import ctypes
+import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -238,8 +240,14 @@ class ExternalController(Controller):
             raise
         except (Exception, SystemExit) as error:
             words = " ".join(str(error).split())
+            if not isinstance(error, RunError):
+                frames = traceback.extract_tb(error.__traceback__)
+                own = next(frame for frame in reversed(frames) if "site-packages" not in frame.filename)
+                words += f" ({Path(own.filename).name}:{own.lineno})"
             raise ControllerError(f"{self.name}, step {inputs.step}: {type(error).__name__}: {words}") from error
         try:
+            if np.iscomplexobj(given):
+                raise TypeError
             fuel, elevator = given
             return float(fuel), float(elevator)
         except (TypeError, ValueError):
