@@ -23,7 +23,7 @@ def included() -> dict[Path, str]:
 
 
 def text_of(page: str, source: str, files: dict[Path, str]) -> str:
-    """Return the text of a page with links as the site has them, where a folder without a page is no link.
+    """Return the text of a page with links as the site has them, where a folder or text without a page is no link.
 
     Args:
         page: Its name, from the folder of the documentation, without suffix.
@@ -46,8 +46,9 @@ def text_of(page: str, source: str, files: dict[Path, str]) -> str:
         place = DOCS / f"{files[known]}.md" if known in files else target
         return "](" + Path(os.path.relpath(place, (DOCS / page).parent)).as_posix()
 
-    def without_folder(match: re.Match[str]) -> str:
+    def without_page(match: re.Match[str]) -> str:
         target = (file.parent / match[2]).resolve()
-        return match[1] if target.is_dir() and page_file(target) not in files else match[0]
+        elsewhere = target.is_dir() or (target.suffix == ".md" and not target.is_relative_to(DOCS))
+        return match[1] if elsewhere and page_file(target) not in files else match[0]
 
-    return _LINK.sub(link, _WHOLE_LINK.sub(without_folder, source))
+    return _LINK.sub(link, _WHOLE_LINK.sub(without_page, source))
