@@ -65,6 +65,8 @@ def missing(route: str, env: dict[str, str]) -> dict[str, str]:
     found = {}
     if re.search(r"""[\s:;"'$\\]""", str(ROOT)):
         found[f"a path without blanks and : ; \" ' $ \\, for colcon ({ROOT})"] = ""
+    if not str(ROOT).isascii():
+        found[f"a path of ASCII letters, for CMake ({ROOT})"] = ""
     if route == "wheels" and platform.machine() != "x86_64":
         found[f"x86_64, for the ROS 2 wheels (this is {platform.machine()}; source a ROS 2 Jazzy first)"] = ""
     if route == "jazzy" and not (find_spec("rclpy") and find_spec("colcon_core")):

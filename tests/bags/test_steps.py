@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from hsv.bags.bag_warnings import bag_warnings
+from hsv.bags.description import INTERFACE_VERSION
 from hsv.bags.reader import Bag
 from hsv.bags.recover import RECOVERED
-from hsv.bags.steps import irregularities, joined
+from hsv.bags.steps import expected_stamps, irregularities, joined
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import RecordingError
 
@@ -71,3 +74,23 @@ def test_the_end_of_a_bag_that_is_cut_off_may_be_ragged(kit: SimpleNamespace, tm
 def test_no_common_step_is_refused(kit: SimpleNamespace, tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="holds no complete step"):
         joined(_bag(kit, tmp_path, [0], [1]), (STATE, FORCES))
+
+
+@pytest.mark.parametrize("announced", [{"last_step": 400_000_000}, {"period": -1.0}, {"period": float("nan")}])
+def test_a_bag_that_tells_of_more_steps_than_any_flight_has_is_not_believed(
+    kit: SimpleNamespace, tmp_path: Path, announced: dict[str, float]
+) -> None:
+    kinds = {STATE: KINDS[STATE], "/hsv/run": "hsv_msgs/msg/Run"}
+    writer = BagWriter(tmp_path / "bag", [kit.topic(name, kind) for name, kind in kinds.items()])
+    values = {"last_step": 2, "period": 0.02, "interface_version": INTERFACE_VERSION, **announced}
+    writer.write("/hsv/run", 0, kit.messages.serialize(kit.messages.make(kinds["/hsv/run"], **values)))
+    for step in range(3):
+        writer.write(STATE, step * PERIOD, kit.messages.stamped(kinds[STATE], step * PERIOD, step, status=0))
+    writer.close()
+    bag = Bag(tmp_path / "bag")
+    tracemalloc.start()
+    with pytest.raises(RecordingError, match=r"tells of \d+ steps of \S+ s, expected at most 5000000 of at most 1 s"):
+        expected_stamps(bag)
+    assert tracemalloc.get_traced_memory()[1] < 2**20
+    tracemalloc.stop()
+    assert "expected at most 5000000" in bag_warnings(bag)[-1]

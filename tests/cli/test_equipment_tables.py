@@ -160,6 +160,32 @@ WRONG = [
         '[link.measurement]\nloss = "90 %"\nburst = 2',
         "link.measurement.burst = 2.0: expected 0, or at least 9",
     ),
+    (
+        "[link.measurement]\nburst = 3",
+        "link.measurement.burst: has no effect, expected link.measurement.loss beside it",
+    ),
+    (
+        "[link.command]\nchecksum = true",
+        "link.command.checksum: has no effect, expected link.command.corruption beside",
+    ),
+    (
+        '[estimator.noise]\naltitude = "1 ft"',
+        "estimator.noise.altitude: has no effect, expected estimator.enabled beside",
+    ),
+    ('[effectiveness]\ntime = "2 s"', "effectiveness.time: has no effect, expected effectiveness.enabled beside it"),
+    (PITCH_RATE + 'drift_time = "1 s"', "sensors.pitch_rate.drift_time: expected with a drift_sigma only"),
+    (PITCH_RATE + 'drift_sigma = "1 deg/s"', "sensors.pitch_rate.drift_sigma: expected with a drift_time only"),
+    (PITCH_RATE + "noise = []", "sensors.pitch_rate.noise = []: expected one value at least"),
+    (
+        ELEVATOR + 'order = 1\nnatural_frequency = "50 rad/s"\ndamping_ratio = 0.7',
+        "actuator.elevator_deflection.damping_ratio: expected none for an order of 1",
+    ),
+    (GUST.replace("8 s", "20 s") + 'lengths = ["500 m", "500 m"]', "gust.starts[1] = 20 s: expected a time before the"),
+    (FAULT + 'type = "hard_over"\nrate = "0 deg/s"', "fault[0].rate = 0: expected a rate whose sign selects the stop"),
+    (
+        FAULT + 'type = "bias"\noffset = "1 deg"\nintermittent_duty = "25 %"',
+        "fault[0].intermittent_duty: has no effect, expected an intermittent_period above 0 s",
+    ),
     ("[link.measurement]\nchecksum = 1", "link.measurement.checksum = 1: expected bool"),
     (
         "[link]\ncomputational_delay = 0.02",

@@ -103,13 +103,25 @@ def test_metres_serve_as_well_as_feet():
         ("[[fault]]", "[fault]", "fault = {"),
         ("saturated_steps", "stalls", "limits.stalls: no such metric, expected one of altitude_rise_time"),
         ('"8 ft"', '"8 s"', "limits.altitude_end_error = '8 s': wrong unit"),
-        ('"8 ft"', '"-8 ft"', "limits.altitude_end_error = '-8 ft': expected the largest magnitude"),
+        ('"8 ft"', '"-8 ft"', "limits.altitude_end_error = '-8 ft': expected of at least 0 ft"),
+        (
+            "saturated_steps = 0",
+            "saturated_steps = 0.5",
+            "limits.saturated_steps = 0.5: expected a whole number of at least 0",
+        ),
+        ('duration = "200 s"', 'duration = "２００ s"', "duration = '２００ s': cannot be read"),
         ("[limits]", "[notch]\nenabled = 1\n[limits]", "notch.enabled = 1: expected a valid boolean"),
         ("[limits]", "[notch]\nzero_frequency = 15\n[limits]", "notch.zero_frequency = 15: the unit is missing"),
         ("[limits]", '[notch]\nzero_damping = "1 s"\n[limits]', "notch.zero_damping = '1 s': wrong unit"),
         ('[vehicle]\nmodel = "CM"', "[vehicle]\nmodel = 3", "vehicle.model = 3: expected 'CM' or 'DM'"),
         ("[vehicle]", "[vehicle", "Expected ']' at the end of a table declaration (at line"),
         ('title = "', 'title = 3 # "', "title = 3: expected a text"),
+        ('title = "', 'title = " " # "', "title = ' ': expected a text that is not empty"),
+        (
+            'title = "',
+            'controller = "robust_mpc"\nrobust_mpc.gain_index = -1\ntitle = "',
+            "robust_mpc.gain_index = -1: expected at",
+        ),
     ],
 )
 def test_a_wrong_field_is_named_with_value_and_expectation(old, new, message):
@@ -206,7 +218,7 @@ end = "1.1 s"
         (
             'title = "',
             'controller = "robust_mpc"\nrobust_mpc.gain_index = 40\ntitle = "',
-            r"robust_mpc\.gain_index = 40: expected -\d+ to \d+",
+            r"robust_mpc\.gain_index = 40: expected 0 to \d+",
         ),
         ("[limits]", STEEP, r"command: reference at 1 s: altitude = .* no equilibrium"),
         ('"200 s"', '"200.01 s"', r"duration = 200\.01 s: expected a whole number of periods, 0\.02 s each"),
@@ -256,7 +268,9 @@ def test_commands_add_up_to_breakpoints():
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        ('start = "20 s"\nend = "10 s"', "command[0].end = 10 s: expected no time before start, 20 s"),
+        ('start = "20 s"\nend = "10 s"', "command[0].end = 10 s: expected a time after start, 20 s, or none"),
+        ('altitude_change = "1 ft"\nstart = "9 s"\nend = "9 s"', "command[0].end = 9 s: expected a time after start"),
+        ("", "command[0]: changes nothing, expected altitude_change or velocity_change"),
         ('start = "20"', "command[0].start = '20': "),
         ('altitude_change = "-600 ft"\nend = "60 s"', "command[0].altitude_change leads to 84900 ft at 60 s: expected"),
         ('altitude_step = "600 ft"', "command[0].altitude_step: unknown key, expected one of altitude_change, vel"),
@@ -278,6 +292,9 @@ def test_tau_and_its_changes_become_parameters():
     assert values["tau_change.values"] == [0.6, 0.6, 0.7, 0.8, 1.0, 0.9, 0.9, 0.9, 0.9, 0.9]
     assert not {"feedback.tau", "tau_change.starts"} & parse_scenario(CASE1, "x").parameters().keys()
     assert "tube.change[1].tau: 2 values, expected 1 or 5" in refusal(text.replace("tau = 0.9", "tau = [0.9, 0.9]"))
+    assert "tube.change[1].tau = []: expected one value at least" in refusal(text.replace("tau = 0.9", "tau = []"))
+    assert "tube.tau = []: expected one value at least" in refusal(text.replace("tau = 0.8", "tau = []", 1))
+    assert "tube.change[1].start = 5 s: expected one change at a time" in refusal(text.replace("9 s", "5 s"))
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import time
@@ -52,8 +53,7 @@ def test_a_killed_node_ends_the_run_by_name(processes: Processes, name: str) -> 
     output = output_of(run)
     assert run.returncode == 1
     reason = "ended with exit code 143" if asked else "was killed by SIGKILL"
-    # Once at once, and once again with all that is to be said in the end.
-    assert f"{name}: [WARN] {reason}" in output and f"{bag}: {name} {reason}" in output
+    assert output.splitlines()[-1] == f"hsv: error: {bag}: {name} {reason}" and f"{name} {reason}" not in output[:-200]
     assert recorded_steps(bag) >= ON_DISK
     assert (bag / "metadata.yaml").is_file()
     assert not any(Path(f"/proc/{pid}").exists() for pid in nodes.values())
@@ -71,13 +71,24 @@ def test_a_full_disk_loses_the_flight_by_the_recorders_name(processes: Processes
     output = output_of(run)
     assert run.returncode == 1
     assert "full_0.mcap: cannot be repaired: File too large" in output
-    assert "recorder ended with exit code 2. Last output:" in output
+    assert "recorder ended with exit code 2: recorder: error: " in output.splitlines()[-1]
     assert output.count("recorder: error: ") == output.count("cannot be written: File too large") == 1
     assert [file.name for file in bag.iterdir()] == ["full_0.mcap"]
     assert recorded_steps(bag) >= ON_DISK
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, long(signal.SIGTERM)])
+def test_a_bag_that_is_removed_in_flight_ends_the_run_at_once(processes: Processes) -> None:
+    bag = processes.folder / "removed"
+    run = _start_and_fly(processes, bag)
+    shutil.rmtree(bag)
+    output = output_of(run)
+    assert run.returncode == 1
+    said = f"recorder: error: {bag}/removed_0.mcap: cannot be written: No such file or directory"
+    assert output.splitlines()[-1] == f"hsv: error: recorder ended with exit code 2: {said}"
+    assert not bag.exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP, long(signal.SIGTERM)])
 def test_interrupt_ends_all_and_closes_the_bag(processes: Processes, number: int) -> None:
     bag, temporary = processes.folder / "interrupted", processes.folder / "temporary"
     temporary.mkdir()

@@ -60,7 +60,7 @@ def test_drift_is_a_gauss_markov_process():
     assert np.std(error) == pytest.approx(1e-3, rel=0.05)
     lag = 20
     assert np.mean(error[:-lag] * error[lag:]) / 1e-6 == pytest.approx(math.exp(-lag * T / 0.5), abs=0.05)
-    begun = [of_pitch_rate(still(1), seed=seed, drift_sigma=1.0)[0] for seed in range(400)]
+    begun = [of_pitch_rate(still(1), seed=seed, drift_sigma=1.0, drift_time=1.0)[0] for seed in range(400)]
     assert np.std(begun) == pytest.approx(1.0, rel=0.15)
 
 

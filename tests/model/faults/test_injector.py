@@ -183,3 +183,14 @@ def test_parameters_repeat_what_was_injected_and_cleared_in_flight():
     repeated = [again.step(step, COMMAND) for step in range(30)]
     assert [(r.active, r.actuator.tolist()) for r in repeated] == told
     assert FaultInjector.from_parameters(FaultInjector().parameters()).step(0, COMMAND).active == ()
+
+
+def test_a_fault_cannot_come_and_go_within_a_control_period():
+    fault = Fault.of("elevator_deflection", "bias", {"offset": 0.01, "intermittent_period": 0.005})
+    words = r"fault\.intermittent_period = 0\.005 s: expected 0 s or at least 0\.02 s"
+    with pytest.raises(ParameterError, match=words):
+        FaultInjector([ScheduledFault(fault, 1)])
+    injector = FaultInjector()
+    with pytest.raises(ParameterError, match=words):
+        injector.inject(fault)
+    assert not injector.known

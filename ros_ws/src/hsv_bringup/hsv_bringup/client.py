@@ -18,10 +18,10 @@ from rclpy.utilities import remove_ros_args
 from hsv.bags.description import PLANT, NodeDescription
 from hsv.base.errors import HsvError, RunError
 from hsv.base.files import json_text
+from hsv.base.processes import take_signals
 from hsv.graph.exclusive import is_published, ros_domain
 from hsv.graph.standstill import Standstill
 from hsv_node import roles
-from hsv_node.main import take_signals
 from hsv_node.middleware import LATCHED, type_name
 from hsv_node.process import ends_with
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import gc
-import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from types import FrameType
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -17,7 +15,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.utilities import remove_ros_args
 
 from hsv.base.errors import HsvError, ParameterError
-from hsv.base.processes import ignore_ctrl_c_at_end
+from hsv.base.processes import choose_log_folder, ignore_ctrl_c_at_end, take_signals
 from hsv.graph.exclusive import ros_domain
 from hsv_node.arguments import check_names, shared_parameters
 from hsv_node.middleware import prefer_profiles
@@ -59,6 +57,7 @@ def run_nodes(
             raise ParameterError(f"argument {others[0]!r}: expected only those that follow --ros-args")
         ros_domain()
         prefer_profiles()
+        choose_log_folder()
         rclpy.init(args=words, signal_handler_options=rclpy.SignalHandlerOptions.NO)
     except rclpy_implementation.UnknownROSArgsError as error:
         return _refuse(name, ParameterError(f"unknown ROS arguments {error}"))
@@ -68,6 +67,7 @@ def run_nodes(
     # An orderly end must never wait for a message: the handler only asks, and the loop looks four times a second.
     stop: list[int] = []
     take_signals(lambda received, _frame: stop.append(received))
+    ignore_ctrl_c_at_end()
     nodes: list[ProcessNode] = []
     executor: Executor | None = None
     code = 1
@@ -114,17 +114,6 @@ def run_nodes(
             gc.collect()
             rclpy.try_shutdown()
     return code
-
-
-def take_signals(handler: Callable[[int, FrameType | None], object]) -> None:
-    """Have ``handler`` called at Ctrl-C and SIGTERM, also for those that came while this process was still starting.
-
-    Who has started it may have blocked them for that time: :func:`hsv.graph.launcher.become`.
-    """
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, handler)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGTERM))
-    ignore_ctrl_c_at_end()
 
 
 def _refuse(name: str, error: BaseException) -> int:

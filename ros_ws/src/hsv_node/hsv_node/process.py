@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import signal
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -76,8 +77,8 @@ class ProcessNode(Node):
         """Run a task between messages, at least four times per second; for subclasses."""
 
     def stopped(self, signal_number: int) -> int:
-        """Return the exit code after a signal; nodes whose end interrupts the run override it."""
-        return 0
+        """Return the exit code after a signal, 0 after Ctrl-C; nodes whose end interrupts the run override it."""
+        return 0 if signal_number == signal.SIGINT else 128 + signal_number
 
     def close(self) -> None:
         """Save data once before the process ends; for subclasses."""

@@ -221,7 +221,7 @@ class PlantNode(LockstepNode):
     def stopped(self, signal_number: int) -> int:
         """Report that the flight is incomplete, unless the user ended it by Ctrl-C."""
         self._broken_off = signal.Signals(signal_number).name
-        return 0 if signal_number == signal.SIGINT else 128 + signal_number
+        return super().stopped(signal_number)
 
     def close(self) -> None:
         """Log how the run ended, and announce it to the other nodes."""

@@ -14,7 +14,7 @@ _NAMED = 3
 
 def bag_warnings(bag: Bag) -> list[str]:
     """Return the warnings about a bag: damage, a missing end, missing topics, and topics with missing steps."""
-    words = loss_in_words(bag.loss)
+    words = [*bag.contradictions[:_NAMED], *loss_in_words(bag.loss)]
     if any(map(being_recorded, bag.files)):
         words.append(f"is still being recorded, {bag.span[1] * 1e-9:.2f} s so far: the end of its recorder closes it")
     elif not bag.complete and not bag.loss.files:

@@ -21,8 +21,11 @@ _NAME = re.compile(r".+\.mcap(?:\.zstd|\.zst|\.lz4)?")
 _NUMBER = re.compile(r"_(\d+)\.mcap")
 _MAX_FILES = 100_000
 """File numbers from here on are dates or the like, not counters."""
-_PART = 4096
-"""Bytes decompressed at a time, so that data before a damage are kept."""
+_PART = 1024
+"""Bytes decompressed at a time, to at most 32 MiB, so that data before a damage are kept."""
+
+MAX_UNPACKED, MAX_RATIO = 2**27, 32
+"""Bytes to which a file may unpack, or how many times its size if that is more; flights are compressed to a quarter."""
 
 
 def locked(stream: IO[bytes], *, shared: bool = False) -> bool:
@@ -92,37 +95,54 @@ def _number(name: str) -> int:
     return int(match[1]) if match else 0
 
 
-def read_file(path: Path) -> bytes:
-    """Return the contents of a file of a bag up to the first damage in compressed data.
+class Unpacker:
+    """A file of a bag, whose contents rosbag2 may have compressed: as a whole, in chunks, or message by message.
+
+    All that is unpacked of a file has a limit, because a few bytes can stand for gigabytes.
 
     Raises:
-        RecordingError: The file cannot be read.
+        RecordingError: The file cannot be read, or it unpacks to more than :data:`MAX_UNPACKED` bytes and
+            :data:`MAX_RATIO` times its size.
     """
-    try:
-        return decompressed(read_bytes(path))[0]
-    except DocumentError as error:
-        raise RecordingError(f"{path}: {error}") from None
 
-
-def read_message(data: bytes) -> bytes | None:
-    """Return a message, decompressed if rosbag2 compressed it; None if it is damaged."""
-    content, whole = decompressed(data)
-    return content if whole else None
-
-
-def decompressed(data: bytes) -> tuple[bytes, bool]:
-    """Return possibly compressed data, decompressed up to the first damage, and whether they are complete."""
-    match COMPRESSIONS.get(data[:_MAGIC]):
-        case "zstd":
-            stream = zstandard.ZstdDecompressor().decompressobj()
-        case "lz4":
-            stream = lz4.frame.LZ4FrameDecompressor()
-        case _:
-            return data, True
-    parts = []
-    for start in range(0, len(data), _PART):
+    def __init__(self, path: Path) -> None:
+        self._path = path
         try:
-            parts.append(stream.decompress(data[start : start + _PART]))
-        except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError):
-            return b"".join(parts), False
-    return b"".join(parts), bool(stream.eof)
+            data = read_bytes(path)
+        except DocumentError as error:
+            raise RecordingError(f"{path}: {error}") from None
+        self._limit = self._left = max(MAX_UNPACKED, MAX_RATIO * len(data))
+        self.data = self.unpacked(data)[0]
+        """Contents of the file, as far as it can be unpacked"""
+
+    def unpacked(self, data: bytes, compression: str | None = None) -> tuple[bytes, bool]:
+        """Return the content of data that may be compressed, up to the first damage, and whether that is all of it.
+
+        ``compression`` is the name of the compression; None: as the data begin.
+        """
+        match COMPRESSIONS.get(data[:_MAGIC], "") if compression is None else compression:
+            case "zstd":
+                stream = zstandard.ZstdDecompressor().decompressobj()
+            case "lz4":
+                stream = lz4.frame.LZ4FrameDecompressor()
+            case _:
+                return data, True
+        parts, whole = [], True
+        for start in range(0, len(data), _PART):
+            try:
+                parts.append(stream.decompress(data[start : start + _PART]))
+            except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError):
+                whole = False
+                break
+            self._left -= len(parts[-1])
+            if self._left < 0:
+                raise RecordingError(
+                    f"{self._path}: unpacks to more than {self._limit} bytes, expected at most {MAX_UNPACKED} or "
+                    f"{MAX_RATIO} times its size"
+                )
+        return b"".join(parts), whole and bool(stream.eof)
+
+    def message(self, data: bytes) -> bytes | None:
+        """Return a message, decompressed if rosbag2 compressed it; None if it is damaged."""
+        content, whole = self.unpacked(data)
+        return content if whole else None

@@ -17,7 +17,7 @@ from rosbags.typesys.store import Typestore
 
 from hsv.bags.columns import Columns
 from hsv.bags.description import INTERFACE_VERSION, ROOT, RUN, TOPICS, TRANSIENT_LOCAL, resolved
-from hsv.bags.files import find_files, read_file, read_message
+from hsv.bags.files import Unpacker, find_files
 from hsv.bags.metadata import (
     CUSTOM_DATA,
     DISTRO,
@@ -114,6 +114,8 @@ class Bag:
         self.complete = not missing
         """Whether the writer closed every file; a killed writer leaves a truncated file."""
         self.loss = Loss(files=missing)
+        self.contradictions: list[str] = []
+        """What metadata.yaml states otherwise than the files, which are believed."""
         self.attachments: dict[str, bytes] = {}
         self.media_types: dict[str, str] = {}
         """Media type of each attachment."""
@@ -298,19 +300,24 @@ class Bag:
         counts = message_counts(metadata)
         recorded_by: dict[str, Any] = metadata
         for file in self.files:
-            data = read_file(file)
-            scan = Scan(data)
+            unpacker = Unpacker(file)
+            scan = Scan(unpacker)
             # In a bag of several files an unreadable file is a damage, not an error.
-            if len(self.files) == 1 and not data:
+            if len(self.files) == 1 and not unpacker.data:
                 raise RecordingError(f"{file}: is empty, expected an MCAP file")
             if len(self.files) == 1 and not scan.is_mcap:
-                raise RecordingError(f"{file}: is not an MCAP file (starts with {data[:8].hex(' ')})")
-            found, orphans, attachments, rosbag2 = self._read_file(scan)
+                raise RecordingError(f"{file}: is not an MCAP file (starts with {unpacker.data[:8].hex(' ')})")
+            found, orphans, attachments, rosbag2 = self._read_file(scan, unpacker)
             recorded_by = rosbag2 or recorded_by
             self.complete &= scan.closed
             self.loss.damages += [(file, damage) for damage in scan.damages]
             statistics = scan.statistics
-            expected = statistics.message_count if statistics else counts.get(file.name)
+            stated = counts.get(file.name)
+            expected = statistics.message_count if statistics else stated
+            if stated not in (None, expected):
+                self.contradictions.append(
+                    f"metadata.yaml states {stated} messages in {file.name}, which has {expected}"
+                )
             self.loss.counted &= expected is not None or not scan.damages
             self.loss.messages += max((scan.indexed if expected is None else expected) - found, orphans, 0)
             self.loss.attachments += max(statistics.attachment_count - attachments, 0) if statistics else 0
@@ -323,7 +330,7 @@ class Bag:
         self.roles = roles(kinds, self.custom_data, str(self.path))
         self.namespace = namespace_of(self.roles)
 
-    def _read_file(self, scan: Scan) -> tuple[int, int, int, dict[str, Any]]:
+    def _read_file(self, scan: Scan, unpacker: Unpacker) -> tuple[int, int, int, dict[str, Any]]:
         """Add the contents of a file; return the numbers of messages, orphans, attachments, and rosbag2's metadata."""
         unpack, size = MESSAGE_HEADER.unpack_from, MESSAGE_HEADER.size
         schemas: dict[int, Schema] = {}
@@ -374,7 +381,7 @@ class Bag:
                 del channels[channel.id]  # its definition is lost or damaged
         read = 0
         for topic, number in {channel.topic: channel.id for channel in channels.values()}.items():
-            found = [(time, read_message(data)) for time, data in zip(*lists[number], strict=True)]
+            found = [(time, unpacker.message(data)) for time, data in zip(*lists[number], strict=True)]
             whole = [(time, message) for time, message in found if message is not None]
             read += len(whole)
             if topic in self._topics:

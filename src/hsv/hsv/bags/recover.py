@@ -13,7 +13,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 from mcap.writer import Writer
 
-from hsv.bags.files import find_files, locked, read_file, read_message
+from hsv.bags.files import Unpacker, find_files, locked
 from hsv.bags.metadata import (
     CUSTOM_DATA,
     FILE_NAME,
@@ -150,7 +150,7 @@ def _rewrite(bag: Bag, path: Path, name: str = "") -> dict[str, Any]:
         writer.start(profile="ros2")
         copy = _Copy(writer)
         for file in bag.files:
-            copy.add(read_file(file))
+            copy.add(Unpacker(file))
         values = information(name or path.name, *copy.tallied(), custom, bag.distro)
         writer.add_metadata(CUSTOM_DATA, custom)
         writer.add_metadata(ROSBAG2, record(values))
@@ -170,9 +170,9 @@ class _Copy:
         self._topics: dict[str, tuple[Channel, Schema]] = {}
         self._tallies: dict[str, Tally] = {}
 
-    def add(self, data: bytes) -> None:
+    def add(self, file: Unpacker) -> None:
         """Copy the intact data of a file."""
-        found = list(Scan(data).records())
+        found = list(Scan(file).records())
         schemas: dict[int, Schema] = {}
         numbers: dict[int, tuple[int, Tally]] = {}
         # Read definitions first, because in a file with a damaged beginning they are at the end.
@@ -187,7 +187,7 @@ class _Copy:
                     number, sequence, log_time, publish_time = MESSAGE_HEADER.unpack_from(body)
                     if number not in numbers:
                         continue
-                    message = read_message(bytes(body[MESSAGE_HEADER.size :]))
+                    message = file.message(bytes(body[MESSAGE_HEADER.size :]))
                     if message is None:
                         continue
                     channel_id, tally = numbers[number]

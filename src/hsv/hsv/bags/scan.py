@@ -16,11 +16,11 @@ from typing import Any
 
 from mcap import records as kinds
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import EndOfFile, UnsupportedCompressionError
+from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
-from zstandard import ZstdError
+
+from hsv.bags.files import COMPRESSIONS, Unpacker
 
 _FRAME = struct.Struct("<BQ")
 """Opcode and length at the start of a record."""
@@ -33,8 +33,8 @@ _CHECKSUM = struct.Struct("<I")
 # The start of a chunk, an attachment or an end of data with a length below 2^40.
 _CANDIDATE = re.compile(rb"(?=[\x06\x09\x0f].{5}\x00{3})", re.DOTALL)
 
-_DAMAGE = (EndOfFile, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, OverflowError, MemoryError)
-"""Exceptions of the package for wrong lengths, texts or checksums."""
+_DAMAGE = (EndOfFile, struct.error, UnicodeDecodeError, OverflowError, MemoryError)
+"""Exceptions of the package for records whose lengths or texts are wrong."""
 
 _RECORDS = {
     Opcode.HEADER: kinds.Header,
@@ -78,10 +78,10 @@ class Scan:
     """A scan of the records of a file; the attributes are complete after :meth:`records` is exhausted.
 
     Args:
-        data: Contents of the file.
+        file: The file, with what unpacks its chunks.
     """
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, file: Unpacker) -> None:
         self.damages: list[Damage] = []
         """Damages before the last intact record."""
         self.closed = False
@@ -90,7 +90,8 @@ class Scan:
         """Statistics of the writer, if the summary is intact."""
         self.indexed = 0
         """Number of messages in the indexes of the chunks."""
-        self._data = memoryview(data)
+        self._file = file
+        self._data = memoryview(file.data)
         self._chunks: set[int] = set()
         """Digests of the chunks so far, so that a duplicated chunk is read once."""
 
@@ -183,14 +184,19 @@ class Scan:
     def _unpacked(self, offset: int, body: memoryview) -> Iterator[tuple[int, memoryview]]:
         """Yield the records of a chunk: all or none, or up to the first damage in a chunk without a checksum."""
         try:
-            stream, length = get_chunk_data_stream(kinds.Chunk.read(content(body)), validate_crc=True)
-            data = memoryview(stream.read(length))
-        except UnsupportedCompressionError as error:
-            self.damages.append(Damage(offset, len(body), f"a chunk ({error}, expected zstd, lz4 or none)"))
-            return
-        except (*_DAMAGE, RuntimeError):
+            chunk = kinds.Chunk.read(content(body))
+        except _DAMAGE:
             self.damages.append(Damage(offset, len(body), "a chunk"))
             return
+        if (compression := chunk.compression) not in ("", *COMPRESSIONS.values()):
+            problem = f"a chunk (unsupported compression type {compression}, expected zstd, lz4 or none)"
+            self.damages.append(Damage(offset, len(body), problem))
+            return
+        unpacked, whole = self._file.unpacked(chunk.data, compression)
+        if not whole or chunk.uncompressed_crc not in (0, zlib.crc32(unpacked)):
+            self.damages.append(Damage(offset, len(body), "a chunk"))
+            return
+        data = memoryview(unpacked)
         found, position, head = [], 0, _FRAME.size
         while position + head <= len(data):
             opcode, length = _FRAME.unpack_from(data, position)

@@ -13,6 +13,9 @@ from hsv.bags.reader import Bag
 from hsv.bags.recover import RECOVERED
 from hsv.base.errors import RecordingError
 
+MAX_STEPS, MAX_PERIOD = 5_000_000, 1.0
+"""Steps of the longest flight, 100 000 s, at the usual period of 0.02 s; and the longest period, s."""
+
 
 def cut_off(bag: Bag) -> bool:
     """Return whether the last messages may be missing, because the recorder was killed."""
@@ -48,7 +51,7 @@ def expected_stamps(bag: Bag) -> NDArray[np.int64]:
     announcement they end with the last recorded step.
 
     Raises:
-        RecordingError: A message does not fit its definition.
+        RecordingError: A message does not fit its definition, or tells of more steps than any flight has.
     """
     found = np.unique(np.concatenate([np.array([], np.int64), *_stamps(bag).values()]))
     announced = _announced(bag) or _numbered(bag)
@@ -58,6 +61,11 @@ def expected_stamps(bag: Bag) -> NDArray[np.int64]:
     state = bag.columns(STATE) if STATE in bag.roles else Columns()
     if {"status", "step"} <= state.keys() and len(ends := np.flatnonzero(state["status"])):
         last = int(state["step"][ends[0]])
+    if last > MAX_STEPS or not 0.0 < period <= MAX_PERIOD:
+        raise RecordingError(
+            f"{bag.path}: tells of {last} steps of {period:g} s, expected at most {MAX_STEPS} of at most "
+            f"{MAX_PERIOD:g} s"
+        )
     return np.union1d(np.round(np.arange(last + 1) * period * 1e9).astype(np.int64), found)
 
 

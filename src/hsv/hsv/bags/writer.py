@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -128,9 +130,15 @@ class BagWriter:
             self._stream.flush()
 
     def flush(self) -> None:
-        """End the current chunk and pass it to the operating system, so that it survives the end of this process."""
+        """End the current chunk and pass it to the operating system, so that it survives the end of this process.
+
+        Raises:
+            RecordingError: The file cannot be written, or is no longer where it was made.
+        """
         with self._writing():
             self._writer.flush()
+            if not os.path.samestat(self.path.stat(), os.fstat(self._stream.fileno())):
+                raise FileNotFoundError(errno.ENOENT, "it was replaced")
         self._pending = 0
 
     def close(self, custom_data: Mapping[str, str] | None = None) -> None:

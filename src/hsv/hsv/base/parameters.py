@@ -35,6 +35,8 @@ class Parameter:
     """Whether it is fixed once the node has started."""
     whole: bool = False
     """Whether the doubles must be integer-valued, as numbers of steps are."""
+    needs: str = ""
+    """Name of the parameter without which a file may not set this one: it would have no effect."""
 
     @property
     def kind(self) -> str:
@@ -162,19 +164,33 @@ def table_values(
         read: Reads a number, with the arguments of :func:`read_number`.
 
     Raises:
-        ParameterError, QuantityError: A table, key or value that is not admitted, named.
+        ParameterError, QuantityError: A table, key or value that is not admitted, named; or a parameter without the
+            one that it needs.
     """
     known = {parameter.name: parameter for parameter in parameters}
+    values = _flat_values(known, tables, read)
+    for name in values:
+        if (needed := known[name].needs) and needed not in values:
+            raise ParameterError(f"{name}: has no effect, expected {needed} beside it")
+    return values
+
+
+def _flat_values(
+    known: Mapping[str, Parameter], tables: Mapping[str, Any], read: Callable[..., float]
+) -> dict[str, Any]:
+    """Return the values of nested ``tables`` by the names of the ``known`` parameters, see :func:`table_values`."""
     values: dict[str, Any] = {}
     for name, entry in tables.items():
         parameter = known.get(name)
         if parameter is None:
             entries = _entries_of(name, entry, known)
-            values |= table_values(known.values(), {f"{name}.{key}": entries[key] for key in entries}, read)
+            values |= _flat_values(known, {f"{name}.{key}": entries[key] for key in entries}, read)
         elif parameter.kind.startswith("double"):
             several = isinstance(entry, list)
             if several and parameter.kind == "double":
                 raise ParameterError(f"{name} = {_shown(entry)}: expected one value, not a list")
+            if entry == []:
+                raise ParameterError(f"{name} = []: expected one value at least")
             numbers = [
                 read(parameter, number, f"{name}[{i}]" if several else name)
                 for i, number in enumerate(entry if several else [entry])

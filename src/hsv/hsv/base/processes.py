@@ -9,8 +9,10 @@ import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
+from pathlib import Path
+from tempfile import mkdtemp
 from types import CodeType, FrameType
 from typing import Any, ParamSpec, TypeVar
 
@@ -21,6 +23,9 @@ _LATER = 0.02
 """Seconds after which an interruption that could not be raised, or was swallowed, is raised again."""
 
 _PR_SET_PDEATHSIG = 1
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Signals that ask a process to end; SIGHUP comes from a terminal that is closed."""
 
 _WHOLE: set[CodeType] = set()
 """Code of functions that are not interrupted."""
@@ -53,11 +58,21 @@ def interrupt(number: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
+def take_signals(handler: Callable[[int, FrameType | None], object]) -> None:
+    """Have ``handler`` called at the :data:`ENDING` signals, also for those that came while they were blocked.
+
+    The starter of this process may have blocked them for that time. SIGHUP stays ignored, as ``nohup`` has it.
+    """
+    for number in ENDING:
+        if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, handler)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
+
+
 def take_interrupts() -> None:
-    """Let SIGINT and SIGTERM interrupt this process; it may have been started with them blocked."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
-        signal.signal(number, interrupt)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT,))
+    """Let the :data:`ENDING` signals interrupt this process; it may have been started with them blocked."""
+    signal.signal(signal.SIGALRM, interrupt)
+    take_signals(interrupt)
     sys.unraisablehook = _interrupt_again
     ignore_ctrl_c_at_end()
 
@@ -78,6 +93,20 @@ def end_with_parent(parent: int) -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
         if os.getppid() != parent:  # it has ended already
             os.kill(os.getpid(), signal.SIGTERM)
+
+
+def choose_log_folder() -> None:
+    """Have the nodes of this process and its children log to a temporary folder if the usual one cannot be written.
+
+    Otherwise they would not start.
+    """
+    places = (("ROS_LOG_DIR",), ("ROS_HOME", "log"), ("HOME", ".ros", "log"))
+    folder = next((Path(value, *rest) for name, *rest in places if (value := os.environ.get(name))), None)
+    if folder:
+        with suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+    if not folder or not os.access(folder, os.W_OK):
+        os.environ["ROS_LOG_DIR"] = mkdtemp(prefix="hsv_log_")
 
 
 def _interrupt_again(unraisable: Any) -> None:

@@ -54,9 +54,9 @@ class UnitSystem(StrEnum):
 
 _EXAMPLES = {"m": "85500 ft", "m/s": "7900 ft/s", "rad": "0.3 deg", "s": "200 s", "1": "+10 %", "rad/s": "15 rad/s"}
 
-_TERM = r"([^\W\d]\w*|[%°])(\s*(\^|\*\*)\s*-?\d(\.\d+)?)?"
+_TERM = r"([^\W\d]\w*|[%°])(\s*(\^|\*\*)\s*-?[0-9](\.[0-9]+)?)?"
 _QUANTITY = re.compile(
-    r"(?P<number>(?>[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d{1,4})?))"
+    r"(?P<number>(?>[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]{1,4})?))"
     rf"\s*(?P<unit>(1?\s*/\s*)?{_TERM}(\s*[*/ ]\s*{_TERM})*)?",
     re.IGNORECASE,
 )

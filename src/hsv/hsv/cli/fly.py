@@ -419,6 +419,8 @@ def fly(
             raise CampaignError(f"{name} = {value}: expected no --{name} with --corners, which defines the flights")
     method = "corners" if corners else (sampling or Sampling.uniform).value
     factors = dict(map(_factor, factor or ()))
+    if len(factors) < len(factor or ()):
+        raise CampaignError(f"factor = {factor}: a field is given twice, expected once")
     count = _SAMPLES if samples is None else samples
     campaign = plan(scenario, method=method, samples=count, seed=seed, scale=scale, commit=commit(), factors=factors)
     if out is None:

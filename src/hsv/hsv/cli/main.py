@@ -56,14 +56,16 @@ UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 """Error for an unknown option, a missing argument and the like; typer exports only this subclass of it."""
 
 
-class _OptionsOnce(TyperCommand):
-    """A command that refuses an option given twice, of which click silently takes the last."""
+class _StrictCommand(TyperCommand):
+    """A command that refuses an option given twice, of which click silently takes the last, and an empty one."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        _, _, given = self.make_parser(ctx).parse_args(args=[*args])
+        values, _, given = self.make_parser(ctx).parse_args(args=[*args])
         for parameter in given:
             if given.count(parameter) > 1 and not getattr(parameter, "multiple", True):
                 raise QuantityError(f"{parameter.opts[0]}: given twice, expected once")
+            if values[parameter.name] == "":
+                raise QuantityError(f"{parameter.opts[0]} = '': expected a text that is not empty")
         return super().parse_args(ctx, args)
 
 
@@ -97,7 +99,7 @@ def application(commands: Mapping[str, Command], *, prog: str = "hsv", listed: b
             app.command(name, rich_help_panel=panel, hidden=not panel)(shown)
     for group in groups:
         for registered in group.registered_commands:
-            registered.cls = _OptionsOnce
+            registered.cls = _StrictCommand
             # The terminal folds the text: typer keeps the line breaks of all paragraphs but the first.
             paragraphs = (inspect.getdoc(registered.callback) or "").split("\n\n")
             registered.help = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
@@ -141,8 +143,9 @@ def run(prog: str, commands: Mapping[str, Command], description: str, moved: Map
     if completing:
         completion_init()  # a shell requests the words that may come next
     words = sys.argv[1:] or ["--help"]
-    if "--traceback" in words[1:]:
-        words = ["--traceback", *(word for word in words if word != "--traceback")]
+    end = words.index("--") if "--" in words else len(words)
+    if "--traceback" in words[1:end]:
+        words = ["--traceback", *(word for word in words[:end] if word != "--traceback"), *words[end:]]
     if words[0] == "--traceback":
         os.environ["HSV_TRACEBACK"] = "1"
     first = next((word for word in words if word != "--traceback"), "")

@@ -41,6 +41,9 @@ if TYPE_CHECKING:
     from hsv.control.design import ControlDesign
 
 
+FOREIGN_FAILURES = (Exception, SystemExit)
+"""Exceptions of external code: it may raise anything, and even end the program."""
+
 STEP_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, *[ctypes.c_void_p] * 4)
 """``int32_t step(int64_t k, const double *in, double *out, double *state, const double *par)``."""
 
@@ -215,10 +218,8 @@ class ExternalController(Controller):
             return
         try:
             self._controller.reset()
-        # External code may raise anything, even SystemExit.
-        except (Exception, SystemExit) as error:
-            words = " ".join(str(error).split())
-            raise ControllerError(f"{self.name}, reset: {type(error).__name__}: {words}") from error
+        except FOREIGN_FAILURES as error:
+            raise ControllerError(f"{self.name}, reset: {failure_words(error)}") from error
 
     def copied(self) -> ExternalController:
         """Return a separate controller that continues from the state of this one."""
@@ -238,19 +239,19 @@ class ExternalController(Controller):
             given = self._call(inputs)
         except ControllerError:
             raise
-        except (Exception, SystemExit) as error:
-            words = " ".join(str(error).split())
+        except FOREIGN_FAILURES as error:
+            words = failure_words(error)
             if not isinstance(error, RunError):
                 frames = traceback.extract_tb(error.__traceback__)
                 own = next(frame for frame in reversed(frames) if "site-packages" not in frame.filename)
                 words += f" ({Path(own.filename).name}:{own.lineno})"
-            raise ControllerError(f"{self.name}, step {inputs.step}: {type(error).__name__}: {words}") from error
+            raise ControllerError(f"{self.name}, step {inputs.step}: {words}") from error
         try:
-            if np.iscomplexobj(given):
+            if np.iscomplexobj(given):  # numpy would discard the imaginary part
                 raise TypeError
             fuel, elevator = given
             return float(fuel), float(elevator)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise self.failure(inputs.step, f"answered {' '.join(repr(given).split())[:80]}") from None
 
     def step(self, inputs: ControllerInput) -> ControllerResult:
@@ -270,6 +271,11 @@ class ExternalController(Controller):
         return call_step_function(
             self.kernel.address, inputs.step, flat_input(inputs), self._state, self.kernel.parameters
         )
+
+
+def failure_words(error: BaseException) -> str:
+    """Return the exception of external code on one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
 
 
 def flat_input(inputs: ControllerInput) -> np.ndarray:

@@ -18,7 +18,15 @@ from typing import TYPE_CHECKING, Any
 
 from hsv.base.errors import HsvError, ParameterError, did_you_mean
 from hsv.base.parameters import Parameter, validate
-from hsv.control.controller import Controller, ControllerClass, ExternalController, NodeController
+from hsv.control.controller import (
+    FOREIGN_FAILURES,
+    Controller,
+    ControllerClass,
+    ExternalController,
+    NodeController,
+    StepKernel,
+    failure_words,
+)
 from hsv.control.library import LibraryClass, library_place
 from hsv.model.vehicle import Vehicle
 
@@ -76,12 +84,13 @@ def controller_class(name: str) -> ControllerClass:
     module, _, attribute = place.partition(":")
     try:
         found = getattr(importlib.import_module(module), attribute)
-    # External code may raise anything while it is imported.
+    except SystemExit as error:
+        raise ParameterError(f"controller = {name!r}: cannot be loaded, {module} ends the program on import") from error
     except Exception as error:
-        words = " ".join(str(error).split())
+        words = failure_words(error)
         if isinstance(error, ModuleNotFoundError) and error.name == module:
             words += f" (PYTHONPATH=FOLDER:$PYTHONPATH finds {module}.py in FOLDER)"
-        raise ParameterError(f"controller = {name!r}: cannot be loaded, {type(error).__name__}: {words}") from error
+        raise ParameterError(f"controller = {name!r}: cannot be loaded, {words}") from error
     lacking = [a for a in ("PARAMETERS", "from_parameters") if not hasattr(found, a)]
     if lacking:
         raise ParameterError(f"controller = {name!r}: has no {', '.join(lacking)}, expected a class of a controller")
@@ -141,12 +150,15 @@ def build_controller(values: Mapping[str, Any], design: ControlDesign | None = N
         built = kind.from_parameters(own, design)
     except HsvError:
         raise
-    except Exception as error:
-        words = " ".join(str(error).split())
-        raise ParameterError(f"controller = {name!r}: cannot be built, {type(error).__name__}: {words}") from error
+    except FOREIGN_FAILURES as error:
+        raise ParameterError(f"controller = {name!r}: cannot be built, {failure_words(error)}") from error
     if isinstance(built, Controller):
         return built
-    due = () if getattr(built, "kernel", None) is not None else ("reset", "step")
+    kernel = getattr(built, "kernel", None)
+    if not isinstance(kernel, StepKernel | None):
+        shown = " ".join(repr(kernel).split())[:80]
+        raise ParameterError(f"controller = {name!r}: kernel = {shown}: expected a StepKernel")
+    due = () if kernel is not None else ("reset", "step")
     if lacking := [attribute for attribute in due if not hasattr(built, attribute)]:
         raise ParameterError(f"controller = {name!r}: has no {', '.join(lacking)}, expected a controller")
     return ExternalController(name, built, Vehicle.from_parameters(values).decoupled)

@@ -6,7 +6,7 @@ It is a named extension of the paper's tube law, off by default.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any, NamedTuple
 
@@ -21,8 +21,7 @@ from hsv.model.vehicle import VEHICLE_PARAMETERS, Vehicle
 EFFECTIVENESS_ENABLED = Parameter(
     "effectiveness.enabled", False, "true: the elevator command is divided by its estimated effectiveness"
 )
-EFFECTIVENESS_PARAMETERS = (
-    EFFECTIVENESS_ENABLED,
+_TUNING = (
     Parameter("effectiveness.least", 0.3, "least effectiveness that is estimated", "", 0.1, 0.9),
     Parameter("effectiveness.bound", 0.03, "disturbance of a period, for the elevator's effect", "", 1e-3, 0.5),
     Parameter("effectiveness.offset", 0.08, "largest constant disturbance that is learned, likewise", "", 0.0, 0.5),
@@ -32,6 +31,10 @@ EFFECTIVENESS_PARAMETERS = (
         "effectiveness.steps", 2.0, "steps that must agree on a fault before it counts", "", 1.0, 5.0, whole=True
     ),
     Parameter("effectiveness.noise", 0.0, "largest error of a measured change of the pitch rate", "rad/s", 0.0, 0.1),
+)
+EFFECTIVENESS_PARAMETERS = (
+    EFFECTIVENESS_ENABLED,
+    *(replace(parameter, needs=EFFECTIVENESS_ENABLED.name) for parameter in _TUNING),
 )
 """Parameters of the estimator; it also needs those of the vehicle and of the start of the flight."""
 

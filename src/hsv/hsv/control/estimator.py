@@ -34,7 +34,15 @@ _DRIVING = (7e-3, 7e-2, 2e-5, 7e-7, 7e-5, 7e-3, 7e-2, 7e-3, 7e-2, 7e-4, 1e-2)
 _ESTIMATED = tuple(zip((*STATE_NAMES, *INPUT_NAMES), (*STATE_UNITS, *INPUT_UNITS), strict=True))
 
 NOISE_PARAMETERS = tuple(
-    Parameter(f"estimator.noise.{name}", 0.0, "standard deviation of the measurement; 0: the sensor's", unit, 0.0, 1e6)
+    Parameter(
+        f"estimator.noise.{name}",
+        0.0,
+        "standard deviation of the measurement; 0: the sensor's",
+        unit,
+        0.0,
+        1e6,
+        needs=ESTIMATOR_ENABLED.name,
+    )
     for name, unit in _ESTIMATED[:N_RIGID]
 )
 PROCESS_PARAMETERS = tuple(
@@ -45,6 +53,7 @@ PROCESS_PARAMETERS = tuple(
         f"{unit}/s^0.5",
         1e-12,
         1e6,
+        needs=ESTIMATOR_ENABLED.name,
     )
     for (name, unit), driving in zip(_ESTIMATED, _DRIVING, strict=True)
 )

@@ -188,9 +188,8 @@ class Governor:
 
     def _half(self, blend: float) -> int:
         """Return a blend in steps."""
-        half = self._steps(blend)
-        if half <= 0:
-            raise GovernorError(f"blend = {blend:g} s: expected above 0")
+        if not 0.0 < blend <= LONGEST or not (half := self._steps(blend)):
+            raise GovernorError(f"blend = {blend:g} s: expected above 0 s, up to {LONGEST:g} s")
         return half
 
     def _corner(self, corners: Sequence[Corner], leg: Leg, half: int, name: str, beginning: Beginning) -> Corner:

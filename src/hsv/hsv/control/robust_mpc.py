@@ -16,9 +16,7 @@ from hsv.control.notch_filter import discretise
 from hsv.control.tube_law import TubeData, TubeResult, TubeStatusCode, tube_memory, tube_step
 from hsv.model.signals import N_RIGID
 
-ROBUST_MPC_PARAMETERS = (
-    Parameter("robust_mpc.gain_index", 0, "which of nominal.gains: 0 the outermost, -1 the last", "", -64, 63),
-)
+ROBUST_MPC_PARAMETERS = (Parameter("robust_mpc.gain_index", 0, "which of nominal.gains: 0 the outermost", "", 0, 63),)
 
 
 class RobustMpc(Controller):
@@ -29,16 +27,14 @@ class RobustMpc(Controller):
     kernel: TubeData
 
     def __init__(self, design: ControlDesign, gain_index: int = 0) -> None:
-        """Take gain number ``gain_index`` of the family, -1 the last.
+        """Take gain number ``gain_index`` of the family.
 
         Raises:
             ParameterError: The design has no such gain.
         """
         gains = design.nominal_gains
-        if not -len(gains) <= gain_index < len(gains):
-            raise ParameterError(
-                f"parameter robust_mpc.gain_index = {gain_index}: expected {-len(gains)} to {len(gains) - 1}"
-            )
+        if not 0 <= gain_index < len(gains):
+            raise ParameterError(f"parameter robust_mpc.gain_index = {gain_index}: expected 0 to {len(gains) - 1}")
         limits = design.input_minimum, design.input_maximum
         no_notch = discretise((), design.period)
         self.kernel = TubeData(

@@ -41,6 +41,8 @@ class Metric:
     group: Group
     share: bool = False
     """Whether the metric is a share, displayed in percent"""
+    counted: bool = False
+    """Whether the metric is a number of steps"""
 
 
 METRICS = {
@@ -112,7 +114,9 @@ METRICS = {
     "fuel_equivalence_ratio_maximum": Metric("fuel equivalence ratio, largest", "1", "largest command", Group.inputs),
     "elevator_deflection_minimum": Metric("elevator deflection, least", "rad", "least command", Group.inputs),
     "elevator_deflection_maximum": Metric("elevator deflection, largest", "rad", "largest command", Group.inputs),
-    "saturated_steps": Metric("saturated steps", "1", "steps in which a command was limited", Group.inputs),
+    "saturated_steps": Metric(
+        "saturated steps", "1", "steps in which a command was limited", Group.inputs, counted=True
+    ),
 }
 """All metrics in the order of the files."""
 

@@ -14,8 +14,7 @@ from pydantic import Field, StrictInt, ValidationError
 
 from hsv.base.errors import DocumentError, HsvError, ParameterError, ScenarioError, did_you_mean
 from hsv.base.files import follow_extends, is_path, parse_toml, read_text
-from hsv.base.parameters import table_values
-from hsv.base.units import parse_quantity
+from hsv.base.parameters import Parameter, read_number, table_values
 from hsv.control.controllers import SHIPPED_CONTROLLERS
 from hsv.control.design import TAU, rigid_factors
 from hsv.control.effectiveness import EFFECTIVENESS_PARAMETERS
@@ -59,7 +58,7 @@ class Scenario(Table):
     """A flight: vehicle, initial point, commands, controller and its design, faults, and limits of metrics."""
 
     name: str
-    title: str
+    title: Annotated[str, Field(pattern=r"\S")]
     design: str = "baseline"
     """Name or path of the controller's design; empty: none"""
     controller: str = "tube_mpc"
@@ -284,7 +283,7 @@ def set_field(table: dict[str, Any], field: str, value: object, name: str) -> No
     Raises:
         ScenarioError: The scenario, which is called ``name``, has no such field.
     """
-    *path, key = (int(part) if part.isdigit() else part for part in re.findall(r"[^.\[\]]+", field))
+    *path, key = (int(part) if part.isdecimal() else part for part in re.findall(r"[^.\[\]]+", field) or [""])
     place: Any = table
     for part in path:
         if isinstance(place, dict) and isinstance(part, str):
@@ -383,11 +382,12 @@ def _limits(table: object) -> dict[str, float]:
     for name in table:
         if name not in METRICS:
             raise ScenarioError(f"limits.{name}: no such metric, expected one of {', '.join(METRICS)}")
-    limits = {name: parse_quantity(value, METRICS[name].unit, f"limits.{name}") for name, value in table.items()}
-    for name, limit in limits.items():
-        if limit < 0.0:
-            raise ScenarioError(f"limits.{name} = {table[name]!r}: expected the largest magnitude, not below zero")
-    return limits
+    return {
+        name: read_number(
+            Parameter(name, 0.0, "", METRICS[name].unit, 0.0, whole=METRICS[name].counted), value, f"limits.{name}"
+        )
+        for name, value in table.items()
+    }
 
 
 def _check(scenario: Scenario) -> None:
@@ -404,6 +404,9 @@ def _check(scenario: Scenario) -> None:
         raise ScenarioError(f"effectiveness: {scenario.controller} does not read it, expected controller tube_mpc")
     if "nominal" in scenario.model_fields_set and scenario.controller == "robust_mpc":
         raise ScenarioError("nominal: robust_mpc does not read it, expected one that follows the nominal state")
+    for index, command in enumerate(scenario.command):
+        if not {"altitude_change", "velocity_change"} & command.model_fields_set:
+            raise ScenarioError(f"command[{index}]: changes nothing, expected altitude_change or velocity_change")
     for index, change in enumerate(scenario.tube.change):
         field = f"tube.change[{index}].tau"
         try:
@@ -425,19 +428,24 @@ def _check(scenario: Scenario) -> None:
 
 
 def _check_starts(scenario: Scenario) -> None:
-    """Refuse commands, changes and faults that begin after the end of the flight."""
+    """Refuse what begins after the end of the flight, and simultaneous changes of tau; a ramp may end after it."""
+    changes = [change.start for change in scenario.tube.change]
     starts = {
-        "command": [command.start for command in scenario.command],
-        "tube.change": [change.start for change in scenario.tube.change],
-        "fault": [fault.start for fault in scenario.fault],
+        "command[{}].start": [command.start for command in scenario.command],
+        "tube.change[{}].start": changes,
+        "fault[{}].start": [fault.start for fault in scenario.fault],
+        "gust.starts[{}]": scenario.equipment.get("gust.starts", ()),
     }
-    for table, times in starts.items():
+    for field, times in starts.items():
         for index, start in enumerate(times):
             if start > 0.0 and start >= scenario.duration:
                 raise ScenarioError(
-                    f"{table}[{index}].start = {start:g} s: "
+                    f"{field.format(index)} = {start:g} s: "
                     f"expected a time before the flight's end, {scenario.duration:g} s"
                 )
+    for index, start in enumerate(changes):
+        if start in changes[:index]:
+            raise ScenarioError(f"tube.change[{index}].start = {start:g} s: expected one change at a time")
     for index, fault in enumerate(scenario.fault):
         if fault.stop is not None and fault.stop <= fault.start:
             raise ScenarioError(
@@ -449,6 +457,7 @@ _DUE = {
     "tuple_type": "a list of tables",
     "model_type": "a table",
     "string_type": "a text",
+    "string_pattern_mismatch": "a text that is not empty",
     "int_type": "a whole number",
     "greater_than_equal": "at least {ge}",
     "less_than_equal": "at most {le}",

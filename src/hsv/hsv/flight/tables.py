@@ -20,7 +20,6 @@ from pydantic import (
     StrictInt,
     ValidationInfo,
     field_validator,
-    model_validator,
 )
 
 from hsv.base.errors import ParameterError, QuantityError, ScenarioError, did_you_mean
@@ -152,6 +151,8 @@ def quantities(unit: str) -> BeforeValidator:
 
     def parse(given: object, info: ValidationInfo) -> tuple[float, ...]:
         texts = given if isinstance(given, list | tuple) else [given]
+        if not texts:
+            raise QuantityError(f"{info.field_name} = []: expected one value at least")
         return tuple(_ends_and_mean(text, unit, info)[1] for text in texts)
 
     return BeforeValidator(parse)
@@ -231,19 +232,13 @@ class CommandTable(Table):
     altitude_change: Annotated[float, quantity("m")] = 0.0
     velocity_change: Annotated[float, quantity("m/s")] = 0.0
     start: Time = 0.0
-    end: Time = 0.0
-
-    @model_validator(mode="before")
-    @classmethod
-    def _end_defaults_to_start(cls, data: Any) -> Any:
-        return {"end": data["start"], **data} if isinstance(data, dict) and "start" in data else data
+    end: Time = Field(default_factory=lambda data: data.get("start", 0.0))
 
     @field_validator("end")
     @classmethod
-    def _end_is_not_before_start(cls, end: float, info: ValidationInfo) -> float:
-        start = info.data.get("start", 0.0)
-        if end < start:
-            raise QuantityError(f"end = {end:g} s: expected no time before start, {start:g} s")
+    def _end_is_after_start(cls, end: float, info: ValidationInfo) -> float:
+        if end <= (start := info.data.get("start", 0.0)):
+            raise QuantityError(f"end = {end:g} s: expected a time after start, {start:g} s, or none for a step")
         return end
 
     def share(self, time: float) -> float:
@@ -299,7 +294,7 @@ class IntegralTable(Table):
 class RobustMpcTable(Table):
     """The robust MPC controller."""
 
-    gain_index: StrictInt = 0
+    gain_index: Annotated[StrictInt, Field(ge=0)] = 0
 
 
 class FaultTable(Table):

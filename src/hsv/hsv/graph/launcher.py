@@ -29,7 +29,7 @@ from hsv.bags.description import (
     resolved,
 )
 from hsv.base.errors import RunError
-from hsv.base.processes import end_with_parent, uninterrupted
+from hsv.base.processes import ENDING, choose_log_folder, end_with_parent, uninterrupted
 from hsv.graph.exclusive import claim, is_published, ros_domain
 from hsv.graph.snapshot import Snapshot
 from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
@@ -66,8 +66,8 @@ def executable(node: NodeDescription) -> Path:
 def become(node: NodeDescription, words: Sequence[str], namespace: str = "") -> NoReturn:
     """Run the executable of ``node`` with these ``words``, in a namespace if one is given, in place of this process.
 
-    Ctrl-C and SIGTERM wait until it takes them (:func:`hsv_node.main.take_signals`): in the midst of its imports they
-    would end it with a traceback.
+    Ctrl-C and SIGTERM wait until it takes them (:func:`hsv.base.processes.take_signals`): in the midst of its imports
+    they would end it with a traceback.
 
     Raises:
         KeyboardInterrupt: One came during an import.
@@ -79,7 +79,8 @@ def become(node: NodeDescription, words: Sequence[str], namespace: str = "") -> 
     left, _ = signal.setitimer(signal.ITIMER_REAL, 0.0)
     if left > 0.0:
         raise KeyboardInterrupt  # which was to come later: the timer would end the program in its place
-    signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
+    choose_log_folder()
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
     os.execv(path, [path, *words, *remapped])
 
 
@@ -141,6 +142,7 @@ class Launcher:
         self._processes: list[_Process] = []
 
     def __enter__(self) -> Launcher:
+        choose_log_folder()
         paths = [executable(node) for node in self._nodes]
         self._claims.enter_context(claim_graph(self._nodes, self._namespace))
         try:
@@ -164,8 +166,8 @@ class Launcher:
         does not answer, and ends.
 
         Raises:
-            RunError: It failed, or another ended before it (a plant that has landed may); with its last words. Or it
-                hung, or another before the flight had begun. Without who only watches the flight goes on.
+            RunError: It failed, or another ended before it (a plant that has landed may). Or it hung, or another
+                before the flight had begun. Losing a viewer does not end the flight.
         """
         *others, last = self._processes
         while True:
@@ -173,9 +175,10 @@ class Launcher:
                 code = process.popen.poll()
                 if code is None or _landed(process, code):
                     continue
-                failure = self._failure(process, code)
+                reason = _ending(process, code)
                 if process.description is not LIVE:
-                    raise failure
+                    raise RunError(f"{process.description.label} {reason}")
+                self._on_line(process.description.label, WARNING + reason)
                 process.lost = True
             others = [process for process in others if not process.lost]
             for process in (*others, last):
@@ -185,7 +188,7 @@ class Launcher:
             if code is not None:
                 if code == 0 or _landed(last, code):
                     return code
-                raise self._failure(last, code)
+                raise RunError(f"{last.description.label} {_ending(last, code)}")
             time.sleep(_LOOK)
 
     def _await_first_words(self, process: _Process) -> None:
@@ -258,15 +261,6 @@ class Launcher:
                     process.words.append(text)
                 self._on_line(process.description.label, text)
 
-    def _failure(self, process: _Process, code: int) -> RunError:
-        if process.reader:
-            process.reader.join(1.0)
-        reason = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
-        # Said now: until the others have ended and the bag is closed, a busy machine may take its time.
-        self._on_line(process.description.label, WARNING + reason)
-        words = "".join(f"\n  {word}" for word in process.words)
-        return RunError(f"{process.description.label} {reason}{'. Last output:' if words else ''}{words}")
-
 
 def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.socket:
     """Reserve domain and namespace for a run of ``nodes`` on this machine; return the socket that holds the claim.
@@ -293,6 +287,16 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
 def _environment() -> dict[str, str]:
     """Return the environment of the processes: warnings are recognised by the default format of the log."""
     return {name: value for name, value in os.environ.items() if name != "RCUTILS_CONSOLE_OUTPUT_FORMAT"}
+
+
+def _ending(process: _Process, code: int) -> str:
+    """Return how a process ended, with the last error that it has printed."""
+    if process.reader:
+        process.reader.join(1.0)
+    if code < 0:
+        return f"was killed by {signal.Signals(-code).name}"
+    said = next((word for word in reversed(process.words) if "[INFO]" not in word), "") if code < 128 else ""
+    return f"ended with exit code {code}{': ' if said else ''}{said}"
 
 
 def _landed(process: _Process, code: int) -> bool:

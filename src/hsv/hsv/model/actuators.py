@@ -174,8 +174,9 @@ def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, peri
             map[i] = actuator_map(order[i], frequency[i], damping[i], h)
         elif math.isfinite(frequency[i]):
             raise ParameterError(f"parameter {where}.order: 0, expected 1 or 2 with a natural frequency")
-        if order[i] < 2 and math.isfinite(acceleration[i]):
-            raise ParameterError(f"parameter {where}.acceleration_limit: expected none for an order of {order[i]}")
+        for field in ("damping_ratio", "acceleration_limit"):
+            if order[i] < 2 and v[f"{where}.{field}"]:
+                raise ParameterError(f"parameter {where}.{field}: expected none for an order of {order[i]}")
     stops = np.array_equal(low, vehicle.input_minimum) and np.array_equal(high, vehicle.input_maximum)
     ideal = not order.any() and stops and not np.isfinite(rate).any()
     return ActuatorData(order, frequency, damping, map, low, high, rate, acceleration, h, bool(ideal))

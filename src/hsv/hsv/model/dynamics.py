@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 
@@ -19,50 +19,6 @@ from hsv.model.signals import N_INPUTS, N_STATES
 MODELS = ("CM", "DM")
 """Coupled model (paper eq. 1) and decoupled model (paper eq. 4)."""
 
-COEFFICIENTS: dict[str, dict[str, str]] = {
-    "rigid_body": {"mass": "kg", "moment_of_inertia": "kg m^2", "gravity": "m/s^2"},
-    "geometry": {"reference_area": "m^2", "mean_aerodynamic_chord": "m", "thrust_moment_arm": "m"},
-    "atmosphere": {"reference_density": "kg/m^3", "reference_altitude": "m", "density_scale_height": "m"},
-    "lift": dict.fromkeys(("lift_alpha", "lift_elevator", "lift_zero"), "1"),
-    "drag": dict.fromkeys(
-        ("drag_alpha_squared", "drag_alpha", "drag_elevator_squared", "drag_elevator", "drag_zero"), "1"
-    ),
-    "pitching_moment": dict.fromkeys(("moment_alpha_squared", "moment_alpha", "moment_zero", "moment_elevator"), "1"),
-    "thrust": {f"thrust_beta_{i}": "N" for i in range(1, 9)},
-    "elastic_modes": {
-        "elastic_force_1_alpha_squared": "N/kg^0.5",
-        "elastic_force_1_alpha": "N/kg^0.5",
-        "elastic_force_1_zero": "N/kg^0.5",
-        "elastic_force_2_alpha_squared": "N/kg^0.5",
-        "elastic_force_2_alpha": "N/kg^0.5",
-        "elastic_force_2_elevator": "N/kg^0.5",
-        "elastic_force_2_zero": "N/kg^0.5",
-        "damping_ratio_1": "1",
-        "damping_ratio_2": "1",
-        "natural_frequency_1": "rad/s",
-        "natural_frequency_2": "rad/s",
-    },
-}
-"""SI units of the coefficients of the equations of motion, by the tables of a vehicle file."""
-
-COEFFICIENT_UNITS = {name: unit for table in COEFFICIENTS.values() for name, unit in table.items()}
-"""Units of all coefficients, in the order of :class:`VehicleParameters`."""
-
-POSITIVE = frozenset(
-    {
-        "mass",
-        "moment_of_inertia",
-        "gravity",
-        "reference_area",
-        "mean_aerodynamic_chord",
-        "reference_density",
-        "density_scale_height",
-        "natural_frequency_1",
-        "natural_frequency_2",
-    }
-)
-"""Coefficients that are above zero in any vehicle."""
-
 
 _COMPLEX_STEP = 1e-40
 """The complex step of hsv_transitions."""
@@ -71,49 +27,50 @@ _COMPLEX_STEP = 1e-40
 class VehicleParameters(NamedTuple):
     """All constants of the equations of motion and the limits of inputs and angles, SI (kg, m, s, N, rad).
 
-    Field names are those of a vehicle file, :mod:`hsv.model.vehicle`; the shipped vehicles are slices 0.3048 m deep.
+    Coefficients are annotated with their table in a vehicle file, :mod:`hsv.model.vehicle`, and their unit. The shipped
+    vehicles are slices 0.3048 m deep.
     """
 
-    mass: float
-    moment_of_inertia: float
-    gravity: float
-    reference_area: float
-    mean_aerodynamic_chord: float
-    thrust_moment_arm: float
-    reference_density: float
-    reference_altitude: float
-    density_scale_height: float
-    lift_alpha: float
-    lift_elevator: float
-    lift_zero: float
-    drag_alpha_squared: float
-    drag_alpha: float
-    drag_elevator_squared: float
-    drag_elevator: float
-    drag_zero: float
-    moment_alpha_squared: float
-    moment_alpha: float
-    moment_zero: float
-    moment_elevator: float
-    thrust_beta_1: float
-    thrust_beta_2: float
-    thrust_beta_3: float
-    thrust_beta_4: float
-    thrust_beta_5: float
-    thrust_beta_6: float
-    thrust_beta_7: float
-    thrust_beta_8: float
-    elastic_force_1_alpha_squared: float
-    elastic_force_1_alpha: float
-    elastic_force_1_zero: float
-    elastic_force_2_alpha_squared: float
-    elastic_force_2_alpha: float
-    elastic_force_2_elevator: float
-    elastic_force_2_zero: float
-    damping_ratio_1: float
-    damping_ratio_2: float
-    natural_frequency_1: float
-    natural_frequency_2: float
+    mass: Annotated[float, "rigid_body", "kg"]
+    moment_of_inertia: Annotated[float, "rigid_body", "kg m^2"]
+    gravity: Annotated[float, "rigid_body", "m/s^2"]
+    reference_area: Annotated[float, "geometry", "m^2"]
+    mean_aerodynamic_chord: Annotated[float, "geometry", "m"]
+    thrust_moment_arm: Annotated[float, "geometry", "m"]
+    reference_density: Annotated[float, "atmosphere", "kg/m^3"]
+    reference_altitude: Annotated[float, "atmosphere", "m"]
+    density_scale_height: Annotated[float, "atmosphere", "m"]
+    lift_alpha: Annotated[float, "lift", "1"]
+    lift_elevator: Annotated[float, "lift", "1"]
+    lift_zero: Annotated[float, "lift", "1"]
+    drag_alpha_squared: Annotated[float, "drag", "1"]
+    drag_alpha: Annotated[float, "drag", "1"]
+    drag_elevator_squared: Annotated[float, "drag", "1"]
+    drag_elevator: Annotated[float, "drag", "1"]
+    drag_zero: Annotated[float, "drag", "1"]
+    moment_alpha_squared: Annotated[float, "pitching_moment", "1"]
+    moment_alpha: Annotated[float, "pitching_moment", "1"]
+    moment_zero: Annotated[float, "pitching_moment", "1"]
+    moment_elevator: Annotated[float, "pitching_moment", "1"]
+    thrust_beta_1: Annotated[float, "thrust", "N"]
+    thrust_beta_2: Annotated[float, "thrust", "N"]
+    thrust_beta_3: Annotated[float, "thrust", "N"]
+    thrust_beta_4: Annotated[float, "thrust", "N"]
+    thrust_beta_5: Annotated[float, "thrust", "N"]
+    thrust_beta_6: Annotated[float, "thrust", "N"]
+    thrust_beta_7: Annotated[float, "thrust", "N"]
+    thrust_beta_8: Annotated[float, "thrust", "N"]
+    elastic_force_1_alpha_squared: Annotated[float, "elastic_modes", "N/kg^0.5"]
+    elastic_force_1_alpha: Annotated[float, "elastic_modes", "N/kg^0.5"]
+    elastic_force_1_zero: Annotated[float, "elastic_modes", "N/kg^0.5"]
+    elastic_force_2_alpha_squared: Annotated[float, "elastic_modes", "N/kg^0.5"]
+    elastic_force_2_alpha: Annotated[float, "elastic_modes", "N/kg^0.5"]
+    elastic_force_2_elevator: Annotated[float, "elastic_modes", "N/kg^0.5"]
+    elastic_force_2_zero: Annotated[float, "elastic_modes", "N/kg^0.5"]
+    damping_ratio_1: Annotated[float, "elastic_modes", "1"]
+    damping_ratio_2: Annotated[float, "elastic_modes", "1"]
+    natural_frequency_1: Annotated[float, "elastic_modes", "rad/s"]
+    natural_frequency_2: Annotated[float, "elastic_modes", "rad/s"]
     inertial_coupling_1: float
     inertial_coupling_2: float
     fuel_equivalence_ratio_minimum: float
@@ -151,6 +108,32 @@ class VehicleParameters(NamedTuple):
                 raise QuantityError(f"perturbation.{name} = {change!r}: expected a finite relative change above -1")
             changes[name] = getattr(self, name) * (1.0 + change)
         return self._replace(**changes)
+
+
+COEFFICIENTS: dict[str, dict[str, str]] = {}
+"""SI units of the coefficients of the equations of motion, by the tables of a vehicle file."""
+for _name, _hint in get_type_hints(VehicleParameters, include_extras=True).items():
+    if _hint is not float:
+        _table, _unit = _hint.__metadata__
+        COEFFICIENTS.setdefault(_table, {})[_name] = _unit
+
+COEFFICIENT_UNITS = {name: unit for table in COEFFICIENTS.values() for name, unit in table.items()}
+"""All of them, in the order of :class:`VehicleParameters`, which ends with inertial coupling and limits."""
+
+POSITIVE = frozenset(
+    {
+        "mass",
+        "moment_of_inertia",
+        "gravity",
+        "reference_area",
+        "mean_aerodynamic_chord",
+        "reference_density",
+        "density_scale_height",
+        "natural_frequency_1",
+        "natural_frequency_2",
+    }
+)
+"""Coefficients that are above zero in any vehicle."""
 
 
 @lru_cache(maxsize=64)

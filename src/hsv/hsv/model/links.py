@@ -44,9 +44,22 @@ def _parameters(link: str) -> tuple[Parameter, ...]:
             f"{where}.jitter", 0.0, "largest additional random delay, control periods", "", 0.0, longest, whole=True
         ),
         Parameter(f"{where}.loss", 0.0, "probability that a payload is lost: the last one is held", "", 0.0, 1.0),
-        Parameter(f"{where}.burst", 0.0, "mean number of consecutive losses; 0: independent losses", "", 0.0, 1e6),
+        Parameter(
+            f"{where}.burst",
+            0.0,
+            "mean number of consecutive losses; 0: independent losses",
+            "",
+            0.0,
+            1e6,
+            needs=f"{where}.loss",
+        ),
         Parameter(f"{where}.corruption", 0.0, "probability that a bit of a payload is flipped", "", 0.0, 1.0),
-        Parameter(f"{where}.checksum", False, "true: a corrupted payload is detected and lost"),
+        Parameter(
+            f"{where}.checksum",
+            False,
+            "true: a corrupted payload is detected and lost",
+            needs=f"{where}.corruption",
+        ),
     )
 
 

@@ -168,6 +168,10 @@ def sensor_data(values: Mapping[str, object], period: float) -> SensorData:
                 f"parameter sensors.{channel}.minimum = {readable(low, unit)}: "
                 f"expected less than maximum, {readable(high, unit)}"
             )
+        for given, other in (("drift_time", "drift_sigma"), ("drift_sigma", "drift_time")):
+            known = v[f"sensors.{channel}.{other}"] or other in chosen.channels.get(channel, {})
+            if v[f"sensors.{channel}.{given}"] and not known:
+                raise ParameterError(f"parameter sensors.{channel}.{given}: expected with a {other} only")
     inertial = _one(
         "sensors.inertial_angle_of_attack",
         v["sensors.inertial_angle_of_attack"],

@@ -28,7 +28,7 @@ import tomli_w
 from hsv.base.errors import DocumentError, HsvError, ParameterError, QuantityError, VehicleError, did_you_mean
 from hsv.base.files import EXTENDS, Tables, follow_extends, is_path, parse_toml, read_text
 from hsv.base.parameters import Parameter, validate
-from hsv.base.units import parse_quantity
+from hsv.base.units import UnitSystem, parse_quantity, readable
 from hsv.model.dynamics import COEFFICIENT_UNITS, COEFFICIENTS, POSITIVE, VehicleParameters
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS
 
@@ -53,6 +53,7 @@ MAX_UNCERTAIN = 12
 MAX_UNCERTAINTY = 0.9
 """Largest relative bound."""
 
+_DAMPING = ("damping_ratio_1", "damping_ratio_2")
 _COUPLING_UNITS = dict.fromkeys(("inertial_coupling_1", "inertial_coupling_2"), "kg^0.5 m")
 _AXES = {"altitude": "m", "velocity": "m/s"}
 _INPUTS = dict(zip(INPUT_NAMES, INPUT_UNITS, strict=True))
@@ -100,6 +101,46 @@ class Vehicle:
     """m/s, range of commands"""
     uncertainty: Mapping[str, float]
     """Relative bounds of the uncertain coefficients (paper section 5.1)"""
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            QuantityError: Names the value and what was expected.
+        """
+        p = self.decoupled
+        units = {**COEFFICIENT_UNITS, "angle_limit": "rad"}
+        for name in (*POSITIVE, "angle_limit", *_DAMPING):
+            value, undamped = getattr(p, name), name in _DAMPING
+            if value < 0.0 or (value == 0.0 and not undamped):
+                expected = "at least 0" if undamped else "above zero"
+                raise QuantityError(f"{name} = {readable(value, units[name], UnitSystem.si)}: expected {expected}")
+        inputs = zip(INPUT_NAMES, zip(p.input_minimum.tolist(), p.input_maximum.tolist(), strict=True), strict=True)
+        ranges = {"altitude_range": self.altitude_range, "velocity_range": self.velocity_range, **dict(inputs)}
+        for name, (low, high) in ranges.items():
+            if not low < high:
+                raise QuantityError(f"{name}: {low} to {high}, expected a range that increases")
+        if not self.velocity_range[0] > 0.0:
+            raise QuantityError(f"velocity_range: from {self.velocity_range[0]} m/s, expected above zero")
+        if DERIVED not in self.couplings:
+            raise QuantityError(f"coupling_sets.names = {[*self.couplings]}: expected one called {DERIVED!r}")
+        for name, (psi_1, psi_2) in self.couplings.items():
+            # Bessel's inequality for the rotation and orthogonal modes of unit generalised mass.
+            if psi_1**2 + psi_2**2 > p.moment_of_inertia:
+                raise QuantityError(
+                    f"inertial_coupling.{name} = {psi_1:.6g}, {psi_2:.6g} kg^0.5 m: expected a root sum square of at "
+                    f"most {math.sqrt(p.moment_of_inertia):.6g} kg^0.5 m, the square root of the moment of inertia"
+                )
+        for name, bound in self.uncertainty.items():
+            if name not in COEFFICIENT_UNITS:
+                raise QuantityError(f"uncertainty.names: {name!r}, expected names of coefficients")
+            if not 0.0 <= bound <= MAX_UNCERTAINTY:
+                raise QuantityError(f"{name}: uncertainty = {bound}: expected 0 to {MAX_UNCERTAINTY:g}")
+        if len(self.uncertainty) > MAX_UNCERTAIN:
+            raise QuantityError(
+                f"uncertainty: of {len(self.uncertainty)} coefficients, expected at most {MAX_UNCERTAIN}: a design "
+                "flies every corner of their bounds"
+            )
 
     @property
     def centre(self) -> tuple[float, float]:
@@ -191,36 +232,25 @@ class Vehicle:
                 raise ParameterError(f"parameter {lacking[0]}: missing, expected that of the vehicle {name!r}")
             values = {**named_parameters(values), **values}
         v = {name.removeprefix("vehicle."): value for name, value in validate(VEHICLE_PARAMETERS, values).items()}
-        for name in POSITIVE:
-            if not v[name] > 0.0:
-                raise ParameterError(f"parameter vehicle.{name} = {v[name]}: expected above zero")
         sets, bounds = v["coupling_sets.names"], v["uncertainty.bounds"]
         sizes = {"coupling_sets.values": 2 * len(sets), "uncertainty.bounds": len(v["uncertainty.names"])}
         for name in (*sizes, "altitude_range", "velocity_range", "input_minimum", "input_maximum"):
             if len(v[name]) != sizes.get(name, 2):
                 raise ParameterError(f"parameter vehicle.{name} = {v[name]}: expected {sizes.get(name, 2)} numbers")
-        if DERIVED not in sets:
-            raise ParameterError(f"parameter vehicle.coupling_sets.names = {sets}: expected one called {DERIVED!r}")
-        for name in v["uncertainty.names"]:
-            if name not in COEFFICIENT_UNITS:
-                raise ParameterError(f"parameter vehicle.uncertainty.names: {name!r}, expected names of coefficients")
         low, high = ([float(number) for number in v[f"input_{end}"]] for end in ("minimum", "maximum"))
-        ranges = {name: (float(v[name][0]), float(v[name][1])) for name in ("altitude_range", "velocity_range")}
-        for name, pair in {**ranges, **dict(zip(INPUT_NAMES, zip(low, high, strict=True), strict=True))}.items():
-            if not pair[0] < pair[1]:
-                raise ParameterError(
-                    f"parameter vehicle.{name}: {pair[0]} to {pair[1]}, expected a range that increases"
-                )
         psi = list(map(float, v["coupling_sets.values"]))
-        return cls(
-            name=v["name"],
-            title="",
-            decoupled=_parameters({name: v[name] for name in COEFFICIENT_UNITS}, low, high, v["angle_limit"]),
-            couplings=dict(zip(sets, zip(psi[::2], psi[1::2], strict=True), strict=True)),
-            altitude_range=ranges["altitude_range"],
-            velocity_range=ranges["velocity_range"],
-            uncertainty=dict(zip(v["uncertainty.names"], map(float, bounds), strict=True)),
-        )
+        try:
+            return cls(
+                name=v["name"],
+                title="",
+                decoupled=_parameters({name: v[name] for name in COEFFICIENT_UNITS}, low, high, v["angle_limit"]),
+                couplings=dict(zip(sets, zip(psi[::2], psi[1::2], strict=True), strict=True)),
+                altitude_range=(float(v["altitude_range"][0]), float(v["altitude_range"][1])),
+                velocity_range=(float(v["velocity_range"][0]), float(v["velocity_range"][1])),
+                uncertainty=dict(zip(v["uncertainty.names"], map(float, bounds), strict=True)),
+            )
+        except QuantityError as error:
+            raise ParameterError(f"parameter vehicle.{error}") from error
 
     @cached_property
     def digest(self) -> str:
@@ -334,8 +364,8 @@ def parse_vehicle(tables: Mapping[str, Any], name: str) -> Vehicle:
 def _parsed(tables: Mapping[str, Any], name: str) -> Vehicle:
     _refuse_unknown(tables, ("title", *COEFFICIENTS, "inertial_coupling", "envelope", "input_limits"))
     title = tables.get("title", "")
-    if not isinstance(title, str):
-        raise QuantityError(f"title = {title!r}: expected text")
+    if not isinstance(title, str) or (not title.strip() and "title" in tables):
+        raise QuantityError(f"title = {title!r}: expected a text that is not empty")
     coefficients: dict[str, float] = {}
     uncertainty: dict[str, float] = {}
     for section, units in COEFFICIENTS.items():
@@ -344,28 +374,13 @@ def _parsed(tables: Mapping[str, Any], name: str) -> Vehicle:
             field = f"{section}.{coefficient}"
             row = _table(table, field, ("value", "symbol", "uncertainty"), unit)
             coefficients[coefficient] = _quantity(row, field, "value", unit)
-            if coefficient in POSITIVE and not coefficients[coefficient] > 0.0:
-                raise QuantityError(f"{field}.value = {row['value']!r}: expected above zero")
-            if "uncertainty" in row:
-                bound = _quantity(row, field, "uncertainty", "1")
-                if not 0.0 <= bound <= MAX_UNCERTAINTY:
-                    most = f"{100 * MAX_UNCERTAINTY:g} %"
-                    raise QuantityError(f"{field}.uncertainty = {row['uncertainty']!r}: expected 0 % to {most}")
-                if bound > 0.0:  # a vehicle that extends another one may set a bound to zero
-                    uncertainty[coefficient] = bound
-    if len(uncertainty) > MAX_UNCERTAIN:
-        raise QuantityError(
-            f"uncertainty: of {len(uncertainty)} coefficients, expected at most {MAX_UNCERTAIN}: a design flies every "
-            "corner of their bounds"
-        )
+            bound = _quantity(row, field, "uncertainty", "1") if "uncertainty" in row else 0.0
+            if bound:  # a vehicle that extends another one may set a bound to zero
+                uncertainty[coefficient] = bound
     envelope = _table(tables, "envelope", (*_AXES, "angle"))
     ranges = {axis: _range(envelope, f"envelope.{axis}", unit) for axis, unit in _AXES.items()}
-    if not ranges["velocity"][0] > 0.0:
-        raise QuantityError(f"envelope.velocity.minimum = {envelope['velocity']['minimum']!r}: expected above zero")
     angle = _table(envelope, "envelope.angle", ("maximum",), "rad")
     angle_limit = _quantity(angle, "envelope.angle", "maximum", "rad")
-    if not angle_limit > 0.0:
-        raise QuantityError(f"envelope.angle.maximum = {angle['maximum']!r}: expected above zero")
     inputs = _table(tables, "input_limits", _INPUTS)
     limits = [_range(inputs, f"input_limits.{field}", unit) for field, unit in _INPUTS.items()]
     low, high = zip(*limits, strict=True)
@@ -396,8 +411,6 @@ def _parameters(
 
 def _couplings(tables: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     table = _table(tables, "inertial_coupling")
-    if DERIVED not in table:
-        raise QuantityError(f"inertial_coupling.{DERIVED}: missing, expected a set, of which numbers are multiples")
     found = {}
     for name in table:
         if not (name.isidentifier() and name.islower()):
@@ -413,10 +426,7 @@ def _couplings(tables: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
 
 def _range(table: Mapping[str, Any], field: str, unit: str) -> tuple[float, float]:
     row = _table(table, field, ("minimum", "maximum"), unit)
-    low, high = (_quantity(row, field, end, unit) for end in ("minimum", "maximum"))
-    if not low < high:
-        raise QuantityError(f"{field}.minimum = {row['minimum']!r}: expected below its maximum, {row['maximum']!r}")
-    return low, high
+    return _quantity(row, field, "minimum", unit), _quantity(row, field, "maximum", unit)
 
 
 def _table(

@@ -159,9 +159,8 @@ def read_result(path: Path) -> tuple[Campaign, Envelope]:
         raise CampaignError(f"{path}: cannot be read, expected the Parquet file of a campaign") from error
     if CAMPAIGN not in metadata:
         raise CampaignError(f"{path}: not the result of a campaign, expected a file of hsv montecarlo")
-    # Results of before there was a digest have none.
-    if metadata.get(DIGEST, b"") not in (b"", _digest(metadata)):
-        raise CampaignError(f"{path}: damaged, expected the result of a campaign")
+    if metadata.get(DIGEST) != _digest(metadata):
+        raise CampaignError(f"{path}: damaged, its digest is missing or wrong; expected the result of a campaign")
     try:
         campaign = Campaign.from_text(metadata[CAMPAIGN].decode())
     except (CampaignError, UnicodeDecodeError) as error:

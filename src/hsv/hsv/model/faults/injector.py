@@ -70,6 +70,8 @@ class FaultInjector:
             link: Link that carries the command; None: an ideal one.
             before: The input (2) sent before the flight.
         """
+        for row in scheduled:
+            row.fault.check_period(period)
         # The first measurement precedes all faults.
         self.scheduled = tuple(
             row._replace(start=max(row.start, 1)) if row.fault.kind.side == SENSOR else row for row in scheduled
@@ -148,7 +150,11 @@ class FaultInjector:
 
         Returns:
             The first step of the fault.
+
+        Raises:
+            ParameterError: The fault comes and goes faster than the control period.
         """
+        fault.check_period(self.period)
         self.clear(fault.channel, fault.type)
         start = self._first(fault)
         self.known.append(ScheduledFault(fault, start, min(start + steps, NEVER)))

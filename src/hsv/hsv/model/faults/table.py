@@ -364,6 +364,8 @@ class Fault:
             except ParameterError as error:
                 raise ParameterError(str(error).replace("parameter ", "fault.", 1)) from error
         named = dict(zip((p.name for p in table), self.values, strict=True))
+        if self.type == "hard_over" and not named["rate"]:
+            raise ParameterError("fault.rate = 0: expected a rate whose sign selects the stop")
         if named.get("lower", 0.0) > named.get("upper", math.inf):
             known = {parameter.name: parameter for parameter in table}
             lower, upper = (known[end].written(self.channel, named[end]) for end in ("lower", "upper"))
@@ -394,7 +396,19 @@ class Fault:
             if name not in parameters:
                 raise ParameterError(f"fault.{name}: missing, expected {' and '.join(due)} for {kind}")
         given = {**optional, **parameters}
+        if "intermittent_duty" in parameters and not given["intermittent_period"]:
+            raise ParameterError("fault.intermittent_duty: has no effect, expected an intermittent_period above 0 s")
         return cls(channel, kind, tuple(given[p.name] for p in table))
+
+    def check_period(self, period: float) -> None:
+        """Check that the fault comes and goes no faster than the control ``period`` (s).
+
+        Raises:
+            ParameterError: Names the parameter.
+        """
+        cycle = self.parameters.get("intermittent_period", math.inf)
+        if cycle < period:
+            raise ParameterError(f"fault.intermittent_period = {cycle:g} s: expected 0 s or at least {period:g} s")
 
     def __str__(self) -> str:
         known = {parameter.name: parameter for parameter in fault_parameters(self.channel, self.type)}
