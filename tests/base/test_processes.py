@@ -12,10 +12,10 @@ from collections.abc import Iterator
 import pytest
 
 from hsv.bags.description import TUBE_MPC
-from hsv.base.processes import over_threads, take_interrupts, uninterrupted
+from hsv.base.processes import ENDING, choose_log_folder, over_threads, take_interrupts, uninterrupted
 from hsv.graph.launcher import Launcher
 
-NUMBERS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
+NUMBERS = *ENDING, signal.SIGALRM
 
 SWALLOWED = {
     "finaliser": """
@@ -110,3 +110,31 @@ def test_results_are_in_the_order_of_the_items_and_counted():
     counts = []
     assert over_threads(lambda item: item * item, range(20), counts.append) == [item * item for item in range(20)]
     assert counts == list(range(1, 21))
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ({"HOME": "{}"}, True),
+        ({"ROS_HOME": "{}"}, True),
+        ({"ROS_LOG_DIR": "{}"}, True),
+        ({"HOME": "/proc"}, False),
+        ({"HOME": ""}, False),
+        ({"HOME": "{}", "ROS_LOG_DIR": "/proc/log"}, False),
+    ],
+)
+def test_nodes_log_elsewhere_if_their_folder_cannot_be_written(tmp_path, monkeypatch, given, kept) -> None:
+    for name in ("ROS_LOG_DIR", "ROS_HOME", "HOME"):
+        monkeypatch.setenv(name, given.get(name, "").format(tmp_path))
+    before = os.environ["ROS_LOG_DIR"]
+    choose_log_folder()
+    assert (os.environ["ROS_LOG_DIR"] == before) is kept
+    assert kept or os.access(os.environ["ROS_LOG_DIR"], os.W_OK)
+
+
+def test_sighup_interrupts_unless_it_is_ignored() -> None:
+    program = "import signal\n{}from hsv.base.processes import take_interrupts\ntake_interrupts()\n"
+    program += "signal.raise_signal(signal.SIGHUP)\nprint('went on')"
+    for ignored, out in (("", ""), ("signal.signal(signal.SIGHUP, signal.SIG_IGN)\n", "went on\n")):
+        ran = subprocess.run([sys.executable, "-c", program.format(ignored)], capture_output=True, text=True)
+        assert ran.stdout == out and ("KeyboardInterrupt" in ran.stderr) is (not out)

@@ -2,6 +2,7 @@ import json
 import math
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -385,13 +386,22 @@ def design_with(gain, words):
         ("simulat case1", "command 'simulat': unknown (did you mean 'simulate'?)"),
         ("simulate a b", "Got unexpected extra argument"),
         ("simulate case1 --json --json", "--json: given twice, expected once"),
+        ("resilience --list --controllers ''", "--controllers = '': expected a text that is not empty"),
+        ("resilience --list --faults ''", "--faults = '': expected a text that is not empty"),
+        ("certify baseline --actuators ''", "--actuators = '': expected a text that is not empty"),
+        ("replay nowhere --node ''", "--node = '': expected a text that is not empty"),
+        ("simulate -- --traceback", "scenario '--traceback': expected a path or one of"),
+        (
+            "fault inject elevator_deflection bias '1 deg' --duration '1e300 s'",
+            "duration = '1e300 s': expected from 0 to",
+        ),
         ("trim --altitude 1 --units si --altitude 2", "--altitude: given twice, expected once"),
         ("montecarlo case1 --samples 3 --samples 4", "--samples: given twice, expected once"),
         ("simulate case1 --out x.csv", "out = 'x.csv': expected a file that ends in .npz"),
     ],
 )
 def test_usage_errors_are_one_line_with_code_2(hsv, words, message):
-    ran = hsv(*words.split())
+    ran = hsv(*shlex.split(words))
     assert ran.code == 2 and ran.out == ""
     assert ran.error.startswith(message)
 

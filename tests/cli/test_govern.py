@@ -34,6 +34,7 @@ def test_a_file_that_exists_is_kept(hsv, tmp_path):
     ("arguments", "why"),
     [
         (("case1", "--blend", "0 s"), "blend = 0 s: expected above 0"),
+        (("case1", "--blend", "1e9 s"), "blend = 1e+09 s: expected above 0 s, up to 600 s"),
         (("case1", "--blend", "4 ft"), "blend"),
         (("case1_rmpc",), "controller = 'robust_mpc', design = 'baseline_single_k': expected tube_mpc"),
         (("case1_qp",), "nominal.law = 'qp': expected 'family'"),

@@ -46,6 +46,8 @@ def test_a_campaign_by_the_command_and_one_flight_again(campaign, hsv, tmp_path)
         (("--corners", "--sampling", "sobol"), "sampling = sobol: expected no --sampling with --corners"),
         (("--factor", "fault[0].start"), "factor = 'fault[0].start': expected FIELD=LEAST..LARGEST"),
         (("--factor", "initial.altitude=10 km..11 km"), "initial.altitude"),
+        (("--factor", "=1..2"), "no such field"),
+        (("--factor", "fault[0].start=0 s..1 s", "--factor", "fault[0].start=1 s..2 s"), "a field is given twice"),
         (("--scale", "0"), "varies"),
         (("--out", "result.csv"), ".parquet"),
         (("--workers", "-1"), "workers = -1: expected 0 to 4096"),

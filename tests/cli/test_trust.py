@@ -9,6 +9,7 @@ from changed_bags import changed_bag
 from pyarrow import parquet
 from recorded_flight import record_flight
 
+from hsv.flight.campaign.store import result_digest
 from hsv.flight.campaign.table import CAMPAIGN, DIGEST
 from hsv.model.vehicle import vehicle_text
 
@@ -90,8 +91,12 @@ def test_no_path_of_a_campaign_leads_out_of_the_folder(hsv, tmp_path, path):
     kept = json.loads(metadata[CAMPAIGN])
     kept["scenario_text"] = f'design = "{path}"\n' + kept["scenario_text"].replace('design = "baseline"\n', "")
     metadata[CAMPAIGN] = json.dumps(kept).encode()
-    # As in results of before there was a digest.
     del metadata[DIGEST], metadata[b"ARROW:schema"]
+    parquet.write_table(table.replace_schema_metadata(metadata), "own.parquet")
+    assert hsv("montecarlo", "summary", "own.parquet", "--no-page").error.startswith(
+        "own.parquet: damaged, its digest is missing or wrong"
+    )
+    metadata[DIGEST] = result_digest(metadata)
     parquet.write_table(table.replace_schema_metadata(metadata), "own.parquet")
     # The design is kept in the result: a flight in process needs no file.
     assert hsv("montecarlo", "replay", "own.parquet", "--flight", "1").code == 0

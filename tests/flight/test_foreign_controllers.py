@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from c_libraries import step_function
 
-from hsv.base.errors import RunError, ScenarioError
+from hsv.base.errors import HsvError, RunError, ScenarioError
 from hsv.base.parameters import Parameter, validate
 from hsv.control.controller import ControllerInput, StepKernel
+from hsv.control.controllers import controller_class
 from hsv.flight.assembly import assemble_flight, scenario_parameters
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import parse_scenario
@@ -194,6 +195,27 @@ class Leaving(Leaky):
 def test_a_controller_that_ends_the_process_in_its_reset_is_named():
     with pytest.raises(RunError, match=r"Leaving, reset: SystemExit: 5"):
         fly(flight("Leaving"))
+
+
+class JunkKernel(Leaky):
+    kernel = 5
+
+
+class Complex(Late):
+    answer = np.array([1j, 0.0])
+
+
+def test_a_kernel_of_another_type_and_complex_answers_are_named(tmp_path, monkeypatch):
+    with pytest.raises(HsvError, match=r"JunkKernel': kernel = 5: expected a StepKernel"):
+        flight("JunkKernel")
+    with pytest.raises(
+        RunError, match=r"Complex, step 20: answered array\(\[0\.\+1\.j, 0\.\+0\.j\]\), expected 2 finite"
+    ):
+        fly(flight("Complex"))
+    (tmp_path / "ends_on_import.py").write_text("import sys\nsys.exit(0)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(HsvError, match="cannot be loaded, ends_on_import ends the program on import"):
+        controller_class("ends_on_import:Own")
 
 
 def test_flights_in_threads_share_no_state():

@@ -33,10 +33,17 @@ def test_a_complete_machine_lacks_nothing():
 
 
 def test_everything_missing_is_named_at_once(tmp_path, monkeypatch):
-    monkeypatch.setattr(setup, "ROOT", Path("/srv/a b"))
+    monkeypatch.setattr(setup, "ROOT", Path("/srv/a ü"))
     monkeypatch.setattr(setup.platform, "machine", lambda: "aarch64")
     found = setup.missing("wheels", {"PATH": str(tmp_path)})
-    for text in ("/srv/a b", "this is aarch64", "a compiler (gcc)", "a compiler (g++)", "cmake 3.20 or newer"):
+    for text in (
+        "a path without blanks",
+        "a path of ASCII letters, for CMake (/srv/a ü)",
+        "this is aarch64",
+        "a compiler (gcc)",
+        "a compiler (g++)",
+        "cmake 3.20 or newer",
+    ):
         assert any(text in name for name in found), text
     assert {*found.values()} == {"", "g++", "cmake"}
 

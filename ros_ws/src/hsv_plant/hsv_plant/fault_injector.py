@@ -11,7 +11,7 @@ from hsv.bags.description import CLEAR_FAULT, COMMAND, FAULT_INJECTOR, INJECT_FA
 from hsv.bags.messages import fault_in, stamp_in, stamp_of
 from hsv.base.errors import ParameterError
 from hsv.flight.blocks import Signals
-from hsv.model.faults.injector import FAULT_PARAMETERS, LINK_PARAMETERS, FaultInjector
+from hsv.model.faults.injector import DURATION, FAULT_PARAMETERS, LINK_PARAMETERS, FaultInjector
 from hsv.model.links import command_link
 from hsv.model.signals import NEVER, first_step
 from hsv_node.block import BlockNode
@@ -86,15 +86,12 @@ class FaultInjectorNode(BlockNode):
     def _inject(self, request: InjectFault.Request, response: InjectFault.Response) -> InjectFault.Response:
         try:
             fault = fault_in(request.fault)
-            if not request.duration >= 0.0:
-                raise ParameterError(
-                    f"duration = {request.duration:g}: expected at least 0 (seconds; 0: until cleared)"
-                )
+            DURATION.check(request.duration)
+            steps = first_step(request.duration, self._period) if request.duration else NEVER
+            response.step = self._injector.inject(fault, steps)
         except ParameterError as error:
             response.success, response.message = False, str(error)
             return response
-        steps = first_step(request.duration, self._period) if request.duration else NEVER
-        response.step = self._injector.inject(fault, steps)
         response.success = True
         until = f" to step {response.step + steps - 1}" if request.duration else " on"
         response.message = f"{fault} from step {response.step}{until}"

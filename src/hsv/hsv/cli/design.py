@@ -400,6 +400,8 @@ def verify(
                 expected = f", expected {check.expected}" if check.expected else ""
                 line = folded(f"{'ok' if check.ok else 'FAIL':4}  {check.name}: {_found(check)}{expected}", 8)
                 say(line if check.ok else Text(line, "bold red"))
+        if stated:
+            say(folded(f"stated, not checked: {', '.join(stated)}"))
         say(Text(f"{len(rows) - len(failing)} of {len(rows)} checks pass", "bold"))
     if failing:
         part, check = failing[0]

@@ -38,11 +38,13 @@ def inject(
     Example: hsv fault inject elevator_deflection loss_of_effectiveness 0.8 --duration "5 s"
     """
     from hsv.bags.description import FAULT
+    from hsv.base.parameters import read_number
+    from hsv.model.faults.injector import DURATION
     from hsv.model.faults.table import read_fault
 
     found = read_fault(channel, type, parameters or [])
     given = [f"{name}={value!r}" for name, value in found.parameters.items()]
-    options = ["inject", "--duration", _si(duration, "s", "duration")]
+    options = ["inject", "--duration", repr(read_number(DURATION, duration, "duration"))]
     _become(FAULT, "fault", options, [channel, type, *given], namespace, json)
 
 

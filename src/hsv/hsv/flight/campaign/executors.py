@@ -20,6 +20,7 @@ from importlib.metadata import version
 from itertools import islice
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from hsv.base.errors import CampaignError, RunError, reason
@@ -111,13 +112,14 @@ class _PoolExecutor(Executor, ABC):
         Raises:
             RunError: The batch ends its process; its name is in the message.
         """
-        future = self._submit(job, text, batch)
-        try:
-            self._first({future: batch}, label)
-            return self._result(future)
-        except BrokenProcessPool:
-            self._renew()
-            raise RunError(f"campaign: {label(batch)}: the worker process ended; {_KEPT}") from None
+        for _ in range(2):  # the first time, it may have been a process that had nothing to do
+            future = self._submit(job, text, batch)
+            try:
+                self._first({future: batch}, label)
+                return self._result(future)
+            except BrokenProcessPool:
+                self._renew()
+        raise RunError(f"campaign: {label(batch)}: the worker process ended; {_KEPT}")
 
     def _first(self, flying: dict[Future[bytes], int], label: Callable[[int], str]) -> Collection[Future[bytes]]:
         """Wait for the first results, and return their futures."""
@@ -146,7 +148,11 @@ class _PoolExecutor(Executor, ABC):
 
 
 class ProcessExecutor(_PoolExecutor):
-    """Flies the batches in processes of this machine, which are replaced when one of them dies."""
+    """Flies the batches in processes of this machine, which are replaced when one of them dies.
+
+    Results come in files: if a process were killed while it writes a long one to the pipe, the pool would wait for the
+    rest for ever.
+    """
 
     def __init__(self, workers: int, notice: Notice = lambda words: None) -> None:
         """Start the processes.
@@ -156,6 +162,7 @@ class ProcessExecutor(_PoolExecutor):
         """
         super().__init__(notice)
         self.cores = workers
+        self._folder = TemporaryDirectory(prefix="hsv_results_")
         self._start()
 
     def pids(self) -> list[int | None]:
@@ -168,6 +175,7 @@ class ProcessExecutor(_PoolExecutor):
             for process in self._processes():
                 process.kill()
         self._pool.shutdown(cancel_futures=True)
+        self._folder.cleanup()
 
     def _start(self) -> None:
         self._others = set(multiprocessing.active_children())
@@ -189,18 +197,32 @@ class ProcessExecutor(_PoolExecutor):
 
     def _renew(self) -> None:
         self.close(kill=True)
+        self._folder = TemporaryDirectory(prefix="hsv_results_")
         self._start()
 
     def _submit(self, job: Job, text: str, batch: int) -> Future[bytes]:
         try:
-            return self._call(_portably, job, text, batch)
+            return self._call(_to_file, self._folder.name, job, text, batch)
         except BrokenProcessPool:  # a process died while it had nothing to do
             self._renew()
-            return self._call(_portably, job, text, batch)
+            return self._call(_to_file, self._folder.name, job, text, batch)
+
+    def _result(self, future: Future[bytes]) -> bytes:
+        path = Path(future.result().decode())
+        result = path.read_bytes()
+        path.unlink()
+        return result
 
     def _obstacle(self) -> str:
         stopped = [str(pid) for pid in self.pids() if _is_stopped(pid)]
         return f": stopped worker process {', '.join(stopped)}" if stopped else ""
+
+
+def _to_file(folder: str, job: Job, text: str, batch: int) -> bytes:
+    """Fly a batch, and return the path of the file with its result."""
+    path = Path(folder, str(batch))
+    path.write_bytes(_portably(job, text, batch))
+    return bytes(path)
 
 
 def _portably(job: Job, text: str, batch: int) -> bytes:

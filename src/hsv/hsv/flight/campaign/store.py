@@ -92,7 +92,7 @@ class ResultStore:
                         parts.append(part.cast(columns))
                     writer.write_table(pa.concat_tables(parts))
                 kept = {CAMPAIGN: self._campaign.text.encode(), ENVELOPE: envelope.encode().encode()}
-                writer.add_key_value_metadata(kept | {DIGEST: _digest(kept)})
+                writer.add_key_value_metadata(kept | {DIGEST: result_digest(kept)})
             _replace(temporary, self.out)
         shutil.rmtree(self.folder)
 
@@ -159,7 +159,7 @@ def read_result(path: Path) -> tuple[Campaign, Envelope]:
         raise CampaignError(f"{path}: cannot be read, expected the Parquet file of a campaign") from error
     if CAMPAIGN not in metadata:
         raise CampaignError(f"{path}: not the result of a campaign, expected a file of hsv montecarlo")
-    if metadata.get(DIGEST) != _digest(metadata):
+    if metadata.get(DIGEST) != result_digest(metadata):
         raise CampaignError(f"{path}: damaged, its digest is missing or wrong; expected the result of a campaign")
     try:
         campaign = Campaign.from_text(metadata[CAMPAIGN].decode())
@@ -184,7 +184,7 @@ def _has(columns: pa.Schema, column: pa.Field) -> bool:
     return columns.get_field_index(column.name) >= 0 and columns.field(column.name).equals(column, check_metadata=True)
 
 
-def _digest(kept: Mapping[bytes, bytes]) -> bytes:
+def result_digest(kept: Mapping[bytes, bytes]) -> bytes:
     """Return the hexadecimal SHA-256 of the metadata."""
     texts = [kept.get(key, b"") for key in (CAMPAIGN, ENVELOPE)]
     return hashlib.sha256(b"".join(b"%d:%s" % (len(text), text) for text in texts)).hexdigest().encode()

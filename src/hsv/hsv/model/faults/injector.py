@@ -28,6 +28,7 @@ FAULT_PARAMETERS = (
     Parameter("fault.starts", [0.0], "simulated time at which each scheduled fault begins", "s", 0.0),
     Parameter("fault.stops", [], "simulated time at which each scheduled fault ends; empty: never", "s", 0.0),
 )
+DURATION = Parameter("duration", 0.0, "time until a fault injected in flight ends; 0: until cleared", "s", 0.0, 1e5)
 LINK_PARAMETERS = (COMPUTATION_PARAMETER, *COMMAND_LINK_PARAMETERS)
 """Parameters of the link that carries the command to the injector."""
 

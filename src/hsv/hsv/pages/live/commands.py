@@ -8,9 +8,9 @@ from typing import Any
 
 from hsv.bags.description import FAULT_INJECTOR, NodeDescription
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter
-from hsv.base.units import parse_quantity
+from hsv.base.parameters import Parameter, read_number
 from hsv.graph.node_parameters import SETTABLE, parse
+from hsv.model.faults.injector import DURATION
 from hsv.model.faults.table import CHANNELS, FAULT_KINDS, Fault, read_fault
 
 
@@ -60,9 +60,7 @@ def _inject(fields: Mapping[str, Any]) -> Command:
     channel, kind = _choice(fields, "channel", CHANNELS), _choice(fields, "type", FAULT_KINDS)
     words = filter(str.strip, _text(fields, "parameters", "").split(","))
     parameters = ["=".join(map(str.strip, word.split("=", 1))) for word in words]
-    duration = parse_quantity(_text(fields, "duration", "") or "0 s", "s", "duration")
-    if duration < 0.0:
-        raise ParameterError(f"duration = {duration:g}: expected at least 0 (seconds; 0: until cleared)")
+    duration = read_number(DURATION, _text(fields, "duration", "") or "0 s", "duration")
     return Inject(read_fault(channel, kind, parameters), duration)
 
 
