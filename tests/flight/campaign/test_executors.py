@@ -48,13 +48,19 @@ def test_an_address_that_is_none_is_refused_at_once(monkeypatch, address):
         pass
 
 
-def test_a_scheduler_that_does_not_answer_is_named_once(monkeypatch, capfd):
-    monkeypatch.setattr("hsv.flight.campaign.executors.ANSWER", 0.5)
+@pytest.mark.parametrize("listens", [False, True])
+def test_a_scheduler_that_does_not_answer_is_named_once(monkeypatch, capfd, listens):
+    waited = []
+    monkeypatch.setattr("hsv.flight.campaign.executors.ANSWER", 1.5)
+    monkeypatch.setattr("hsv.flight.campaign.executors.NOTICE", 0.1)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
+        if listens:
+            silent.listen()
         address = f"127.0.0.1:{silent.getsockname()[1]}"
-        with pytest.raises(CampaignError, match=f"'{address}': no answer"), make_executor(0, address):
+        with pytest.raises(CampaignError, match=f"'{address}': no answer"), make_executor(0, address, waited.append):
             pass
+    assert waited == [f"waiting for the scheduler {address}"]
     assert capfd.readouterr().err == ""
 
 

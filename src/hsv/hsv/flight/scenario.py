@@ -292,7 +292,7 @@ def set_field(table: dict[str, Any], field: str, value: object, name: str) -> No
             place = place[part]
         else:
             raise _refused(name, f"{field}: no such field, expected one such as fault[0].start")
-    if isinstance(place, dict) != isinstance(key, str) or (isinstance(key, int) and key >= len(place)):
+    if not (isinstance(place, dict) and key if isinstance(key, str) else isinstance(place, list) and key < len(place)):
         raise _refused(name, f"{field}: no such field, expected one such as fault[0].start")
     place[key] = value
 

@@ -15,7 +15,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessP
 from concurrent.futures import Executor as Pool
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 from itertools import islice
 from multiprocessing.process import BaseProcess
@@ -340,7 +340,9 @@ def _connected(address: str, notice: Notice) -> Iterator[Any]:
             stack.callback(logger.setLevel, logger.level)
             logger.setLevel(logging.CRITICAL)
         # Dask's own wait for a scheduler cannot be interrupted.
-        if not _in_time(lambda: _answers(host, port), ANSWER, lambda: notice(f"waiting for the scheduler {address}")):
+        greets = address.partition("://")[0] in ("tcp", address)
+        waiting = partial(notice, f"waiting for the scheduler {address}")
+        if not _in_time(lambda: _answers(host, port, greets), ANSWER, waiting):
             raise silent
         try:
             client = stack.enter_context(Client(address, timeout=NOTICE, set_as_default=False))
@@ -367,10 +369,11 @@ def _in_time(done: Callable[[], Any], limit: float, notice: Callable[[], None] =
     return True
 
 
-def _answers(host: str, port: int) -> bool:
+def _answers(host: str, port: int, greets: bool) -> bool:
+    """Return whether a scheduler is there: one that ``greets``, as over TCP, sends the first bytes."""
     try:
-        with socket.create_connection((host, port), timeout=_LOOK):
-            return True
+        with socket.create_connection((host, port), timeout=NOTICE) as link:
+            return not greets or bool(link.recv(1))
     except OSError:
         return False
 
