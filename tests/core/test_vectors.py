@@ -61,7 +61,8 @@ from hsv.model.links import LinkData, link_state
 from hsv.model.lpv.actuated import SampledActuators, respond
 from hsv.model.lpv.linearisation import Filter, extended_derivative, extended_jacobian
 from hsv.model.lpv.polytope import Polytope, axis_weights
-from hsv.model.sensors import sensor_data, sensor_state
+from hsv.model.sensors import SENSOR_SETS, sensor_data, sensor_state
+from hsv.model.signals import STATE_NAMES
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 
@@ -288,6 +289,12 @@ def faults(z: Golden) -> None:
 def sensors(z: Golden) -> None:
     found, none = [], fault_rows((), (), PERIOD)
     for i, (values, rows) in enumerate(zip(z["sensors.values"], tables(z, "sensor"), strict=True)):
+        for channel in STATE_NAMES:
+            # Only one of the two is refused: the other gets its standard value.
+            for one, other, standard in (("drift_time", "drift_sigma", 0.0), ("drift_sigma", "drift_time", 1.0)):
+                known = SENSOR_SETS[values.get("sensors.set", "ideal")].channels.get(channel, {})
+                if values.get(f"sensors.{channel}.{one}") and other not in known:
+                    values[f"sensors.{channel}.{other}"] = values.get(f"sensors.{channel}.{other}") or [standard]
         data, memory = sensor_data(values, PERIOD), sensor_state()
         given = data, memory, rows if i % 2 else none
         found.append(np.ravel([measure(*given, k, 23 + i, x) for k, x in enumerate(z["sensors.x"])]))

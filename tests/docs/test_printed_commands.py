@@ -112,7 +112,6 @@ ELSEWHERE = {
     "hsv-paper claims": "tests/hsv_paper/test_claims.py",
     "hsv run case1 --live": "tests/graph/test_live.py",
     "hsv topic /hsv/state --every 50": "tests/graph/test_by_hand.py",
-    "cd examples/cpp_node": "tests/graph/test_full_installation.py",
     "cd examples/node": "tests/graph/test_own_controllers.py",
     "python3 -m colcon build": "tests/graph/test_own_controllers.py",
     "source install/local_setup.bash": "test_a_workspace_of_ones_own, tests/graph/test_own_controllers.py",

@@ -67,7 +67,18 @@ def test_of_whole_numbers_each_between_the_ends_is_drawn_as_often():
             -0.02,
             0.04,
         ),
-        ({"command": [{}, {"start": {"uniform": ["1 s", "2 s"]}}]}, "command[1].start", "s", 1.0, 2.0),
+        (
+            {
+                "command": [
+                    {"altitude_change": "10 m"},
+                    {"start": {"uniform": ["1 s", "2 s"]}, "altitude_change": "10 m"},
+                ]
+            },
+            "command[1].start",
+            "s",
+            1.0,
+            2.0,
+        ),
         ({"duration": {"uniform": ["3 s", "0.1 min"]}}, "duration", "s", 3.0, 6.0),
         ({"tube": {"tau": [1.0, 1.0, {"uniform": [0.9, 1.0]}, 1.0, 1.0]}}, "tube.tau[2]", "1", 0.9, 1.0),
         (

@@ -47,8 +47,9 @@ def test_without_a_timer_a_process_leaves_all_the_same():
 def test_the_exit_code_of_a_node_stands_when_ctrl_c_comes_at_the_very_end():
     done = run("""
 import os, signal
-from hsv_node.main import take_signals
+from hsv.base.processes import ignore_ctrl_c_at_end, take_signals
 take_signals(lambda number, frame: None)
+ignore_ctrl_c_at_end()
 class Last:
     def __del__(self, kill=os.kill, process=os.getpid(), number=signal.SIGINT): kill(process, number)
 last = Last()

@@ -109,7 +109,7 @@ def test_a_campaign_with_distributions_reads_back_as_it_was_written(scenario):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"end": '{ uniform = ["0.2 s", "3 s"] }'}, r"command\[0\].end = 0.2 s: expected no time before start"),
+        ({"end": '{ uniform = ["0.2 s", "3 s"] }'}, r"command\[0\].end = 0.2 s: expected a time after start"),
         ({"altitude_change": '{ uniform = ["0 ft", "2000 ft"] }'}, r"command\[0\].altitude_change leads to 87500 ft"),
     ],
 )
@@ -157,13 +157,15 @@ def test_values_that_do_not_go_together_are_told_with_their_flight(tmp_path, out
     ends = 'end = { uniform = ["0.8 s", "1.4 s"] }\naltitude_change'
     path.write_text(SCENARIO.replace("altitude_change", ends, 1))
     campaign = plan(str(path), samples=40, scale=0.0)
-    with pytest.raises(ScenarioError, match=r"^flight \d+: scenario 'drawn': command\[0\].end = .*before start"):
+    with pytest.raises(
+        ScenarioError, match=r"^flight \d+: scenario 'drawn': command\[0\].end = .*expected a time after start"
+    ):
         run_campaign(campaign, ResultStore(out, campaign), Executor())
 
 
 def test_a_vehicle_by_its_name_alone_is_drawn_like_a_table(tmp_path):
     path = tmp_path / "drawn.toml"
-    text = 'title = ""\nduration = "2 s"\nvehicle = "stiffened"\n[initial]\naltitude = "85500 ft"\n'
+    text = 'title = "by its name"\nduration = "2 s"\nvehicle = "stiffened"\n[initial]\naltitude = "85500 ft"\n'
     path.write_text(text + 'velocity = "7900 ft/s"\n')
     campaign = plan(str(path), samples=2)
     sample = [factor.high for factor in campaign.factors]

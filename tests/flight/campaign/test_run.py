@@ -15,7 +15,7 @@ from hsv.base.errors import CampaignError
 from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import capacity, run_campaign
 from hsv.flight.campaign.sample_runner import SampleRunner, fly_batch
-from hsv.flight.campaign.store import ResultStore, read_result
+from hsv.flight.campaign.store import ResultStore, read_result, result_digest
 from hsv.flight.campaign.summary import Results
 from hsv.flight.campaign.table import CAMPAIGN, DIGEST
 
@@ -204,10 +204,10 @@ def rewritten(path, campaign=None, without=()):
     """Write a result file again as another version might have."""
     table = parquet.read_table(path)
     metadata = {key: value for key, value in parquet.read_metadata(path).metadata.items() if key.startswith(b"hsv.")}
-    del metadata[DIGEST]  # as a version had it that made none
     if campaign:
         metadata[CAMPAIGN] = json.dumps(json.loads(metadata[CAMPAIGN]) | campaign).encode()
     metadata = {key: value for key, value in metadata.items() if key.decode() not in without}
+    metadata[DIGEST] = result_digest(metadata)
     kept = [name for name in table.column_names if name not in without]
     parquet.write_table(table.select(kept).replace_schema_metadata(metadata), path)
 

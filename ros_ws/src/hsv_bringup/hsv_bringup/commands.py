@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from math import isclose
 
 from hsv_msgs.msg import Actuator, Fault, Reference
 from hsv_msgs.srv import ClearFault, InjectFault, SetCommand
@@ -94,20 +95,30 @@ def _command(client: GraphClient, options: argparse.Namespace) -> None:
         raise ParameterError(response.message)
     time, values = acting_from(run, response.step)
 
-    def planned() -> list[Reference]:
-        """Return what has been published since this plan was announced."""
-        announced = [(m.status, m.step) == (Reference.PLANNING, response.step) for m in published]
-        return published[len(published) - announced[::-1].index(True) :] if any(announced) else []
+    rejected = f"rejected {response.message}: "
 
-    client.wait_for(lambda: planned() or not client.count_publishers(topic), f"the plan ({topic})", for_ever=True)
-    if not planned():
+    def reasons() -> list[str]:
+        return [log.msg.removeprefix(rejected) for log in logged if log.msg.startswith(rejected)]
+
+    def plans() -> list[Reference]:
+        """Return the references that lead to this point; a rejected command may have had the same step."""
+        return [
+            m
+            for m in published
+            if (m.status, m.step) == (Reference.FLOWN, response.step)
+            and isclose(m.altitudes[-1], options.altitude)
+            and isclose(m.velocities[-1], options.velocity)
+        ]
+
+    def known() -> bool:
+        return bool(plans() or reasons()) or not client.count_publishers(topic)
+
+    client.wait_for(known, f"the plan ({topic})", for_ever=True)
+    if reasons() and not plans():
+        raise ParameterError(reasons()[-1])
+    if not plans():
         raise RunError("the flight has ended before the plan was known")
-    reference = planned()[0]
-    if reference.status == Reference.REJECTED:
-        rejected = f"rejected {response.message}: "
-        client.wait_for(lambda: any(log.msg.startswith(rejected) for log in logged), f"the reason ({ROSOUT})")
-        reasons = [log.msg.removeprefix(rejected) for log in logged if log.msg.startswith(rejected)]
-        raise ParameterError(reasons[-1] if reasons else f"{rejected}the log of the node has the reason")
+    reference = plans()[-1]
     end = reference.times[-1] + reference.blends[-1]
     message = f"{response.message}, at rest at {end:.2f} s"
     answer(f"{message}, {time}", {"message": message, **values, "end_s": round(end, 9)}, options.json)

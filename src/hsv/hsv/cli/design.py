@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     import numpy as np
     from rich.table import Table
 
-    from hsv.control.checks import Check
+    from hsv.control.checks import Check, Subject
     from hsv.control.design import ControlDesign
     from hsv.control.linear_model import LinearModel
     from hsv.design.compare import Row
@@ -218,6 +218,7 @@ def design(
 
     Example: hsv design baseline; hsv design adjustable --tau 0.8 --out softer.yaml; hsv design baseline --check
     """
+    from hsv.control.checks import load_subject
     from hsv.control.design import certificate_path, write_certificate, write_design
     from hsv.design.adjustable import design_adjustable
     from hsv.design.baseline import design_baseline
@@ -235,13 +236,14 @@ def design(
     if check and (out or force or tau or compare_sets):
         raise ParameterError("check: --out, --force, --tau or --compare-sets given, expected --check alone")
     target = out or Path(f"{source.stem}.yaml")
-    if not check:
-        for path in (target, certificate_path(target)):
-            check_new(path, "out", force)
+    # Before the minutes that a design takes.
+    shipped = load_subject(source.with_suffix(".yaml")) if check else None
+    for path in () if check else (target, certificate_path(target)):
+        check_new(path, "out", force)
     with stages() as progress:
         result = (design_adjustable if inputs.adjustable else design_baseline)(inputs, progress)
-    if check:
-        _check(source, result.design, json)
+    if shipped:
+        _check(shipped, result.design, json)
         return
     command = f"hsv design {name}" + (f" --tau {tau}" if tau else "")
     with writing(target, "out"):
@@ -281,11 +283,10 @@ def _compared(design: ControlDesign, report: dict[str, Any], inputs: DesignInput
     return compare_sets(design, tube_problem(design, inputs.flown_vehicle, disturbance), inputs.invariant_set)
 
 
-def _check(source: Path, found: ControlDesign, json: bool) -> None:
-    from hsv.control.checks import load_subject
+def _check(shipped: Subject, found: ControlDesign, json: bool) -> None:
     from hsv.design.agreement import deviations
 
-    deviating = deviations(found, load_subject(source.with_suffix(".yaml")))
+    deviating = deviations(found, shipped)
     worst = max(deviating, key=lambda deviation: deviation.scaled)
     if json:
         print_json({"deviations": [vars(deviation) for deviation in deviating], "ok": worst.ok})

@@ -126,10 +126,10 @@ class Vehicle:
             raise QuantityError(f"coupling_sets.names = {[*self.couplings]}: expected one called {DERIVED!r}")
         for name, (psi_1, psi_2) in self.couplings.items():
             # Bessel's inequality for the rotation and orthogonal modes of unit generalised mass.
-            if psi_1**2 + psi_2**2 > p.moment_of_inertia:
+            if psi_1 * psi_1 + psi_2 * psi_2 > p.moment_of_inertia:
                 raise QuantityError(
-                    f"inertial_coupling.{name} = {psi_1:.6g}, {psi_2:.6g} kg^0.5 m: expected a root sum square of at "
-                    f"most {math.sqrt(p.moment_of_inertia):.6g} kg^0.5 m, the square root of the moment of inertia"
+                    f"inertial_coupling.{name} = {psi_1:.6g}, {psi_2:.6g} kg^0.5 m: expected squares whose "
+                    f"sum is at most {p.moment_of_inertia:.6g} kg m^2, the moment of inertia"
                 )
         for name, bound in self.uncertainty.items():
             if name not in COEFFICIENT_UNITS:
