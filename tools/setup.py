@@ -63,10 +63,8 @@ def missing(route: str, env: dict[str, str]) -> dict[str, str]:
     if version not in ("3.11", "3.12"):
         return {f"Python 3.11 or 3.12 (this is {version}; make setup PYTHON=/path/to/python3 names another)": "python3"}
     found = {}
-    if re.search(r"""[\s:;"'$\\]""", str(ROOT)):
-        found[f"a path without blanks and : ; \" ' $ \\, for colcon ({ROOT})"] = ""
-    if not str(ROOT).isascii():
-        found[f"a path of ASCII letters, for CMake ({ROOT})"] = ""
+    if re.search(r"""[\s:;"'$\\]""", str(ROOT)) or not str(ROOT).isascii():
+        found[f"a path of ASCII letters, without blanks and : ; \" ' $ \\, for colcon and CMake ({ROOT})"] = ""
     if route == "wheels" and platform.machine() != "x86_64":
         found[f"x86_64, for the ROS 2 wheels (this is {platform.machine()}; source a ROS 2 Jazzy first)"] = ""
     if route == "jazzy" and not (find_spec("rclpy") and find_spec("colcon_core")):

@@ -37,8 +37,8 @@ def test_everything_missing_is_named_at_once(tmp_path, monkeypatch):
     monkeypatch.setattr(setup.platform, "machine", lambda: "aarch64")
     found = setup.missing("wheels", {"PATH": str(tmp_path)})
     for text in (
-        "a path without blanks",
-        "a path of ASCII letters, for CMake (/srv/a ü)",
+        "a path of ASCII letters, without blanks",
+        "for colcon and CMake (/srv/a ü)",
         "this is aarch64",
         "a compiler (gcc)",
         "a compiler (g++)",

@@ -7,8 +7,7 @@
  * of the two end positions. An ideal actuator reaches its command at once.
  *
  * Order of effects: dynamics with the limits after faults; scale, bias, drift and oscillation of the effector; faults
- * that replace its position, of which the last in the list prevails; the stops.
- */
+ * that replace its position, of which the last in the list prevails; the stops. */
 #pragma once
 #include "faults.h"
 

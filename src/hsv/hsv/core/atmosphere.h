@@ -7,8 +7,7 @@
  *
  * Both filters are discretised exactly over the distance flown in a period and are stationary from the first step. The
  * density varies as a Gauss-Markov process along the path. A gust has the (1 - cos) shape of MIL-F-8785C and CS-25.341;
- * its mean over a period is computed in closed form. Speed of sound: US Standard Atmosphere 1976.
- */
+ * its mean over a period is computed in closed form. Speed of sound: US Standard Atmosphere 1976. */
 #pragma once
 #include "noise.h"
 #include "vehicle.h"

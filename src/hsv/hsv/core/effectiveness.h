@@ -11,8 +11,7 @@
  * noise. Every step gives an interval for P. An interval without P = 1 indicates a fault. Two hypotheses are then
  * tracked, each as the intersection of the intervals of the steps: a loss of effectiveness (y - d proportional to e)
  * and an offset (y - d - e constant). While a loss explains all steps, the command is divided by the middle of its
- * interval.
- */
+ * interval. */
 #pragma once
 #include "vehicle.h"
 

@@ -6,8 +6,7 @@
  * sine_cosine and exponential accept a complex argument with an imaginary part whose square is negligible, for the
  * complex step. sine_cosine, exponential and arctangent2 accept vectors of lanes.
  *
- * Sources: argument reduction after Cody and Waite; rounding errors after Dekker (1971) and Knuth; power series.
- */
+ * Sources: argument reduction after Cody and Waite; rounding errors after Dekker (1971) and Knuth; power series. */
 #pragma once
 #include "real.h"
 

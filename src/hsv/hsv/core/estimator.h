@@ -4,8 +4,7 @@
  *
  * with phi_T the flow of the design's vehicle over a period, b an offset of each input that compensates model errors,
  * and L the steady-state gain at the initial trim of the flight (hsv.control.estimator). The filter uses the
- * measurement y of the rigid states; elastic states are predicted.
- */
+ * measurement y of the rigid states; elastic states are predicted. */
 #pragma once
 #include "vehicle.h"
 

@@ -5,8 +5,7 @@
  *
  * Faults of the command: loss of effectiveness (paper eq. 14, eq. 15), reversal, delay, dead zone, backlash. Faults of
  * the engine: loss of thrust, unstarted inlet. Faults of actuators and effectors are in actuators.h, of sensors in
- * sensors.h.
- */
+ * sensors.h. */
 #pragma once
 #include "noise.h"
 

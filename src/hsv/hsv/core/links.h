@@ -2,8 +2,7 @@
  *
  * The receiver uses the last payload that arrived. Losses follow a two-state Gilbert channel (Gilbert 1960). Corruption
  * flips one bit of one number. The receiver detects it by a checksum, or if the number is not finite or exceeds
- * LARGEST; the payload is then lost.
- */
+ * LARGEST; the payload is then lost. */
 #pragma once
 #include "noise.h"
 

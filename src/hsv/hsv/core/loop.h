@@ -11,8 +11,7 @@
  *   actuator(k)       u(k) after link and faults of the command (loss of effectiveness: eq. 14, eq. 15)
  *   x(k+1)            state of the plant with actuator(k) held over [k T, (k+1) T)
  *
- * x_n(0) = y(0) - x_r(0). A flight ends when its state leaves the range of the model.
- */
+ * x_n(0) = y(0) - x_r(0). A flight ends when its state leaves the range of the model. */
 #pragma once
 #include "effectiveness.h"
 #include "estimator.h"

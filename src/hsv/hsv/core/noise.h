@@ -5,8 +5,7 @@
  * on the order in which steps, blocks and flights are computed. numpy's Philox(counter=c, key=k) begins with the block
  * of c + 1. Normal numbers follow Box and Muller (1958).
  *
- * Each stream belongs to one channel of one block: adding a block to a flight does not change the noise of others.
- */
+ * Each stream belongs to one channel of one block: adding a block to a flight does not change the noise of others. */
 #pragma once
 #include "elementary.h"
 

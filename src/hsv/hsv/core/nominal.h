@@ -7,8 +7,7 @@
  * The weights w_i are the tau_i of eq. 11; the design provides K_g and P_g = Q^-1 (eq. 32 to eq. 35). d_r is the defect
  * of the reference (hsv.control.reference_trajectory), p the measured altitude and velocity, clamped to the envelope.
  * Interpolated gains make u_n continuous: K = a K_g + (1 - a) K_(g+1) with x_n' (a P_g + (1 - a) P_(g+1)) x_n = 1 (Wan
- * and Kothare, Automatica 39, 2003).
- */
+ * and Kothare, Automatica 39, 2003). */
 #pragma once
 #include "real.h"
 

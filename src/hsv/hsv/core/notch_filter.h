@@ -3,8 +3,7 @@
  *   q_f(k) = C s(k) + D q(k),   s(k+1) = A s(k) + B q(k),
  *
  * discretised by the bilinear rule with prewarping (hsv.control.notch_filter). The filter starts in the equilibrium for
- * its first input, s(0) = G q(0).
- */
+ * its first input, s(0) = G q(0). */
 #pragma once
 #include "real.h"
 

@@ -2,8 +2,7 @@
  *
  * Equipment is computed lane by lane in double precision; the equations of motion advance all lanes at once. With ideal
  * actuators, without delay and without an acting fault of actuator or effector, the effectors follow the command within
- * the stops. Otherwise actuators and vehicle move on the substeps of the actuators.
- */
+ * the stops. Otherwise actuators and vehicle move on the substeps of the actuators. */
 #pragma once
 #include "vehicle.h"
 

@@ -10,8 +10,7 @@
  * have no ?:, && and !; choose, & and opposite replace them, and every reduces a mask to a single truth value.
  *
  * Results are the same to the bit on every processor: the core uses only additions, subtractions, multiplications,
- * divisions and square roots of IEEE 754, in the order written, without fused operations (-ffp-contract=off).
- */
+ * divisions and square roots of IEEE 754, in the order written, without fused operations (-ffp-contract=off). */
 #pragma once
 #include "core.h"
 

@@ -4,8 +4,7 @@
  *
  * with scale factor s, lag, bias b (constant, Gauss-Markov drift and random walk), white noise n, latency in samples,
  * hold of the last sample after a drop-out, quantisation, range and faults. An ideal sensor returns its state to the
- * bit. In step 0 lags are in equilibrium and queues contain the first sample.
- */
+ * bit. In step 0 lags are in equilibrium and queues contain the first sample. */
 #pragma once
 #include "faults.h"
 #include "vehicle.h"

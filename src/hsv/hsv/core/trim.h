@@ -1,8 +1,7 @@
 /* Trims (paper eq. 5), rows of the reference, and the steady-state gain of the estimator.
  *
  * They are computed before a flight, but the flight depends on their last bits. LAPACK is not used because the order of
- * its sums depends on the processor.
- */
+ * its sums depends on the processor. */
 #pragma once
 #include "estimator.h"
 #include "vehicle.h"
@@ -41,8 +40,7 @@ void hsv_solve(int64_t n, int64_t m, double *A, double *b)
  * (3): angle of attack, equivalence ratio and elevator. "unknown" contains the initial guess and then the best
  * solution. theta is alpha plus the path angle (rad); the pitch rate (rad/s) is that of a steady pull-up. The elastic
  * coordinates are N_i / omega_i^2: at trim the pitching moment is zero, so that inertial coupling has no effect.
- * "rigid" has no coupling.
- */
+ * "rigid" has no coupling. */
 double hsv_balance(const hsv_vehicle *rigid, double path_angle, double acceleration, double pitch_rate, double *unknown,
                    double *x, double *u)
 {

@@ -8,8 +8,7 @@
  * (effectiveness.h).
  *
  * Robust MPC, the comparison in the paper (section 5.2), has a nominal gain K in place of F and no x_n and u_n
- * ("planned" is 0).
- */
+ * ("planned" is 0). */
 #pragma once
 #include "notch_filter.h"
 
@@ -31,8 +30,7 @@ static inline int64_t active_gain(const hsv_tube *tube, int64_t k)
  * The notch filter of the plan starts from the state s of the filter in the loop, which is exact for x = x_r + x_n. It
  * is stepped if the loop has a notch filter and the law or the monitor needs it. The integral is frozen while an input
  * is saturated. If the sum is not finite, the input of the reference is used, so that the actuators always receive a
- * number.
- */
+ * number. */
 static inline void tube_step(const hsv_tube *tube, TubeMemory *memory, const real *gain, real effectiveness, int64_t k,
                              int monitored, int64_t filter_states, const real *x, real q_f, const real *x_r,
                              const real *u_r, const real *x_n, const real *u_n, const real *s, real *u_feedback,

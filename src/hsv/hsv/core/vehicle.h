@@ -18,8 +18,7 @@
  *
  * State x: altitude h (m), velocity V (m/s), angle of attack alpha (rad), pitch angle theta (rad), pitch rate q
  * (rad/s), eta_1 (kg^0.5 m) and its rate, eta_2 and its rate. Input u: equivalence ratio phi (1), elevator delta_e
- * (rad). V and alpha are inertial; moving air acts through the conditions, see forces_in.
- */
+ * (rad). V and alpha are inertial; moving air acts through the conditions, see forces_in. */
 #pragma once
 #include "elementary.h"
 
