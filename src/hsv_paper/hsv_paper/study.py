@@ -31,13 +31,13 @@ Made by `hsv-paper {command} --out docs/study`, including all numbers.
 class Scope:
     """How fine a study is (coarseness 1: as in the docs), where its flights are kept, and whom to tell of progress.
 
-    ``beside``: scenarios whose controllers are flown in addition.
+    ``additional``: scenarios whose controllers are flown, too.
     """
 
     coarseness: float
     folder: Path
     progress: Progress = lambda what, done, total: None
-    beside: Sequence[str] = ()
+    additional: Sequence[str] = ()
 
     @cached_property
     def flights(self) -> Flights:

@@ -75,7 +75,7 @@ def run_nodes(
         executor = executor_class()
         for node in build():
             nodes.append(node)
-            node.beside = nodes
+            node.process_nodes = nodes
             executor.add_node(node)
         # What was imported and built stays: the collector need not look through it again in flight.
         gc.collect()

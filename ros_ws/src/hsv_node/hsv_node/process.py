@@ -33,7 +33,7 @@ class ProcessNode(Node):
         super().__init__(name, namespace=namespace, **options)
         self.exit_code: int | None = None
         """Exit code of the process, once the node is to end."""
-        self.beside: list[ProcessNode] = [self]
+        self.process_nodes: list[ProcessNode] = [self]
         """The nodes of this process."""
         self._claims: list[socket.socket] = []
 

@@ -281,7 +281,7 @@ class PlantNode(LockstepNode):
 
     def _elsewhere(self) -> list[NodeDescription]:
         """Return the peers in other processes."""
-        here = {node.get_fully_qualified_name() for node in self.beside}
+        here = {node.get_fully_qualified_name() for node in self.process_nodes}
         return [peer for peer in self._peers if self.node_in_role(peer) not in here]
 
     def _land(self) -> None:

@@ -60,13 +60,13 @@ ExternalOption = Annotated[bool, Option("--external", help="Wait for a controlle
 NamespaceOption = Annotated[str, Option(help="ROS namespace of all nodes and topics, such as /veh1.")]
 PausedOption = Annotated[bool, Option("--paused", help="Start paused; hsv set paused false resumes.")]
 ReportOption = Annotated[bool, Option(help="Write the report into the bag's folder.")]
-StrictOption = Annotated[bool, Option("--strict", help="Exit code 1 if a limit of the scenario is not kept.")]
-AllOption = Annotated[bool, Option("--all", help="Say which metrics the scenario does not limit, too.")]
+StrictOption = Annotated[bool, Option("--strict", help="Exit code 1 if a limit of the scenario is violated.")]
+AllOption = Annotated[bool, Option("--all", help="Also list the metrics that the scenario does not limit.")]
 WorkersOption = Annotated[int, Option(help="Processes on this machine; 0: one per processor, 1: this process.")]
 SchedulerOption = Annotated[str, Option(help="Address of a Dask scheduler whose workers are used instead.")]
 ResultArgument = Annotated[Path, Argument(help="Result file of a campaign (.parquet).")]
 FlightOption = Annotated[int, Option("--flight", help="Number of the flight.")]
-PageOption = Annotated[bool, Option(help="Write the page of the results beside them.")]
+PageOption = Annotated[bool, Option(help="Write a page next to the results.")]
 
 
 def run(

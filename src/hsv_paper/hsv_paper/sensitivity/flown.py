@@ -214,7 +214,7 @@ def others_with_elevator_fault(scenarios: Sequence[str]) -> list[Controller]:
 
 def fault(scope: Scope) -> Outcome:
     """Fly every controller, and those of further scenarios, with an elevator effectiveness from 1 down to 0.3."""
-    others = others_with_elevator_fault(scope.beside)
+    others = others_with_elevator_fault(scope.additional)
     shares = scope.grid(0.3, 1.0, 0.025)
 
     def point(controller: Controller, left: float) -> Point:
