@@ -1,37 +1,13 @@
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
+from ran import Ran
 
 from hsv.cli.entry import COMMANDS, DESCRIPTION, MOVED
 from hsv.cli.main import run as run_command_line
-
-
-@dataclass
-class Ran:
-    """A command that has ended: what it printed and its exit code."""
-
-    out: str
-    err: str
-    code: int
-
-    @property
-    def json(self) -> Any:
-        return json.loads(self.out)
-
-    @property
-    def error(self) -> str:
-        """The one line of an error; nothing else may have been printed."""
-        assert self.err.startswith("hsv: error: "), self.err
-        assert self.err.endswith("\n")
-        lines = self.err.splitlines()
-        assert len(lines) == 1, self.err
-        return lines[0].removeprefix("hsv: error: ")
 
 
 @pytest.fixture

@@ -162,17 +162,17 @@ WRONG = [
     ),
     (
         "[link.measurement]\nburst = 3",
-        "link.measurement.burst: has no effect, expected link.measurement.loss beside it",
+        "link.measurement.burst: has no effect without link.measurement.loss, expected both",
     ),
     (
         "[link.command]\nchecksum = true",
-        "link.command.checksum: has no effect, expected link.command.corruption beside",
+        "link.command.checksum: has no effect without link.command.corruption",
     ),
     (
         '[estimator.noise]\naltitude = "1 ft"',
-        "estimator.noise.altitude: has no effect, expected estimator.enabled beside",
+        "estimator.noise.altitude: has no effect without estimator.enabled",
     ),
-    ('[effectiveness]\ntime = "2 s"', "effectiveness.time: has no effect, expected effectiveness.enabled beside it"),
+    ('[effectiveness]\ntime = "2 s"', "effectiveness.time: has no effect without effectiveness.enabled, expected both"),
     (PITCH_RATE + 'drift_time = "1 s"', "sensors.pitch_rate.drift_time: expected with a drift_sigma only"),
     (PITCH_RATE + 'drift_sigma = "1 deg/s"', "sensors.pitch_rate.drift_sigma: expected with a drift_time only"),
     (PITCH_RATE + "noise = []", "sensors.pitch_rate.noise = []: expected one value at least"),

@@ -214,7 +214,7 @@ def test_the_result_of_a_campaign(fuzz: Fuzz, campaign: Results, tmp_path: Path)
 
 
 def test_no_flipped_bit_of_a_campaign_passes_as_another_result(campaign: Results, tmp_path: Path) -> None:
-    """What is read is what was flown, or it is refused."""
+    """A reader returns the recorded flight or refuses the file."""
     from random import Random
 
     path, data = tmp_path / "mine.parquet", campaign.path.read_bytes()

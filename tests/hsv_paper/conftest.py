@@ -1,34 +1,12 @@
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
+from ran import Ran
 
 from hsv_paper.cli import main
-
-
-@dataclass
-class Ran:
-    """A command that has ended: what it printed and its exit code."""
-
-    out: str
-    err: str
-    code: int
-
-    @property
-    def json(self) -> Any:
-        return json.loads(self.out)
-
-    @property
-    def error(self) -> str:
-        """The one line of an error; nothing else may have been printed."""
-        (line,) = self.err.splitlines()
-        assert line.startswith("hsv: error: ")
-        return line.removeprefix("hsv: error: ")
 
 
 @pytest.fixture

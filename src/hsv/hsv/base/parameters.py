@@ -171,7 +171,7 @@ def table_values(
     values = _flat_values(known, tables, read)
     for name in values:
         if (needed := known[name].needs) and needed not in values:
-            raise ParameterError(f"{name}: has no effect, expected {needed} beside it")
+            raise ParameterError(f"{name}: has no effect without {needed}, expected both")
     return values
 
 

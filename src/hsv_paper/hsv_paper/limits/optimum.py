@@ -230,7 +230,7 @@ class _Local:
         return sparse.csc_matrix((blocks[upper], (i[upper], j[upper])), (self._size, self._size))
 
     def _bound(self, scale: np.ndarray) -> None:
-        """Write what is given and what is bounded as rows of the unknowns: z - slope ds within its room."""
+        """Write the equations and the bounds of the problem as rows of the unknowns: lower <= z - slope ds <= upper."""
         problem, point, n = self._problem, self._point, len(self._point.input)
         sizes = np.concatenate((np.tile(STATE_SCALE, n), np.tile(INPUT_SCALE, n), [1.0]))
         value = np.concatenate((point.state[1:].ravel(), point.input.ravel(), [point.scalar]))

@@ -31,7 +31,7 @@ MARGIN = np.array([100.0, 10.0])
 """Altitude (m) and velocity (m/s)."""
 
 GRID_ERROR = 5e-4
-"""More than the largest rate between the points of the grid can exceed that at them, of itself: from its curvature."""
+"""Relative margin for the rate between grid points: its curvature lets it exceed the largest rate at them by less."""
 
 LONGEST = 60.0
 """Upper bound of the time (s)."""
