@@ -29,7 +29,7 @@ COMPOSED = ("--composed",)
         long("fault", APART, "plant", "/hsv/actuator: active[0]: fault.type = 'stuk': expected one of "),
         long(
             *("value", APART, "plant"),
-            "/hsv/actuator: active[0]: fault.parameter_values: 0 values, expected one a name, 1",
+            "/hsv/actuator: active[0]: fault.parameter_values: 0 values, expected 1, one for each name",
         ),
         long("estimate", APART, "tube_mpc", "/hsv/filtered_state: estimate: 1 numbers, expected 9, or none"),
         long("estimate", COMPOSED, "tube_mpc", "/hsv/filtered_state: estimate: 1 numbers, expected 9, or none"),

@@ -37,8 +37,7 @@ def main(how: str, step: int) -> None:
         if measured.step >= step:
             # Of another time than the step: that of a flight is not to become it.
             message.step = measured.step
-            data = serialize_message(message)
-            publishers[0].publish(data[:-8] if topic.endswith(how) else data)
+            publishers[0].publish(serialize_message(message)[:-8] if topic.endswith(how) else message)
 
     node.create_subscription(Measurement, "hsv/measurement", disturb, deep)
     rclpy.spin(node)

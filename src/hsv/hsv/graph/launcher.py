@@ -290,13 +290,15 @@ def _environment() -> dict[str, str]:
 
 
 def _ending(process: _Process, code: int) -> str:
-    """Return how a process ended, with the last error that it has printed."""
+    """Return how a process ended, with the error that ended it, or else the last that it has printed."""
     if process.reader:
         process.reader.join(1.0)
     if code < 0:
         return f"was killed by {signal.Signals(-code).name}"
-    said = next((word for word in reversed(process.words) if "[INFO]" not in word), "") if code < 128 else ""
-    return f"ended with exit code {code}{': ' if said else ''}{said}"
+    errors = [line for line in process.words if "[INFO]" not in line] if code < 128 else []
+    # Other nodes of a composed graph can report errors after the one that ends the process.
+    fatal = [line for line in errors if "[FATAL]" in line]
+    return f"ended with exit code {code}" + "".join(f": {line}" for line in (fatal or errors)[-1:])
 
 
 def _landed(process: _Process, code: int) -> bool:
