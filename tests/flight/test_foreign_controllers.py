@@ -125,6 +125,11 @@ def test_answers_are_limited_and_the_limits_are_told(monkeypatch):
     assert flown.data().saturated[20].all() and not flown.data().saturated[19].any()
 
 
+def test_a_flight_has_the_wall_times_of_a_law_in_python_step_by_step():
+    assert {name: len(times) for name, times in fly(flight()).law_times.items()} == {"controller": 201}
+    assert not fly(flight("CompiledLeaky")).law_times
+
+
 def test_settings_reach_the_controller_in_si_units():
     scenario = parse_scenario(
         SCENARIO.format(

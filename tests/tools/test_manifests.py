@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,13 +12,16 @@ import pytest
 import yaml
 from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import parse_package
+from packaging.specifiers import SpecifierSet
 
 import hsv
 
 ROOT = Path(__file__).parents[2]
 MANIFESTS = sorted([*ROOT.glob("src/*/package.xml"), *ROOT.glob("ros_ws/src/*/package.xml")])
-KEYS = {name: f"python3-{name}" for name in ("cffi", "jinja2", "matplotlib", "numpy", "pydantic", "rich", "scipy")}
-KEYS |= {"typer": "python3-typer", "yaml": "python3-yaml"}
+DISTRIBUTION = {"cffi": "1.16.0", "jinja2": "3.1.2", "numpy": "1.26.4", "rich": "13.7.1", "yaml": "6.0.1"}
+"""Versions of Ubuntu 24.04 by imported module; a module that is too old there has no rosdep key in the manifests."""
+
+KEYS = {name: f"python3-{name}" for name in DISTRIBUTION}
 """By imported module: its key in rosdep."""
 
 WITHOUT_KEY = {
@@ -28,13 +32,15 @@ WITHOUT_KEY = {
     "foxglove",
     "lz4",
     "markupsafe",
+    "matplotlib",
     "mcap",
     "pandas",
     "pint",
     "piqp",
     "pyarrow",
+    "pydantic",
 }
-WITHOUT_KEY |= {"rosbags", "tomli_w", "websockets", "zstandard"}
+WITHOUT_KEY |= {"rosbags", "scipy", "tomli_w", "typer", "websockets", "zstandard"}
 """Modules of notebooks, or for which rosdep has no key of a Debian package that will do; see docs/installation.md."""
 
 
@@ -81,6 +87,12 @@ def test_a_package_has_a_changelog_of_its_name(manifest: Path) -> None:
     changelog = get_changelog_from_path(str(manifest.parent / "CHANGELOG.rst"))
     versions = [version for version, _, _ in changelog.foreach_version()]
     assert versions and all(changelog.get_content_of_version(version) for version in versions)
+
+
+@pytest.mark.parametrize(("module", "version"), DISTRIBUTION.items())
+def test_a_key_stands_for_a_version_that_suffices(module: str, version: str) -> None:
+    bounds = re.findall(rf'"({module.replace("yaml", "pyyaml")})([<>=][^"]*)"', (ROOT / "src/hsv/setup.py").read_text())
+    assert [name for name, bound in bounds if SpecifierSet(bound).contains(version)]
 
 
 def test_modules_without_a_key_are_named_in_the_documentation() -> None:

@@ -17,8 +17,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from hsv import __all__ as __all__
 from hsv.base.units import UnitSystem, unit_system
-from hsv.control.linear_model import LinearModel, linearise
+from hsv.control.linear_model import LinearModel as LinearModel
+from hsv.control.linear_model import linearise as linearise
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly as fly_components
 from hsv.flight.flight import Flight
@@ -31,21 +33,6 @@ from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
-
-__all__ = [
-    "Flight",
-    "LinearModel",
-    "Scenario",
-    "Trim",
-    "compare",
-    "fly",
-    "linearise",
-    "load",
-    "montecarlo",
-    "plot",
-    "sweep",
-    "trim",
-]
 
 
 def fly(scenario: Scenario | str) -> Flight:

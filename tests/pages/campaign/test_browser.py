@@ -80,7 +80,7 @@ def test_the_address_says_what_is_shown_and_shows_it(opened):
     opened.settle()
     shown, address = opened.run(what), opened.driver.current_url
     assert shown[0] == "paper" and shown[1] == plain[1] - 2 and shown[2] == [1, 2]
-    assert shown[3] == "velocity error at the end [ft/s]" and shown[4] > 0
+    assert shown[3] == "velocity end error [ft/s]" and shown[4] > 0
     opened.driver.get("about:blank")
     opened.driver.get(address)
     opened.settle()

@@ -60,10 +60,8 @@ def test_verdict_limits_and_metrics_are_those_of_the_run(quiet):
     assert over, "20 s are too short to reach the end error that is asked for"
     assert f"✗ {over} of {len(run.scenario.limits)} limits not kept" in seen
     for name in run.metrics:
-        assert METRICS[name].words in seen and METRICS[name].meaning in seen
+        assert name.replace("_", " ") in seen and METRICS[name].meaning in seen
     assert seen.count("✓ within ") + seen.count("✗ over ") == len(run.scenario.limits)
-    names = {name.replace("_", " ") for name in METRICS} - {metric.words for metric in METRICS.values()}
-    assert names and not [name for name in names if name in seen]
 
 
 def test_metrics_are_grouped_as_people_read_them(page):
@@ -77,14 +75,14 @@ def test_the_verdict_has_its_numbers_in_the_units_shown(quiet):
     metric, paper = (
         re.search(rf'<span class="{units}">([^<]+)</span>', sentence([run]))[1] for units in ("metric", "paper")
     )
-    value = re.compile(r"altitude error at the end (\S+) (m|ft) \(limit")
+    value = re.compile(r"altitude end error (\S+) (m|ft) \(limit")
     (metres, m), (feet, ft) = (value.search(said).groups() for said in (metric, paper))
     assert (m, ft) == ("m", "ft") and float(metres) == pytest.approx(0.3048 * float(feet), rel=0.01)
     assert float(metres) == pytest.approx(run.metrics["altitude_end_error"], rel=0.01)
 
 
 def test_all_systems_of_units_are_there(page):
-    (run, *_) = re.findall(r"<tr[^>]*>\s*<th scope=\"row\">altitude error at the end.*?</tr>", page, re.DOTALL)
+    (run, *_) = re.findall(r"<tr[^>]*>\s*<th scope=\"row\">altitude end error.*?</tr>", page, re.DOTALL)
     cells = re.findall(r'<span class="metric si">([^&]*)&nbsp;m</span><span class="paper">([^&]*)&nbsp;ft</span>', run)
     assert len(cells) >= 2
     for si, paper in cells:
@@ -157,8 +155,8 @@ def test_metrics_that_differ_are_marked_with_their_difference(page, quiet, loud)
     first, second = (run.metrics for run in reported_runs([quiet, loud]))
     rows = re.findall(r'<tr( class=differs)?>\s*<th scope="row">([^<]+)<small>(.*?)</tr>', page, re.DOTALL)
     marked = {html.unescape(name) for mark, name, _ in rows if mark}
-    assert marked == {METRICS[name].words for name in first if first[name] != second.get(name)}
-    (cells,) = [cells for _, name, cells in rows if name == "altitude error, integral"]
+    assert marked == {name.replace("_", " ") for name in first if first[name] != second.get(name)}
+    (cells,) = [cells for _, name, cells in rows if name == "altitude integral absolute error"]
     shown = float(re.search(r'difference <span class="metric si">([^&]*)', cells)[1].replace("−", "-"))
     name = "altitude_integral_absolute_error"
     assert shown == pytest.approx(second[name] - first[name], rel=5e-3)

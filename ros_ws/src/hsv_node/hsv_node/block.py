@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
 from hsv_msgs.msg import Run
 
 from hsv.bags.description import TOPIC_OF, NodeDescription
 from hsv.bags.messages import StepMessages
 from hsv.base.errors import RunError, SignalError
 from hsv.flight.blocks import Signals
+from hsv.flight.flight import step_statistics
 from hsv_node.lockstep import PeerNode
 
 
@@ -85,9 +85,7 @@ class BlockNode(PeerNode):
 
     def diagnose(self, signals: Signals, summary: str = "running", warning: bool = False, **values: object) -> None:
         """Publish this node's diagnostics with the wall times of the steps of its component so far, in ms."""
-        median, p99, largest = 1e3 * np.percentile(self._step_times, (50.0, 99.0, 100.0))
-        times = {"median": median, "p99": p99, "max": largest}
-        measured = {f"step_time_{name}_ms": f"{value:.3f}" for name, value in times.items()}
+        measured = {f"step_time_{name}": f"{value:.3f}" for name, value in step_statistics(self._step_times).items()}
         super().diagnose(signals, summary, warning, **values, **measured)
 
     def _due(self, step: int) -> Sequence[str]:

@@ -204,15 +204,6 @@ def _step_times(bag: Bag) -> dict[str, Any] | None:
     return {"period_ms": period, "nodes": nodes} if nodes and period else None
 
 
-def step_times_in_words(step_times: dict[str, Any]) -> str:
-    """Return the wall times of the control law on one line."""
-    nodes = [
-        f"{name} {times['median_ms']:.3g} ms in the median, 99 % {times['p99_ms']:.3g}, largest {times['max_ms']:.3g}"
-        for name, times in step_times["nodes"].items()
-    ]
-    return "; ".join([*nodes, f"a period has {step_times['period_ms']:g} ms"])
-
-
 def _saturation(bag: Bag) -> dict[str, Any]:
     saturated = bag.columns(COMMAND)["saturated"]
     return {

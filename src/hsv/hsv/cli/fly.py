@@ -99,18 +99,9 @@ def run(
     from hsv.graph.preparation import RunOptions, prepare
 
     namespace = checked_namespace(namespace)
-    prepared = prepare(
-        scenario,
-        RunOptions(
-            real_time_factor=real_time_factor,
-            step_timeout=step_timeout,
-            composed=composed,
-            external=external,
-            live_port=_live_port(live, live_port),
-            paused=paused,
-        ),
-        bag=bag,
-    )
+    port = _live_port(live, live_port)
+    options = RunOptions(real_time_factor, step_timeout, composed, external, port, paused)
+    prepared = prepare(scenario, options, bag=bag)
     clock: dict[str, float] = {}
 
     def line(node: str, text: str) -> None:
@@ -153,6 +144,7 @@ def simulate(
     from hsv.control.design import digest, find_design, read_design
     from hsv.flight.assembly import assemble_flight, blamed_on, uncovered_of
     from hsv.flight.closed_loop import fly
+    from hsv.flight.flight import step_statistics
     from hsv.flight.metrics import flight_metrics
     from hsv.flight.scenario import load_scenario
     from hsv.model.plant import FlightStatus
@@ -179,6 +171,11 @@ def simulate(
         simulated_time=float(flight.time[-1]),
         wall_time=wall_time,
         not_covered=uncovered_of(loaded, design),
+        step_times={
+            "period_ms": 1e3 * flight.period,
+            "nodes": {name: step_statistics(times) for name, times in flight.law_times.items()},
+            "loop_mean_ms": 1e3 * wall_time / len(flight.time),
+        },
     )
     report_flight(flown, units, json, strict, every)
 
@@ -215,23 +212,12 @@ def prepare(
     if folder:
         check_folder(folder, "folder")
     namespace, port = checked_namespace(namespace), _live_port(live, live_port)
+    options = RunOptions(real_time_factor, step_timeout, composed, external, port, paused)
     # The claim is released at once: each node claims what it publishes when it starts.
     claim_graph(graph(), namespace).close()
     target = folder or Path(tempfile.mkdtemp(prefix="hsv_run_"))
     try:
-        prepared = prepare_run(
-            scenario,
-            RunOptions(
-                real_time_factor=real_time_factor,
-                step_timeout=step_timeout,
-                composed=composed,
-                external=external,
-                live_port=port,
-                paused=paused,
-            ),
-            bag=bag,
-            folder=target,
-        )
+        prepared = prepare_run(scenario, options, bag=bag, folder=target)
     except BaseException:
         if not folder:
             shutil.rmtree(target)

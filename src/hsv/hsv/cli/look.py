@@ -205,9 +205,9 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
 
 
 def _print_description(description: dict[str, Any], units: UnitSystem) -> None:
-    from hsv.bags.info import step_times_in_words
     from hsv.cli.summary import print_section
     from hsv.flight.fingerprint import published_in_words
+    from hsv.flight.flight import step_times_in_words
 
     attached = ", ".join(f"{a['name']} ({a['size_bytes']} bytes)" for a in description["attachments"])
     published = published_in_words(description["fingerprint"], description["as_published"])

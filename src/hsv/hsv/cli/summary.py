@@ -14,6 +14,7 @@ from hsv.base.errors import RunError
 from hsv.base.units import UnitSystem, in_system, significant, unit_in
 from hsv.cli.output import console, errors, folded, json_system, new_table, print_json, say, to_json
 from hsv.flight.fingerprint import as_published, published_in_words
+from hsv.flight.flight import step_times_in_words
 from hsv.flight.limits import Verdict, in_units, limits_kept, not_judged, verdict_sentence, verdicts
 from hsv.flight.metrics import METRICS, Group, in_words, is_share
 from hsv.flight.scenario import Scenario
@@ -45,7 +46,7 @@ class FlightSummary:
     not_covered: Sequence[str] | None
     """Items of the flight that the certificate does not cover; ``None``: not known."""
     step_times: dict[str, Any] | None = None
-    """Wall times of the steps of the control law where they are recorded, see :func:`hsv.bags.info.describe`."""
+    """Wall times of the steps of the control law where they are known, see :func:`hsv.bags.info.describe`."""
     files: Mapping[str, Path] = field(default_factory=dict)
     """Written files by name."""
 
@@ -89,15 +90,10 @@ def report_flight(
             }
         )
     else:
-        law = {}
-        if flight.step_times:
-            from hsv.bags.info import step_times_in_words
-
-            law = {"control law": step_times_in_words(flight.step_times)}
         pace = f" in {significant(wall_time)} s, {significant(factor)} x real time" if wall_time and factor else ""
         run: dict[str, object] = {
             "flown": f"{time:.6g} s{pace}",
-            **law,
+            **({"control law": step_times_in_words(flight.step_times)} if flight.step_times else {}),
             **({"not covered": "; ".join(flight.not_covered)} if flight.not_covered else {}),
             **flight.files,
             # On a line of its own, it is as wide as a terminal.
@@ -145,7 +141,7 @@ def print_metrics(
             value = significant(number) if name in metrics else "-"
             unjudged = Text("not judged" if every and judged is not None else "", "dim")
             remark = _remark(name, verdict, units) if verdict else unjudged
-            table.add_row("  " + metric.words, value, "" if unit == "1" else unit, remark)
+            table.add_row("  " + in_words(name), value, "" if unit == "1" else unit, remark)
     console.print(table)
 
 

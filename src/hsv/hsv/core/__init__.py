@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import os
 import re
+from array import array
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from operator import index
+from time import perf_counter
 from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -343,12 +345,16 @@ def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: d
 
 
 class Callback:
-    """A Python function as a step function of ``hsv_block.h`` while this object lives; keeps its exception."""
+    """A Python function as a step function of ``hsv_block.h`` while this object lives; keeps its exception.
+
+    ``times`` are the wall times (s) of its calls.
+    """
 
     def __init__(self, function: Callable[[int, Any, Any], None]) -> None:
         """Call ``function`` with k and the pointers to its inputs and outputs."""
         self.function = function
         self.error: BaseException | None = None
+        self.times = array("d")
         self._handle = ffi.new_handle(self)
         state = ffi.cast("double *", self._handle)
         self.call = SimpleNamespace(function=lib.hsv_call_python, state=state, par=None)
@@ -361,5 +367,8 @@ def _keep_exception(kind: type[BaseException], error: BaseException, traceback: 
 
 @ffi.def_extern(name="hsv_call_python", error=1, onerror=_keep_exception)
 def _call_python(k: int, given: Any, out: Any, state: Any, par: Any) -> int:
-    ffi.from_handle(ffi.cast("void *", state)).function(k, given, out)
+    callback = ffi.from_handle(ffi.cast("void *", state))
+    begun = perf_counter()
+    callback.function(k, given, out)
+    callback.times.append(perf_counter() - begun)
     return 0

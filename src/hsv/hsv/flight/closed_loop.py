@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
@@ -65,7 +65,8 @@ def fly(components: Components) -> Flight:
             steps = request("fly", rows, kept=vars(components))
             return flight_of(components, history.copy().cut(steps))
     history = History.empty(rows, estimated=not is_ideal(components))
-    return flight_of(components, history.cut(fly_into(history, components)))
+    steps, law_times = fly_into(history, components)
+    return replace(flight_of(components, history.cut(steps)), law_times=law_times)
 
 
 def is_ideal(components: Components) -> bool:
@@ -100,38 +101,40 @@ def watched(controller: Controller, rows: int) -> Iterator[tuple[History, Callab
 _ONE_AT_A_TIME = threading.Lock()
 
 
-def fly_into(history: History, components: Components) -> int:
-    """Simulate ``components`` in this process for at most the rows of ``history``; return the number of steps.
+def fly_into(history: History, components: Components) -> tuple[int, dict[str, Sequence[float]]]:
+    """Simulate ``components`` in this process for at most the rows of ``history``.
+
+    Returns:
+        The number of steps, and :attr:`hsv.flight.flight.Flight.law_times`.
 
     Raises:
         ControllerError, ParameterError: As for :func:`fly`.
     """
     law, controller = components.nominal_trajectory.law, components.controller
-    callbacks, calls = [], {}
+    callbacks = {}
     if not law.in_core:
-        callbacks.append(_law_callback(law))
-        calls["nominal_law"] = callbacks[-1].call
-    if not controller.in_core:
-        if controller.kernel is None:
-            callbacks.append(_controller_callback(controller, 2 * len(components.notch_filter.data.D)))
-            calls["controller"] = callbacks[-1].call
-        else:
-            address, state, parameters = controller.kernel
-            calls["controller"] = SimpleNamespace(function=address, state=state.copy(), par=parameters)
+        callbacks["nominal_law"] = _law_callback(law)
+    if not controller.in_core and controller.kernel is None:
+        callbacks["controller"] = _controller_callback(controller, 2 * len(components.notch_filter.data.D))
+    calls = {name: callback.call for name, callback in callbacks.items()}
+    if not controller.in_core and controller.kernel is not None:
+        address, state, parameters = controller.kernel
+        calls["controller"] = SimpleNamespace(function=address, state=state.copy(), par=parameters)
     flight = flight_struct(components, history, **calls)
     with _ONE_AT_A_TIME if callbacks else nullcontext():
         if callbacks:
             law.reset()
             controller.reset()
         rows = core.fly([flight], core.loop_memory(1), 0, len(history.signals))
-    for callback in callbacks:
+    for callback in callbacks.values():
         if callback.error is not None:
             raise callback.error
     if rows < 0:
         if code := flight.pointer.returned:
             raise ControllerError(f"{controller.name}, step {-1 - rows}: returned {code}, expected 0")
         raise controller.failure(-1 - rows, f"answered {list(flight.pointer.answer)}")
-    return rows
+    nodes = {"nominal_law": "nominal_trajectory", "controller": "controller"}
+    return rows, {nodes[name]: callback.times for name, callback in callbacks.items()}
 
 
 NO_CALL = SimpleNamespace(function=None, state=None, par=None)

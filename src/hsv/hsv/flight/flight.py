@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,6 +40,9 @@ class Flight:
     trajectory: ReferenceTrajectory
     fault_start: float | None
     status: FlightStatus
+    law_times: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    """Wall times (s) of the steps of the nominal law and the controller, if they are in Python; those in the core are
+    not measured one by one."""
 
     @property
     def time(self) -> np.ndarray:
@@ -115,6 +119,23 @@ class Flight:
             gain_index=h.gain_index,
             fault_start=self.fault_start,
         )
+
+
+def step_statistics(seconds: Sequence[float]) -> dict[str, float]:
+    """Return median, 99th percentile and maximum of wall times, in ms."""
+    values = 1e3 * np.percentile(seconds, (50.0, 99.0, 100.0))
+    return dict(zip(("median_ms", "p99_ms", "max_ms"), values.tolist(), strict=True))
+
+
+def step_times_in_words(step_times: dict[str, Any]) -> str:
+    """Return the wall times of the control law on one line: by node, and of the loop as a whole where it is known."""
+    times = [
+        f"{name} {times['median_ms']:.3g} ms in the median, 99 % {times['p99_ms']:.3g}, largest {times['max_ms']:.3g}"
+        for name, times in step_times["nodes"].items()
+    ]
+    if loop := step_times.get("loop_mean_ms"):
+        times.append(f"a step of law, vehicle and sensors {loop:.3g} ms in the mean")
+    return "; ".join([*times, f"a period has {step_times['period_ms']:g} ms"])
 
 
 def flight_of(components: Components, history: History) -> Flight:

@@ -76,7 +76,7 @@ class LoadedLibrary:
         components = Components(**parts)
         assert isinstance(components.controller, LibraryController)
         components.controller = components.controller.loaded(self.describe(components.controller.symbol).address)
-        return fly_into(History.over(self._memory.numbers(rows * History.numbers()), rows), components)
+        return fly_into(History.over(self._memory.numbers(rows * History.numbers()), rows), components)[0]
 
     def step(
         self, symbol: str, k: int, inputs: np.ndarray, state: np.ndarray, parameters: np.ndarray

@@ -33,9 +33,8 @@ class Group(StrEnum):
 
 @dataclass(frozen=True)
 class Metric:
-    """Definition of a metric: name in words, unit (SI), meaning and group."""
+    """Definition of a metric: unit (SI), meaning and group."""
 
-    words: str
     unit: str
     meaning: str
     group: Group
@@ -46,77 +45,63 @@ class Metric:
 
 
 METRICS = {
-    "altitude_rise_time": Metric("altitude rise time", "s", "10 % to 90 % of the altitude step", Group.tracking),
+    "altitude_rise_time": Metric("s", "10 % to 90 % of the altitude step", Group.tracking),
     "altitude_settling_time": Metric(
-        "altitude settling time",
         "s",
         "last time before the fault that altitude is more than 2 % of the step off",
         Group.tracking,
     ),
     "altitude_overshoot": Metric(
-        "altitude overshoot",
         "1",
         "largest excess over the altitude step before the fault, share of the step",
         Group.tracking,
         share=True,
     ),
-    "altitude_integral_absolute_error": Metric(
-        "altitude error, integral", "m s", "integral of |h - h_r|", Group.tracking
-    ),
-    "altitude_error_maximum": Metric("altitude error, largest", "m", "largest |h - h_r|", Group.tracking),
-    "altitude_end_error": Metric("altitude error at the end", "m", "h - h_r at the end", Group.tracking),
-    "velocity_rise_time": Metric("velocity rise time", "s", "10 % to 90 % of the velocity step", Group.tracking),
+    "altitude_integral_absolute_error": Metric("m s", "integral of |h - h_r|", Group.tracking),
+    "altitude_error_maximum": Metric("m", "largest |h - h_r|", Group.tracking),
+    "altitude_end_error": Metric("m", "h - h_r at the end", Group.tracking),
+    "velocity_rise_time": Metric("s", "10 % to 90 % of the velocity step", Group.tracking),
     "velocity_settling_time": Metric(
-        "velocity settling time",
         "s",
         "last time before the fault that velocity is more than 2 % of the step off",
         Group.tracking,
     ),
     "velocity_overshoot": Metric(
-        "velocity overshoot",
         "1",
         "largest excess over the velocity step before the fault, share of the step",
         Group.tracking,
         share=True,
     ),
-    "velocity_integral_absolute_error": Metric(
-        "velocity error, integral", "m", "integral of |V - V_r|", Group.tracking
-    ),
-    "velocity_error_maximum": Metric("velocity error, largest", "m/s", "largest |V - V_r|", Group.tracking),
-    "velocity_end_error": Metric("velocity error at the end", "m/s", "V - V_r at the end", Group.tracking),
+    "velocity_integral_absolute_error": Metric("m", "integral of |V - V_r|", Group.tracking),
+    "velocity_error_maximum": Metric("m/s", "largest |V - V_r|", Group.tracking),
+    "velocity_end_error": Metric("m/s", "V - V_r at the end", Group.tracking),
     "post_fault_attitude_deviation": Metric(
-        "attitude change after the fault",
         "rad",
         "largest change of angle of attack or pitch angle after the fault from its mean over the 5 s before",
         Group.after_the_fault,
     ),
     "post_fault_attitude_from_nominal": Metric(
-        "attitude from nominal after the fault",
         "rad",
         "largest difference of angle of attack or pitch angle after the fault from reference + nominal",
         Group.after_the_fault,
     ),
     "attitude_from_nominal": Metric(
-        "attitude from nominal",
         "rad",
         "largest difference of angle of attack or pitch angle from reference + nominal, over the whole flight",
         Group.tracking,
     ),
     "elastic_rate_1_decay_time": Metric(
-        "first mode's decay time",
         "s",
         "time after the fault from which |rate| stays within 5 % of its peak",
         Group.modes,
     ),
-    "elastic_rate_2_decay_time": Metric("second mode's decay time", "s", "the same for the second mode", Group.modes),
-    "elastic_decay_time": Metric("elastic decay time", "s", "the slower of the two", Group.modes),
-    "fuel_equivalence_ratio_minimum": Metric("fuel equivalence ratio, least", "1", "least command", Group.inputs),
-    "fuel_equivalence_ratio_maximum": Metric("fuel equivalence ratio, largest", "1", "largest command", Group.inputs),
-    "elevator_deflection_minimum": Metric("elevator deflection, least", "rad", "least command", Group.inputs),
-    "elevator_deflection_maximum": Metric("elevator deflection, largest", "rad", "largest command", Group.inputs),
-    "saturated_steps": Metric(
-        "saturated steps", "1", "steps in which a command was limited", Group.inputs, counted=True
-    ),
+    "elastic_rate_2_decay_time": Metric("s", "the same for the second mode", Group.modes),
+    "elastic_decay_time": Metric("s", "the slower of the two", Group.modes),
+    "fuel_equivalence_ratio_minimum": Metric("1", "least command", Group.inputs),
+    "fuel_equivalence_ratio_maximum": Metric("1", "largest command", Group.inputs),
+    "elevator_deflection_minimum": Metric("rad", "least command", Group.inputs),
+    "elevator_deflection_maximum": Metric("rad", "largest command", Group.inputs),
+    "saturated_steps": Metric("1", "steps in which a command was limited", Group.inputs, counted=True),
 }
 """All metrics in the order of the files."""
 
@@ -132,8 +117,8 @@ CRITERIA = (
 
 
 def in_words(name: str) -> str:
-    """Return the display name of a metric or of another identifier."""
-    return METRICS[name].words if name in METRICS else name.replace("_", " ")
+    """Return the display name of a metric or of another identifier: the same words."""
+    return name.replace("_", " ")
 
 
 def is_share(name: str) -> bool:

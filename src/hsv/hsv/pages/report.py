@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup, escape
 
-from hsv.bags.info import step_times_in_words
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.bags.reader import Bag
 from hsv.base.errors import RecordingError
 from hsv.base.units import UnitSystem
+from hsv.flight.flight import step_times_in_words
 from hsv.flight.limits import criteria_not_judged, limits_kept, verdict_sentence
 from hsv.flight.metrics import CRITERIA, METRICS, Group, Metric, in_words
 from hsv.flight.scenario import scenario_names
