@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from marking import long
 from mcap.reader import make_reader
 
 from hsv.bags.flight import flight_data, labels
+from hsv.bags.metadata import FILE_NAME
 from hsv.bags.reader import Bag
 from hsv.bags.topic import Topic
 from hsv.bags.writer import BagWriter
@@ -64,6 +66,20 @@ def test_a_bag_that_is_cut_off_is_used_and_said_to_be_cut_off(
     assert ran.err.count("\n") == 1
     assert ran.err.startswith(f"hsv: warning: {cut}: truncated after ") and "hsv recover completes it" in ran.err
     assert RESULTS[command] == [] or (tmp_path / RESULTS[command][-1]).is_file()
+
+
+@pytest.mark.parametrize("command", ["info", long("replay"), long("export"), long("report"), long("plot")])
+def test_metadata_that_contradict_their_file_are_named_once_and_not_believed(
+    hsv: Hsv, bag: Path, tmp_path: Path, command: str
+) -> None:
+    lying = shutil.copytree(bag, tmp_path / "lying")
+    (file,), count = lying.glob("*.mcap"), sum(topic.count for topic in Bag(bag).topics.values())
+    metadata = lying / FILE_NAME
+    metadata.write_text(metadata.read_text().replace(f"message_count: {count}", "message_count: 7"))
+    ran = hsv(command, str(lying), *RESULTS[command])
+    assert ran.code == 0
+    said = f"metadata.yaml states 7 messages in {file.name}, which has {count}"
+    assert ran.err == f"hsv: warning: {file}: {said}\n"
 
 
 def test_diff_says_which_of_the_two_is_cut_off(hsv: Hsv, bag: Path, cut: Path) -> None:

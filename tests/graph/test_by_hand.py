@@ -56,7 +56,11 @@ def test_a_flight_by_hand_is_told_and_can_be_repeated(processes: Processes) -> N
     bag = processes.folder / "by_hand"
     # Nodes need not have the same parameters, and each is repeated with its own.
     tube = ["--params-file", str(find_design("adjustable")), "-p", "feedback.tau:=[0.9]"]
-    extra = {"recorder": ["-p", f"bag.directory:={bag}"], "plant": ["-p", "duration:=12.0"], "tube_mpc": tube}
+    extra = {
+        "recorder": ["-p", f"bag.directory:={bag}"],
+        "plant": ["-p", "duration:=12.0", "-p", "seed:=7"],
+        "tube_mpc": tube,
+    }
     # Nor need they be in one namespace, where the topics are in one.
     topics = ("measurement", "filtered_state", "run", "ready", "last_state")
     back = [word for topic in topics for word in ("-r", f"hsv/{topic}:=/hsv/{topic}")]
@@ -80,6 +84,7 @@ def test_a_flight_by_hand_is_told_and_can_be_repeated(processes: Processes) -> N
     opened = Bag(bag)
     assert sorted(opened.attachments) == ["certificate.json", "design.yaml", "scenario.yaml"]
     assert opened.custom_data["run_id"].startswith(run_id) and opened.custom_data["design"] == "adjustable"
+    assert opened.custom_data["seed"] == "7"
     values = flown_parameters(opened)
     assert values.of("tube_mpc")["feedback.tau"] == [0.9] and values.of("nominal_trajectory")["feedback.tau"] == [1.0]
     assert [values.of(name)["design.name"] for name in ("tube_mpc", "nominal_trajectory")] == ["adjustable", "baseline"]

@@ -15,7 +15,7 @@ from marking import long
 from node_processes import Processes, children, fly_until, recorded_steps, short_scenario
 from waiting import output_of, wait_until
 
-from hsv.bags.description import PLANT, RECORDER, graph
+from hsv.bags.description import RECORDER, graph
 from hsv.bags.reader import Bag
 from hsv.graph.standstill import HUNG_AFTER
 
@@ -35,24 +35,26 @@ def _start_and_fly(processes: Processes, bag: Path, *words: str) -> subprocess.P
 
 
 @pytest.mark.parametrize(
-    "name",
+    ("name", "number", "reason"),
     [
-        pytest.param(node.name, marks=() if node.name == "tube_mpc" else pytest.mark.long)
+        case if case[0] == "tube_mpc" else long(*case)
         for node in graph()
         if node is not RECORDER
+        for case in (
+            (node.name, signal.SIGKILL, "was killed by SIGKILL"),
+            (node.name, signal.SIGTERM, "ended with exit code 143"),
+        )
     ],
 )
-def test_a_killed_node_ends_the_run_by_name(processes: Processes, name: str) -> None:
+def test_a_killed_node_ends_the_run_by_name(processes: Processes, name: str, number: int, reason: str) -> None:
     bag = processes.folder / "broken"
     run = _start_and_fly(processes, bag)
     nodes = children(run.pid)
     assert set(nodes) == {node.name for node in graph()}
-    # Asked to end in flight, the plant ends in order; the flight is lost all the same.
-    asked = name == PLANT.name
-    os.kill(nodes[name], signal.SIGTERM if asked else signal.SIGKILL)
+    # Asked to end in flight, a node ends in order; the flight is lost all the same.
+    os.kill(nodes[name], number)
     output = output_of(run)
     assert run.returncode == 1
-    reason = "ended with exit code 143" if asked else "was killed by SIGKILL"
     assert output.splitlines()[-1] == f"hsv: error: {bag}: {name} {reason}" and f"{name} {reason}" not in output[:-200]
     assert recorded_steps(bag) >= ON_DISK
     assert (bag / "metadata.yaml").is_file()

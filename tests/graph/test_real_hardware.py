@@ -10,7 +10,7 @@ import pytest
 from injected_fault import last_line
 from marking import long
 from node_processes import Processes, fly_until
-from real_hardware import ELEVATOR, scenario_file
+from real_hardware import ELEVATOR, SHORT, scenario_file
 from waiting import output_of
 
 from hsv.bags.flight import input_columns, state_columns
@@ -36,6 +36,7 @@ def test_graph_equals_in_process_bit_for_bit(shared_processes: Processes, name: 
     done = shared_processes.run("hsv", "run", scenario, "--no-report", "--bag", path, *words)
     assert done.returncode == 0, done.stdout
     bag, history = Bag(path), fly(assemble_flight(load_scenario(str(scenario)))).history
+    assert [run.seed for _, run in bag.decode("/hsv/run")] == [SHORT["seed"]]
     filtered = [message for _, message in bag.decode("/hsv/filtered_state")]
     measured = state_columns(bag.columns("/hsv/measurement"), "state.")
     assert {len(message.estimate) for message in filtered} == {9 if "estimated" in name else 0}

@@ -82,6 +82,7 @@ class PeerEmulatorNode(LockstepNode):
             run_id="replay",
             period=self._run.period,
             last_step=self._run.last_step,
+            seed=self._run.seed,
             interface_version=Run.INTERFACE_VERSION,
         )
         self._announcer = self._peers[description.PLANT.name].create_publisher(Run, description.RUN, LATCHED)

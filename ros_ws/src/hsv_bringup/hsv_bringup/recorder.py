@@ -20,7 +20,6 @@ from hsv.bags.description import (
     NOMINAL,
     NOMINAL_TRAJECTORY,
     OTHER_TOPICS,
-    PLANT,
     RECORDER,
     RECORDER_PROGRESS,
     STATE,
@@ -37,7 +36,6 @@ from hsv.bags.roles import naming
 from hsv.bags.topic import Qos, Topic
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import ParameterError
-from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.blocks import Signals
 from hsv.graph.snapshot import Snapshot
 from hsv_bringup.flow_executor import BatchExecutor
@@ -152,10 +150,8 @@ class RecorderNode(PeerNode):
         design = values[(NOMINAL_TRAJECTORY if flown.foreign else flown).name]
         for name, text in recorded_files(values, design).items():
             self._attach(name, text.encode())
-        seed = values[PLANT.name][SEED_PARAMETER.name]
-        self.bag.add_custom_data(
-            {"run_id": run.run_id, **provenance(self.controller, design.get("design.name", ""), digest(design), seed)}
-        )
+        origin = provenance(self.controller, design.get("design.name", ""), digest(design), run.seed)
+        self.bag.add_custom_data({"run_id": run.run_id, **origin})
 
     def _attach(self, name: str, data: bytes) -> None:
         self.bag.attach(name, mimetypes.guess_type(name)[0] or "text/plain", data)

@@ -36,6 +36,7 @@ from hsv.bags.description import (
 from hsv.bags.infrastructure_parameters import PACE_PARAMETERS, STEP_TIMEOUT
 from hsv.bags.messages import StepMessages, stamp_of
 from hsv.base.errors import SignalError
+from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.blocks import VEHICLE, Signals
 from hsv.graph.standstill import Standstill
 from hsv.model.plant import FlightStatus, Plant
@@ -81,6 +82,7 @@ class PlantNode(LockstepNode):
             run_id=uuid.uuid4().hex,
             period=self.plant.period,
             last_step=self.plant.steps,
+            seed=self.values[SEED_PARAMETER.name],
             interface_version=Run.INTERFACE_VERSION,
         )
         self._announcer = self.create_publisher(Run, RUN, LATCHED)

@@ -13,7 +13,7 @@
 
 enum { POSITION, RATE };
 
-/* Write F11, F12, F21, F22 of the transition over h (s) of (position - command, rate). */
+/* Write F11, F12, F21, F22 of the transition over h (s) of (position - command, rate); an order of 0 has none. */
 void hsv_actuator_map(int64_t order, double frequency, double damping, double h, double *map)
 {
     if (order == 1) {
@@ -105,7 +105,7 @@ void hsv_move_effectors(const hsv_actuators *actuators, double *state, hsv_fault
             else if (fault->code == STOP_LIMIT)
                 low = maximum(low, fault->parameter[0]), high = minimum(high, fault->parameter[1]);
         }
-        if (changed && order > 0) {
+        if (changed) {
             hsv_actuator_map(order, frequency, actuators->damping_ratio[channel], h, own_map);
             map = own_map;
         }
