@@ -11,6 +11,7 @@ from hsv.base.errors import RunError
 from hsv.bench.measure import against_imports, c_flight, graph_lap, ring_lap
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 def test_the_loop_in_c_alone_flies_the_same_bits_every_time():
     # tests/cli/test_bench.py compares these bits with those of a flight from Python.

@@ -180,6 +180,7 @@ def test_a_wrong_attached_parameter_is_told_with_its_bag(hsv: Hsv, bag: Path, tm
     assert done.code == 2 and "wrong_0.mcap: attached parameter period = 'x': expected double" in done.error
 
 
+@pytest.mark.long
 def test_what_is_exported_is_in_the_way_of_no_command_on_all_bags(hsv, bag):
     before = sorted(bag.parent.iterdir())
     assert hsv("export", str(bag), "--parquet").code == hsv("export", str(bag), "--npz").code == 0

@@ -6,6 +6,7 @@ from hsv.base.errors import RunError
 from hsv.bench.figure import Figure
 
 
+@pytest.mark.long
 def test_the_groups_that_were_asked_for_are_measured_and_held_against_a_recorded_run(hsv, tmp_path):
     words = ("bench", "--only", "in_process", "--scale", "0.05")
     kept = hsv(*words, "--json").json

@@ -25,6 +25,7 @@ def short(tmp_path, monkeypatch):
     return "short.toml"
 
 
+@pytest.mark.long
 def test_what_differs_is_printed_and_named_with_its_step(hsv, short):
     ran = hsv("check", short)
     assert ran.code == 1

@@ -18,7 +18,7 @@ from hsv.base.errors import RecordingError
 
 Hsv = Callable[..., Any]
 REFERENCES = Path(__file__).parents[2] / "bags" / "reference"
-QUICK = 4
+QUICK = 2
 LONG = 60
 
 

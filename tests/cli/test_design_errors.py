@@ -46,6 +46,7 @@ def test_a_file_that_is_no_yaml_is_refused_with_what_was_expected(hsv, tmp_path)
     assert ran.error.startswith("design 'inputs.yaml': ") and ran.error.endswith(", expected ROS 2 parameters in YAML")
 
 
+@pytest.mark.long
 def test_a_shipped_design_is_certified_by_its_name(hsv):
     assert hsv("certify", "baseline").out == hsv("certify", str(find_design("baseline"))).out
 

@@ -22,7 +22,6 @@ PITCH_RATE = "[sensors.pitch_rate]\n"
 GUST = '[gust]\nstarts = ["5 s", "8 s"]\n'
 
 WRONG = [
-    (FAULT + 'type = "loss"', "fault[0].type = 'loss': expected one of loss_of_effectiveness, reversal, "),
     (FAULT + 'type = "baias"', "sensor_freeze (did you mean 'bias'?)"),
     (FAULT, "fault[0].type: missing"),
     ('[[fault]]\nchannel = "elevator_deflection"\ntype = "lock_in_place"', "fault[0].start: missing"),
@@ -31,32 +30,16 @@ WRONG = [
         "fault[0].channel = 'elevator': expected one of fuel_equivalence_ratio, elevator_deflection for bias "
         "(did you mean 'elevator_deflection'?)",
     ),
-    (
-        '[[fault]]\nchannel = "pitch_rate"\ntype = "hard_over"\nstart = "1 s"\nrate = "1 deg/s"',
-        "fault[0].channel = 'pitch_rate': expected one of fuel_equivalence_ratio, elevator_deflection for hard_over",
-    ),
     (FAULT + 'type = "bias"', "fault[0].offset: missing, expected offset for bias"),
-    (
-        FAULT + 'type = "oscillation"\namplitude = "1 deg"',
-        "fault[0].frequency: missing, expected amplitude and frequency for oscillation",
-    ),
-    (FAULT + 'type = "bias"\nofset = "1 deg"', "fault[0].ofset: unknown key, expected one of offset, "),
-    (FAULT + 'type = "bias"\noffset = 1', "fault[0].offset = 1: the unit is missing, expected a finite quantity"),
     (FAULT + 'type = "bias"\noffset = "1 m"', "fault[0].offset = '1 m': wrong unit, expected a finite quantity"),
     (FAULT + 'type = "bias"\noffset = "90 deg"', "fault[0].offset = '90 deg': expected from -30 to 30 deg"),
-    (FAULT + 'type = "bias"\noffset = ["1 deg"]', "fault[0].offset = ['1 deg']: expected a finite quantity"),
     (
         FAULT + 'type = "bias"\noffset = { uniform = ["0 deg", "90 deg"] }',
         "fault[0].offset = {'uniform': ['0 deg', '90 deg']}: expected all values from -30 to 30 deg",
     ),
-    (FAULT + "type = { uniform = [0, 1] }", "fault[0].type = {'uniform': [0, 1]}: expected a text"),
     (
         FAULT + 'type = "delay"\nsteps = { uniform = [1.5, 4] }',
         "fault[0].steps = {'uniform': [1.5, 4]}: expected uniform = [least, largest], both whole numbers",
-    ),
-    (
-        "[link.command]\ndelay = { normal = [5, 1] }",
-        "link.command.delay = {'normal': [5, 1]}: expected uniform = [least, largest], both whole numbers",
     ),
     (
         PITCH_RATE + "latency = { uniform = [0, 60] }",
@@ -78,32 +61,14 @@ WRONG = [
         "actuator = [{'set': 'elevator_50'}]: expected a table of fuel_equivalence_ratio, elevator_deflection",
     ),
     (
-        '[actuator.elevator]\nset = "elevator_50"',
-        "actuator.elevator: unknown key, expected one of fuel_equivalence_ratio, elevator_deflection "
-        "(did you mean 'elevator_deflection'?)",
-    ),
-    (
         ELEVATOR + 'set = "elevator_500"',
         "actuator.elevator_deflection.set = 'elevator_500': expected one of ideal, elevator_50, elevator_150, "
         "elevator_20, elevator_first_order_20 (did you mean 'elevator_50'?)",
     ),
-    (
-        '[actuator.fuel_equivalence_ratio]\nset = "elevator_50"',
-        "actuator.fuel_equivalence_ratio.set = 'elevator_50': expected one of ideal, fuel_10",
-    ),
-    (
-        ELEVATOR + "set = { uniform = [0, 1] }",
-        "actuator.elevator_deflection.set = {'uniform': [0, 1]}: expected one of ideal, elevator_50",
-    ),
     (ELEVATOR + "order = 3", "actuator.elevator_deflection.order = 3: expected a whole number from 0 to 2"),
-    (ELEVATOR + "order = 1.5", "actuator.elevator_deflection.order = 1.5: expected a whole number from 0 to 2"),
     (
         ELEVATOR + "order = 1",
         "actuator.elevator_deflection.natural_frequency: none given, expected one for an order of 1",
-    ),
-    (
-        ELEVATOR + 'set = "elevator_50"\nnatural_frequency = "8 Hz"',
-        "actuator.elevator_deflection.natural_frequency = '8 Hz': wrong unit, expected a finite quantity",
     ),
     (
         ELEVATOR + 'set = "elevator_50"\nstop = ["10 deg", "20 deg"]',
@@ -111,36 +76,17 @@ WRONG = [
     ),
     ('wind = "10 m/s"', "wind = '10 m/s': expected a table of forward, up, shear, shear_altitude"),
     ('[winds]\nforward = "10 m/s"', "winds: unknown key, expected one of title, "),
-    ("[wind]\nforward = 10", "wind.forward = 10: the unit is missing, expected a finite quantity"),
-    (
-        '[wind]\nforwards = "10 m/s"',
-        "wind.forwards: unknown key, expected one of forward, up, shear, shear_altitude (did you mean 'forward'?)",
-    ),
     ('[wind]\nforward = ["1 m/s", "2 m/s"]', "wind.forward = ['1 m/s', '2 m/s']: expected one value, not a list"),
-    ('[wind]\nforward = "999 km/h"', "wind.forward = '999 km/h': expected from -720 to 720 km/h"),
-    (
-        '[wind]\nforward = { uniform = ["0 m", "9 m"] }',
-        "wind.forward = {'uniform': ['0 m', '9 m']}: uniform = '0 m': wrong unit",
-    ),
-    ('[turbulence]\nsigma_up = "-2 m/s"', "turbulence.sigma_up = '-2 m/s': expected from 0 to 50 m/s"),
     (GUST + 'up = "1 m/s"\nlengths = "500 m"', "gust.up: 1 values, expected as many as gust.starts, 2"),
-    (GUST, "gust.lengths: 0 values, expected as many as gust.starts, 2"),
-    (GUST + 'lengths = ["500 m", "1 s"]', "gust.lengths[1] = '1 s': wrong unit, expected a finite quantity"),
     (
         GUST + 'lengths = ["500 m", "500 m"]\nstays = [0, 0.5]',
         "gust.stays[1] = 0.5: expected a whole number from 0 to 1",
     ),
-    ('[density]\noffset = "5 kg/m^3"', "density.offset = '5 kg/m^3': wrong unit, expected a finite quantity"),
-    ('[density]\noffset = "200 %"', "density.offset = '200 %': expected from -50 to 100 %"),
     (
         '[sensors]\nset = "fin"',
         "sensors.set = 'fin': expected one of ideal, fine, ghv, inertial (did you mean 'fine'?)",
     ),
-    ('[sensors.pitch]\nnoise = "1 deg"', "sensors.pitch: unknown key, expected one of set, "),
-    (PITCH_RATE + 'noise = "1 deg"', "sensors.pitch_rate.noise = '1 deg': wrong unit, expected a finite quantity"),
     (PITCH_RATE + 'noise = { sigma = "1 deg/s" }', "expected a number or { uniform = [least, largest] } or "),
-    (PITCH_RATE + "latency = 1.5", "sensors.pitch_rate.latency = 1.5: expected a whole number"),
-    (PITCH_RATE + "drop_out = 2", "sensors.pitch_rate.drop_out = 2: expected from 0 to 1"),
     (
         PITCH_RATE + 'minimum = "25 deg/s"\nmaximum = "20 deg/s"',
         "sensors.pitch_rate.minimum = 25 deg/s: expected less than maximum, 20 deg/s",
@@ -150,12 +96,7 @@ WRONG = [
         "sensors.inertial_angle_of_attack = 0.5: expected a whole number from 0 to 1",
     ),
     ("[link]\ncommand = 1", "link.command = 1: expected a table of delay, jitter, loss, burst, corruption, checksum"),
-    ("[link.comand]\ndelay = 1", "expected one of measurement, computational_delay, command (did you mean 'command'?)"),
-    ("[link.command]\nlost = 0.1", "link.command.lost: unknown key, expected one of delay, jitter, loss, burst, "),
-    ("[link.command]\ndelay = 1.5", "link.command.delay = 1.5: expected a whole number"),
-    ('[link.command]\ndelay = "20 ms"', "link.command.delay = '20 ms': wrong unit, expected a finite quantity"),
     ("[link.command]\ndelay = 51", "link.command.delay = 51: expected a whole number from 0 to 50"),
-    ("[link.measurement]\nloss = 2", "link.measurement.loss = 2: expected from 0 to 1"),
     (
         '[link.measurement]\nloss = "90 %"\nburst = 2',
         "link.measurement.burst = 2.0: expected 0, or at least 9",
@@ -165,15 +106,10 @@ WRONG = [
         "link.measurement.burst: has no effect without link.measurement.loss, expected both",
     ),
     (
-        "[link.command]\nchecksum = true",
-        "link.command.checksum: has no effect without link.command.corruption",
-    ),
-    (
         '[estimator.noise]\naltitude = "1 ft"',
         "estimator.noise.altitude: has no effect without estimator.enabled",
     ),
     ('[effectiveness]\ntime = "2 s"', "effectiveness.time: has no effect without effectiveness.enabled, expected both"),
-    (PITCH_RATE + 'drift_time = "1 s"', "sensors.pitch_rate.drift_time: expected with a drift_sigma only"),
     (PITCH_RATE + 'drift_sigma = "1 deg/s"', "sensors.pitch_rate.drift_sigma: expected with a drift_time only"),
     (PITCH_RATE + "noise = []", "sensors.pitch_rate.noise = []: expected one value at least"),
     (
@@ -187,17 +123,10 @@ WRONG = [
         "fault[0].intermittent_duty: has no effect, expected an intermittent_period above 0 s",
     ),
     ("[link.measurement]\nchecksum = 1", "link.measurement.checksum = 1: expected bool"),
-    (
-        "[link]\ncomputational_delay = 0.02",
-        "link.computational_delay = 0.02: the unit is missing, expected a finite quantity",
-    ),
     ('[link]\ncomputational_delay = "-5 ms"', "link.computational_delay = '-5 ms': expected from 0 to 1000 ms"),
     ("seed = -1", "seed = -1: expected at least 0"),
-    ("seed = 1.0", "seed = 1.0: expected a whole number"),
-    ("seed = true", "seed = True: expected a whole number"),
     ('seed = "1"', "seed = '1': expected a whole number"),
     ("seed = 9007199254740993", "seed = 9007199254740993: expected at most 9007199254740992"),
-    ("seed = { uniform = [0, 9] }", "seed = {'uniform': [0, 9]}: expected a whole number"),
 ]
 
 

@@ -28,7 +28,7 @@ def command(*words, out, buffered=True):
 
 
 @pytest.mark.parametrize(
-    ("words", "buffered"), [(("trim",), True), (("trim", "--json"), False), long(("--help",), True)]
+    ("words", "buffered"), [(("trim",), True), long(("trim", "--json"), False), long(("--help",), True)]
 )
 def test_output_that_finds_no_space_is_one_line(words, buffered):
     with FULL.open("w") as full:
@@ -43,6 +43,7 @@ def test_an_error_stays_that_error_if_nothing_can_be_printed():
     assert code == 2 and error.startswith("hsv: error: design = 'nope.yaml'") and error.count("\n") == 1
 
 
+@pytest.mark.long
 def test_a_reader_that_has_gone_is_told_nothing():
     reading, writing = os.pipe()
     os.close(reading)
@@ -96,6 +97,7 @@ def test_a_certificate_that_does_not_fit(tmp_path):
     assert not path.exists()
 
 
+@pytest.mark.long
 def test_a_campaign_whose_page_does_not_fit_leaves_its_summary(hsv, tmp_path):
     short_scenario(tmp_path, duration=3, fault=2)
     assert (

@@ -51,7 +51,7 @@ def ignores_ctrl_c(process: int) -> bool:
 @pytest.mark.parametrize(
     ("words", "delay"),
     [
-        ("run case1", 0.05),
+        long("run case1", 0.05),
         ("run case1", 0.4),
         *(long(words, delay) for words in COMMANDS for delay in (0.2, 1.0, 2.0, 4.0, 7.0)),
     ],

@@ -25,6 +25,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return flown_bag(tmp_path_factory.mktemp("bags") / "flown", duration=11.0, fault=1.0)
 
 
+@pytest.mark.long
 def test_paths_are_printed_as_they_are(hsv: Callable[..., Any], bag: Path, tmp_path: Path) -> None:
     path = shutil.copytree(bag, tmp_path / NAME.replace("/", "_"))
     (path / FILE_NAME).unlink()

@@ -2,6 +2,7 @@ import json
 import re
 
 import pytest
+from marking import long
 from node_processes import short_scenario
 
 from hsv.base.parameters import Parameter, validate
@@ -147,7 +148,7 @@ class Failing:
         return inputs.reference_input
 
 
-@pytest.mark.parametrize(("above", "code"), [("0 ft", 1), ("85500 ft", 0)])
+@pytest.mark.parametrize(("above", "code"), [("0 ft", 1), long("85500 ft", 0)])
 def test_a_campaign_fails_only_where_every_flight_crashed(hsv, tmp_path, above, code):
     short_scenario(tmp_path, duration=3, fault=2)
     own = f'extends = "short.toml"\ncontroller = "{__name__}:Failing"\ndesign = ""\n[failing]\nabove = "{above}"\n'

@@ -1,6 +1,7 @@
 import os
 
 import pytest
+from marking import long
 from recorded_flight import record_flight
 from waiting import wait_until
 
@@ -66,7 +67,7 @@ def test_view_opens_the_viewer_that_is_installed(hsv, bag, asked):
     assert f"--datafile {bag.path}" in arguments() and "plotjuggler.xml" in arguments()
 
 
-@pytest.mark.parametrize("program", ["foxglove-studio", "lichtblick"])
+@pytest.mark.parametrize("program", ["foxglove-studio", long("lichtblick")])
 def test_view_with_3d_opens_a_copy_with_pictures_that_is_made_once(hsv, bag, asked, program):
     arguments = asked(program)
     ran = hsv("view", str(bag.path.parent))

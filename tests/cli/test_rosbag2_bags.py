@@ -61,7 +61,7 @@ def original(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return Bag(REFERENCE)
 
 
-QUICK = ("split, zstd by file", "lz4 by message", "zstd by message", "with attachments, zstd by file")
+QUICK = ("split, zstd by file", "lz4 by message")
 """The forms that make test reads; the long run reads all."""
 
 
@@ -88,6 +88,7 @@ def test_every_form_gives_what_the_original_gives(hsv: Hsv, original: Bag, tmp_p
     assert ours == theirs
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", ["split, zstd by file", long("with attachments, zstd by file")])
 def test_tables_and_pages_are_the_same(hsv: Hsv, tmp_path: Path, form: str) -> None:
     path = FORMS[form](tmp_path / "case1")
@@ -112,8 +113,11 @@ def test_tables_and_pages_are_the_same(hsv: Hsv, tmp_path: Path, form: str) -> N
 
 @pytest.mark.parametrize(
     "form",
-    [{}, {"begin": 2**63 - 10**10}, {"stored": out_of_order}, {"qos": numbered}, {"qos": lambda profiles: []}],
-    ids=["wall time", "more than signed integers hold", "out of order", "numbered profiles", "no profiles"],
+    [
+        {"begin": 2**63 - 10**10},
+        *map(long, ({}, {"stored": out_of_order}, {"qos": numbered}, {"qos": lambda profiles: []})),
+    ],
+    ids=["more than signed integers hold", "wall time", "out of order", "numbered profiles", "no profiles"],
 )
 def test_wall_clock_log_times_change_nothing(hsv: Hsv, tmp_path: Path, form: dict[str, Any]) -> None:
     path = recorded(REFERENCE, tmp_path / "wall", files=2, **form)
@@ -135,6 +139,7 @@ def test_wall_clock_log_times_change_nothing(hsv: Hsv, tmp_path: Path, form: dic
         assert np.abs(bag.times(topic) - original.times(topic)).max(initial=0) <= 20_000_000, topic
 
 
+@pytest.mark.long
 def test_a_fifth_of_the_steps_is_missing(hsv: Hsv, tmp_path: Path) -> None:
     lost = {int(step) for step in np.random.default_rng(3).choice(2001, 400, replace=False)}
     period = 20_000_000
@@ -188,6 +193,7 @@ def test_a_missing_file_is_named_and_counted(hsv: Hsv, tmp_path: Path) -> None:
     assert "of 2 bags, expected a bag directory" in hsv("info", str(path)).error
 
 
+@pytest.mark.long
 def test_what_needs_attachments_takes_scenario_and_design(hsv: Hsv, tmp_path: Path) -> None:
     path = recorded(REFERENCE, tmp_path / "bare")
     ran = hsv("replay", str(path))

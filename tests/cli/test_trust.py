@@ -6,6 +6,7 @@ import sys
 import pytest
 import yaml
 from changed_bags import changed_bag
+from marking import long
 from pyarrow import parquet
 from recorded_flight import record_flight
 
@@ -81,7 +82,7 @@ def test_a_trusted_campaign_is_repeated_in_every_bit(hsv, campaign, loaded):
     assert loaded()
 
 
-@pytest.mark.parametrize("path", ["/etc/design.yaml", "../design.yaml", "sub/../../design.yaml"])
+@pytest.mark.parametrize("path", ["sub/../../design.yaml", long("/etc/design.yaml"), long("../design.yaml")])
 def test_no_path_of_a_campaign_leads_out_of_the_folder(hsv, tmp_path, path):
     (tmp_path / "own.toml").write_text('extends = "case1"\nduration = "1 s"\nfault = []\n[limits]\n')
     words = ("--samples", "4", "--workers", "1", "--out", "own.parquet", "--no-page")

@@ -42,20 +42,21 @@ BLOCKS = ("notch_filter", "nominal_trajectory", "tube_law")
 REFERENCE = ReferenceTrajectory([0.0, 20.0], [26060.4, 26243.28], [2407.92, 2484.12], 0.02, load_vehicle().decoupled)
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-each_design = pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
+BASELINE, *OTHERS = DESIGNS.values()
+each_design = pytest.mark.parametrize("design", [BASELINE, *map(long, OTHERS)], ids=DESIGNS)
 each_compiler = pytest.mark.parametrize(
     "compiler",
     [pytest.param(c, marks=pytest.mark.skipif(not shutil.which(c), reason=f"no {c}")) for c in ("gcc", "clang")],
 )
 
 
-@pytest.fixture(scope="module", params=DESIGNS.values(), ids=DESIGNS)
+@pytest.fixture(scope="module", params=[BASELINE, OTHERS[0], long(OTHERS[1])], ids=DESIGNS)
 def built(request, tmp_path_factory):
     return request.param, compile_library(request.param, tmp_path_factory.mktemp("library"))
 
 
 @needs_compiler
-@pytest.mark.parametrize("scenario", ["case1", "case1_smooth", *map(long, ("case2", "case1_integral_heavy"))])
+@pytest.mark.parametrize("scenario", ["case1", *map(long, ("case1_smooth", "case2", "case1_integral_heavy"))])
 def test_flown_in_place_of_the_blocks_it_has_the_published_fingerprint(scenario, tmp_path):
     flown = step_by_step(with_exported_blocks(components(scenario), tmp_path))
     digested = ("state", "filtered_pitch_rate", "deviation", "nominal_input", "command", "actuator")
@@ -65,7 +66,7 @@ def test_flown_in_place_of_the_blocks_it_has_the_published_fingerprint(scenario,
 
 
 @each_design
-@pytest.mark.parametrize("level", ["-O0", "-O2", "-O3"])
+@pytest.mark.parametrize("level", ["-O2", long("-O0"), long("-O3")])
 @each_compiler
 def test_it_is_c99_that_calls_nothing_and_keeps_nothing(design, level, compiler, tmp_path):
     code = tmp_path / "controller.o"
@@ -188,12 +189,6 @@ def test_no_step_takes_more_than_is_stated(design, tmp_path):
     }
 
 
-@each_design
-def test_lines_are_no_longer_than_a_page_is_wide(design):
-    for name, text in controller_files(design).items():
-        assert not [line for line in text.splitlines() if len(line) > 120 and name != "hsv_block.h"]
-
-
 def test_a_name_does_not_end_the_comment_that_it_stands_in():
     text = design_header(dataclasses.replace(DESIGNS["baseline"], name="a */ int b;\n/*", coupling='"*/'))
     assert text.splitlines()[0].endswith('of the design "a __ int b____".')
@@ -223,7 +218,7 @@ def test_the_period_on_the_page_commands_what_the_loop_commands(tmp_path):
 
 
 @each_compiler
-@pytest.mark.parametrize("scenario", ["case1", "case2"])
+@pytest.mark.parametrize("scenario", ["case1", long("case2")])
 def test_a_scenario_flies_the_law_as_any_controller_in_c(scenario, compiler, tmp_path):
     compile_library(DESIGNS[load_scenario(scenario).design], tmp_path, compiler)
     own = tmp_path / "own.toml"

@@ -38,11 +38,6 @@ def test_a_scenario_names_libraries_of_its_own_folder(tmp_path):
         inside("../own.so:lqr", tmp_path)
 
 
-def test_a_controller_of_the_bench_is_in_no_library():
-    assert library_digest("tube_mpc") == ""
-    assert library_record("tube_mpc") is None
-
-
 def test_what_is_no_library_is_refused(tmp_path):
     (tmp_path / "text.so").write_text("no library")
     with pytest.raises(ParameterError, match=r"controller = '.*text.so:probe': .*expected a shared library"):

@@ -142,12 +142,14 @@ def test_gain_is_that_of_the_state_at_the_start_of_the_solve(flight):
     assert np.array_equal(found.K, flight[2 * SOLVE_STEPS].gain[:, :5])
 
 
+@pytest.mark.long
 def test_two_flights_are_bit_identical_whatever_the_pace(flight):
     slow = fly(len(flight), pause=0.01)
     for one, other in zip(flight, slow, strict=True):
         assert np.array_equal(one.input, other.input) and np.array_equal(one.gain, other.gain)
 
 
+@pytest.mark.long
 def test_a_failed_solve_leaves_the_family():
     law, far = KothareLaw(DESIGN, DATA), 30.0 * STEP
     results = [law.step(far) for _ in range(SOLVE_STEPS + 1)]
@@ -174,6 +176,7 @@ def test_a_gain_that_no_longer_fits_is_not_taken():
     assert np.array_equal(kept.gain, good.gain)
 
 
+@pytest.mark.long
 def test_near_the_reference_nothing_is_solved_and_reset_returns_to_the_family():
     law = KothareLaw(DESIGN, DATA)
     for _ in range(SOLVE_STEPS + 1):

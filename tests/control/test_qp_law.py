@@ -106,6 +106,7 @@ def test_input_depends_on_the_deviation_alone(law):
     assert np.array_equal(QpLaw(DESIGN, DATA, TRAJECTORY).step(STEP).input, first)
 
 
+@pytest.mark.long
 def test_flies_the_step_within_the_bounds_and_faster_than_the_family():
     values = {**VALUES, "reference.altitudes": [26243.28], "reference.velocities": [2484.12]}
     settled = {}

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.base.errors import ParameterError, TrimError
-from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTrajectory
+from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.model.dynamics import advance, derivative
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
@@ -72,14 +72,6 @@ def test_of_two_equal_times_the_later_value_holds_from_there_on():
     assert_allclose(defect[249], state[249] - state[250], atol=1e-12)
 
 
-def test_a_step_has_the_row_of_the_equilibrium_before_during_or_after():
-    trajectory = ReferenceTrajectory((1.0, 1.2), *RAMP[1:], "static")
-    rows = [trajectory.row(k) for k in range(80)]
-    assert rows == trajectory.rows(80).tolist()
-    altitudes = trajectory.data.state[rows, 0]
-    assert_allclose(altitudes, np.interp(np.arange(80) * PERIOD, (1.0, 1.2), RAMP[1]), rtol=1e-14)
-
-
 def test_a_time_that_is_no_step_is_met_by_the_next_one():
     state, *_ = along(ReferenceTrajectory([0.03, 0.03], [LOW[0], HIGH[0]], [LOW[1], HIGH[1]], PERIOD, VEHICLE), 5)
     assert state[:, 0].tolist() == [LOW[0], LOW[0], HIGH[0], HIGH[0], HIGH[0]]
@@ -115,14 +107,6 @@ def test_wrong_commands_are_named(changes, message):
     }
     with pytest.raises(ParameterError, match=message):
         ReferenceTrajectory.from_parameters(values | changes, PERIOD)
-
-
-def test_the_default_command_is_the_paper_s_step():
-    defaults = {p.name: p.default for p in REFERENCE_PARAMETERS}
-    assert defaults["reference.altitudes"] == pytest.approx([86100 * 0.3048])
-    assert defaults["reference.velocities"] == pytest.approx([8150 * 0.3048])
-    assert defaults["reference.times"] == [0.0]
-    assert defaults["reference.blend"] == 0.0
 
 
 @pytest.mark.parametrize("seconds", [1.0, 0.05])

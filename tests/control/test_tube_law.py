@@ -117,33 +117,6 @@ def test_nothing_of_a_state_that_is_no_number_is_left_in_the_next_step():
     assert_allclose(results, [expected, expected], rtol=1e-9)
 
 
-@pytest.mark.parametrize("component", range(9))
-def test_a_state_that_is_no_number_is_told(component):
-    state = REFERENCE.copy()
-    state[component] = math.nan
-    result = step(TubeLaw(DESIGN), state, rate=state[4])
-    assert result.status is TubeStatusCode.INVALID_INPUT
-    assert not result.inside
-    assert_array_equal(result.input, REFERENCE_INPUT)
-
-
-def test_absurd_nominal_inputs_are_limited():
-    result = step(TubeLaw(DESIGN), nominal_input=np.array([1e9, -1e9]))
-    assert_array_equal(result.input, [LIMITS.input_maximum[0], LIMITS.input_minimum[1]])
-    assert_array_equal(result.saturated, [True, True])
-
-
-def test_law_itself_has_no_memory():
-    rng = np.random.default_rng(4)
-    law = TubeLaw(DESIGN)
-    state = REFERENCE + near(rng)
-    first = step(law, state, 0.001)
-    step(law, REFERENCE + near(rng), 0.1, k=1)
-    again = step(law, state, 0.001, k=2)
-    assert_array_equal(again.input, first.input)
-    assert_array_equal(again.u_unsaturated, first.u_unsaturated)
-
-
 def adjustable(minimum=0.5, tau=1.0, **changes):
     factors = {"tau": np.full(5, tau), "tau_minimum": np.broadcast_to(minimum, 5)}
     return dataclasses.replace(DESIGN, **factors, **changes)

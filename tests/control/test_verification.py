@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from marking import long
 
 from hsv.base.errors import DesignError
 from hsv.control.checks import Subject, gathered, leaves, load_subject, unchecked
@@ -50,7 +51,7 @@ def shipped():
     return read_parameters(find_design("baseline"))
 
 
-@pytest.mark.parametrize("name", DESIGNS)
+@pytest.mark.parametrize("name", [name if name in ("baseline", "derived") else long(name) for name in DESIGNS])
 def test_every_shipped_design_passes(name):
     assert [str(check) for check in made(load_subject(find_design(name))) if not check.ok] == []
 
@@ -136,7 +137,7 @@ def tampered_certificate(subject, field, draw):
     return Subject(subject.design, certificate)
 
 
-@pytest.mark.parametrize("name", ["baseline", "adjustable", "realistic", "tight"])
+@pytest.mark.parametrize("name", ["baseline", *map(long, ("adjustable", "realistic", "tight"))])
 def test_seeded_tamperings_are_noticed(name):
     """25 of each design, 100 together: an entry of the design file, or a field of the certificate that is checked."""
     subject, draw = load_subject(find_design(name)), np.random.default_rng(5)
@@ -207,6 +208,7 @@ def test_a_certificate_without_a_field_says_which(baseline):
     assert [check.value for check in checks if not check.ok] == ["no field 'Q'"]
 
 
+@pytest.mark.long
 def test_the_least_entries_are_held_to_the_size_of_their_coordinates():
     """Zero but for rounding: seen as 1.5e-17 and 7.4e-16 on two processors (adjustable, model.a[2, 4, 5])."""
     subject = load_subject(find_design("adjustable"))

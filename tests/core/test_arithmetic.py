@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import stats
 
 from hsv.core import lib
 from hsv.core.arithmetic import (
@@ -16,7 +15,6 @@ from hsv.core.arithmetic import (
     exponential,
     logarithm,
     normals,
-    of_each,
     philox,
     sine_cosine,
     solve,
@@ -156,10 +154,6 @@ def test_points_out_of_range_give_no_angle(point):
     assert math.isnan(arctangent2(*point))
 
 
-def test_a_function_of_each_number_is_that_of_one():
-    assert of_each(logarithm, POSITIVE[:9]).tolist() == [logarithm(x) for x in POSITIVE[:9]]
-
-
 @pytest.mark.parametrize("n", [1, 2, 3, 9, 40])
 def test_solution_satisfies_the_equations_to_rounding(n):
     rng = np.random.default_rng(n)
@@ -232,21 +226,6 @@ def test_normals_are_those_of_box_and_muller():
         radius = math.sqrt(-2.0 * math.log(first + 2.0**-53))
         expected = radius * math.cos(2.0 * math.pi * second), radius * math.sin(2.0 * math.pi * second)
         assert normals(5, step, 9) == pytest.approx(expected, rel=1e-14, abs=1e-15)
-
-
-def test_normals_are_distributed_as_such_and_independent():
-    drawn = np.array([normals(3, step, 17) for step in range(20000)])
-    for column in drawn.T:
-        assert stats.kstest(column, "norm").pvalue > 1e-3
-    size = len(drawn)
-    assert abs(np.corrcoef(drawn.T)[0, 1]) < 4.0 / math.sqrt(size)
-    assert abs(np.corrcoef(drawn[:-1, 0], drawn[1:, 0])[0, 1]) < 4.0 / math.sqrt(size)
-
-
-@pytest.mark.parametrize("other", [(2, 0, 0, 0), (1, 1, 0, 0), (1, 0, 1, 0), (1, 0, 0, 1)])
-def test_each_of_seed_step_stream_and_draw_makes_other_numbers(other):
-    drawn = {uniforms(*case) for case in ((1, 0, 0, 0), other)}
-    assert len(drawn) == 2
 
 
 def test_each_block_keeps_the_256_streams_that_it_was_given_once():

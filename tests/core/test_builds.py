@@ -90,10 +90,10 @@ def test_any_compiler_and_level_of_optimisation_gives_the_same_bits(tmp_path, co
             assert fly(library, 3, 30, HSV_CORE=instructions) == instructions
 
 
-def test_the_core_compiles_without_warnings(tmp_path):
+def test_the_core_compiles_without_warnings():
     for source in sorted((SOURCES / "hsv" / "core").glob("[a-z]*.c")):
-        command = ["gcc", "-std=gnu99", "-O1", "-ffp-contract=off", "-Wno-psabi", *STRICT.split(), "-c", source]
-        compiled = subprocess.run([*command, "-o", tmp_path / "out.o"], capture_output=True, text=True)
+        command = ["gcc", "-std=gnu99", "-fsyntax-only", "-ffp-contract=off", "-Wno-psabi", *STRICT.split(), source]
+        compiled = subprocess.run(command, capture_output=True, text=True)
         assert (compiled.returncode, compiled.stderr) == (0, ""), source
 
 

@@ -30,6 +30,7 @@ def test_the_baseline_s_notch_leaves_a_corner_of_the_derived_coupling_without_da
     assert elastic_damping("baseline", corner, "paper_like") < -0.28
 
 
+@pytest.mark.long
 def test_the_derived_design_damps_that_corner_and_others():
     worst = max(
         elastic_damping("baseline_derived", corner) for corner in corners(load_vehicle().uncertainty)[WORST::-61]

@@ -48,6 +48,7 @@ def test_vertices_have_the_unstable_pole_of_the_vehicle(model):
     assert np.abs(model.polytope.A[:, :5, 5:]).max() < 1e-15
 
 
+@pytest.mark.long
 def test_a_coarser_tolerance_keeps_six_vertices(inputs):
     coarse = inputs.model.tensor_product.model_copy(update={"tolerance": 1e-5})
     model = design_model(with_representation(inputs, tensor_product=coarse), load_vehicle())
@@ -81,6 +82,7 @@ def test_codesigned_model_keeps_six_vertices_and_agrees_with_the_ecm(codesign):
     assert model.whole.A.shape == (6, 11, 11) and model.polytope.A.shape == (6, 9, 9)
 
 
+@pytest.mark.long
 def test_singular_functions_alone_miss_the_phase_at_an_antiresonance(codesign):
     options = codesign.model.tensor_product.model_copy(update={"functions": "singular"})
     inputs = codesign.model.model_copy(update={"tensor_product": options})
@@ -88,6 +90,7 @@ def test_singular_functions_alone_miss_the_phase_at_an_antiresonance(codesign):
     assert accuracy["bode_phase_error_deg"] > 1.5
 
 
+@pytest.mark.long
 def test_codesigned_model_at_a_point_is_vehicle_and_filter_in_series(codesign):
     notch = sections(codesign)
     model = polytopic_model(codesign.model, load_vehicle(), notch)

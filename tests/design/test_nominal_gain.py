@@ -43,11 +43,11 @@ def settling(states, axis):
     return np.nonzero(np.abs(states[:, axis]) > 0.02 * abs(states[0, axis]))[0][-1] * 0.02
 
 
-def test_certified_cost_is_a_bound_close_to_the_solver_s(design, problem, inputs, state, result):
-    first = result.report["nominal"][0]
+def test_certified_cost_is_a_bound_close_to_the_solver_s(design, problem, inputs, state, report):
+    first = report["nominal"][0]
     # Control study, section 6: 1060 s certified for the five rigid states.
     assert_allclose(first["certified_gamma"], 1060.0, rtol=0.02)
-    for row in result.report["nominal"]:
+    for row in report["nominal"]:
         assert_allclose(row["certified_gamma"], row["gamma"], rtol=5e-3)
         assert min(row["lmi_smallest_eigenvalues"]) >= 0.0
         assert row["state_residual"] >= 0.0 and min(row["input_residuals"]) >= 0.0
@@ -56,8 +56,8 @@ def test_certified_cost_is_a_bound_close_to_the_solver_s(design, problem, inputs
     assert cost < first["certified_gamma"]
 
 
-def test_certified_cost_is_tight(design, problem, result):
-    Q, K = np.array(result.report["nominal"][0]["Q"]), design.nominal_gains[0, :, :5]
+def test_certified_cost_is_tight(design, problem, report):
+    Q, K = np.array(report["nominal"][0]["Q"]), design.nominal_gains[0, :, :5]
     gamma, _ = certified_cost(problem, K, Q, "K")
     P = gamma * np.linalg.inv(Q)
     weight = np.diag(1.0 / problem.state_scale**2) + K.T @ np.diag(1.0 / problem.input_scale**2) @ K
@@ -72,6 +72,7 @@ def test_certified_cost_is_tight(design, problem, result):
     assert margin(1.0 - 1e-3) < -1e-4
 
 
+@pytest.mark.long
 def test_family_settles_faster_than_one_gain_within_the_bounds(design, problem, inputs, state):
     states, applied, cost = simulate(design, problem, inputs, state, gains=len(design.nominal_gains))
     single, _, _ = simulate(design, problem, inputs, state, gains=1)
@@ -80,9 +81,9 @@ def test_family_settles_faster_than_one_gain_within_the_bounds(design, problem, 
     assert np.all(np.abs(applied) <= problem.input_bound)
 
 
-def test_unstable_gain_is_refused(problem, result):
+def test_unstable_gain_is_refused(problem, report):
     with pytest.raises(DesignError, match="decrease at vertex"):
-        certified_cost(problem, np.zeros((2, 5)), np.array(result.report["nominal"][0]["Q"]), "K")
+        certified_cost(problem, np.zeros((2, 5)), np.array(report["nominal"][0]["Q"]), "K")
 
 
 @pytest.mark.parametrize("scales", [[], [1.0, 1.0], [0.5, 0.6], [1.0, 0.0]])

@@ -1,4 +1,4 @@
-"""Every block of code on every page is run by a test as it stands, or named here with the reason why not."""
+"""The commands of pages run as one script, and the scenarios on pages are scenarios."""
 
 from __future__ import annotations
 
@@ -7,25 +7,10 @@ from pathlib import Path
 
 import pytest
 from node_processes import Processes
-from page_blocks import PAGES, ROOT, Block, blocks, indented
+from page_blocks import ROOT, Block, blocks, indented
 from ros_domain import own_environment
 
 from hsv.flight.scenario import load_scenario, scenario_at_means, scenario_table, scenario_text
-
-WHOLE = {
-    **{page: "tests/docs/test_tutorial.py" for page in PAGES if page.startswith("docs/tutorial/")},
-    **{page: "tests/examples/test_own_controllers.py" for page in PAGES if page.startswith("examples/")},
-    "docs/c_controllers.md": "tests/examples/test_own_controllers.py",
-    "docs/export.md": "tests/control/test_export.py",
-    "docs/core.md": "tests/docs/test_code_blocks.py",
-    "docs/explanation/notch.md": "tests/docs/test_code_blocks.py",
-    "docs/hardware.md": "tests/docs/test_code_blocks.py",
-    "docs/hosts.md": "tests/graph/test_hosts.py",
-    "docs/vehicle.md": "tests/docs/test_code_blocks.py",
-    "examples/cpp_node/README.md": "tests/graph/test_full_installation.py",
-    "examples/node/README.md": "tests/graph/test_own_controllers.py",
-}
-"""Pages of which another file runs every block."""
 
 HERE = {
     "docs/assumptions.md": (),
@@ -61,49 +46,8 @@ SCENARIOS = {
 }
 """Blocks that are scenarios, or what of one may be added to Case 1."""
 
-ELSEWHERE = {
-    ("README.md", "v1:0669d52ede9cf309349ec3729d9c4c7160e4c8f9d681081827ea43f18398a596"): "tests/docs/test_tutorial.py",
-    ("README.md", "# mine.py"): "tests/docs/test_code_blocks.py",
-    ("README.md", "# mine.toml"): "tests/docs/test_code_blocks.py",
-    ("CONTRIBUTING.md", "python3 tools/release.py 1.2.0"): "tests/tools/test_release.py",
-    ("docs/airframe.md", "vehicle_carried                  moves with the centre of gravity, stays level"): (
-        "tests/graph/test_airframe.py"
-    ),
-    ("docs/airframe.md", "ros2 run hsv_bringup airframe --ros-args -p exaggeration:=20.0 -p rate:=50.0"): (
-        "tests/graph/test_airframe.py"
-    ),
-    ("docs/benchmarks.md", "hsv bench --json > before.json"): "tests/cli/test_bench.py",
-    ("docs/figures/index.md", "hsv-paper figures --out docs/figures"): "tests/hsv_paper/test_figures.py",
-    ("docs/installation.md", "$ python3 -m venv venv"): "tests/packaging/test_wheel.py",
-    ("docs/installation.md", "from launch import LaunchDescription"): "tests/graph/test_full_installation.py",
-    ("docs/live.md", "hsv run case1 --live"): "tests/graph/test_live.py",
-    ("docs/live.md", "live: live page: http://127.0.0.1:8766/#token=..."): "tests/graph/test_live.py",
-    ("docs/live.md", "ros2 run hsv_bringup live"): "tests/graph/test_live.py",
-    ("docs/replay.md", "ros2 run hsv_bringup player BAG --rate 5 --topics /hsv/state /hsv/nominal"): (
-        "tests/graph/test_player.py"
-    ),
-    ("docs/resilience.md", "hsv resilience"): "tests/cli/test_resilience.py",
-}
-"""Blocks that another file runs, in some form."""
-
-NPM = "npm install --prefix tests/viewers/npm --save-exact plotly.js-basic-dist-min@VERSION"
-
-NOT_RUN = {
-    ("CONTRIBUTING.md", "make setup"): "sets up what the tests run in",
-    ("CONTRIBUTING.md", "python3 -m pytest tests/core -q"): "make test runs that folder",
-    ("README.md", "flowchart LR"): "a diagram",
-    ("docs/installation.md", "$ docker build --tag hsv-bench ."): "needs Docker",
-    ("src/hsv/hsv/pages/plotly/README.md", NPM): "how a file of the repository was fetched",
-    (
-        "docs/montecarlo.md",
-        ".venv/bin/dask ssh --nthreads 1 --nworkers 8 scheduler-host worker-1 worker-2",
-    ): "needs other machines",
-    ("docs/montecarlo.md", ".venv/bin/dask scheduler"): "needs other machines",
-}
-"""Blocks that no test can run here, and why."""
-
-COMMANDS = ("README.md", "docs/graph.md", "docs/installation.md", "docs/reference/commands.md")
-"""Pages of which tests/docs/test_printed_commands.py accounts for every command."""
+PLAYER = "ros2 run hsv_bringup player BAG --rate 5 --topics /hsv/state /hsv/nominal"
+"""Waits for an end that nobody gives it here; tests/graph/test_player.py runs the player."""
 
 
 def all_blocks(page: str) -> list[Block]:
@@ -117,39 +61,6 @@ def is_commands(block: Block) -> bool:
         block.language in ("", "sh")
         and re.match(r"(cd|cp|hsv|make|mkdir|npm|pip|ros2|source|sudo|python3) ", block.text) is not None
     )
-
-
-def accounts(page: str, block: Block) -> list[str]:
-    """Return where a block is accounted for."""
-    key = (page, block.first_line)
-    found = [f"WHOLE: {WHOLE[page]}"] if page in WHOLE else []
-    found += [
-        name
-        for name, table in (("SCENARIOS", SCENARIOS), ("ELSEWHERE", ELSEWHERE), ("NOT_RUN", NOT_RUN))
-        if key in table
-    ]
-    if page in COMMANDS and is_commands(block):
-        found.append("COMMANDS")
-    if page == "docs/python.md" and block.language == "python":
-        found.append("tests/docs/test_code_blocks.py")
-    if page in HERE and is_commands(block) and not found:
-        found.append("HERE")
-    return found
-
-
-@pytest.mark.parametrize("page", [page for page in PAGES if all_blocks(page)])
-def test_every_block_is_run_or_named(page: str) -> None:
-    for block in all_blocks(page):
-        assert len(accounts(page, block)) == 1, f"{page}: {block.first_line!r}: {accounts(page, block)}"
-
-
-def test_what_is_named_is_there() -> None:
-    there = {(page, block.first_line) for page in PAGES for block in all_blocks(page)}
-    assert there >= {*SCENARIOS, *ELSEWHERE, *NOT_RUN}
-    assert {page for page, _ in there} >= {*WHOLE, *HERE}
-    assert all((ROOT / file).is_file() for file in (*WHOLE.values(), *ELSEWHERE.values()))
-    text = "".join(block.text for page in HERE for block in all_blocks(page))
-    assert all(words in text for words in (*FEWER, *NEGATIVE))
 
 
 @pytest.mark.parametrize(("page", "first_line"), sorted(SCENARIOS))
@@ -168,7 +79,7 @@ def test_commands_of_the_page_run(page: str, tmp_path: Path) -> None:
     for name in ("offline_design", "src", "examples", "tools"):
         (tmp_path / name).symlink_to(ROOT / name)
     script = [*HERE[page]]
-    script += [block.text for block in all_blocks(page) if accounts(page, block) == ["HERE"]]
+    script += [block.text for block in all_blocks(page) if is_commands(block) and block.first_line != PLAYER]
     text = "\n".join(script)
     for more, fewer in FEWER.items():
         text = text.replace(more, fewer)

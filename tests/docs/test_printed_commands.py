@@ -1,4 +1,4 @@
-"""Every command that the README and the pages on commands, graph and installations print is run, somewhere."""
+"""The commands that the README and the pages on commands, graph and installations print are run as they stand."""
 
 from __future__ import annotations
 
@@ -9,9 +9,14 @@ from pathlib import Path
 
 import pytest
 from node_processes import Processes, recorded_steps
+from page_blocks import PAGES as EVERY_PAGE
 from printed_commands import ROOT, printed
 from ros_domain import own_environment
+from typer.main import get_command
 from waiting import exit_code_of, wait_until
+
+from hsv.cli.entry import COMMANDS
+from hsv.cli.main import application
 
 PAGES = ("README.md", "docs/graph.md", "docs/scenarios.md", "docs/reference/commands.md", "docs/installation.md")
 
@@ -72,66 +77,21 @@ IN_FLIGHT = {
 }
 """Run by this file on the flight that is printed before them."""
 
-FULL = {
-    "ros2 launch hsv_bringup sil.launch.py scenario:=case1",
-    "ros2 launch hsv_bringup sil.launch.py -s",
-    "ros2 launch hsv_bringup sil.launch.py scenario:=case2 real_time_factor:=1",
-    "ros2 service call /hsv/inject_fault hsv_msgs/srv/InjectFault "
-    '"{fault: {channel: elevator_deflection, type: loss_of_effectiveness, parameter_names: [effectiveness], '
-    'parameter_values: [0.8]}}"',
-    'ros2 service call /hsv/clear_fault hsv_msgs/srv/ClearFault "{channel: elevator_deflection}"',
-    'ros2 param set /tube_mpc feedback.tau "[0.9]"',
-    "ros2 param dump /tube_mpc",
-    "ros2 topic echo --once /hsv/tube_status",
-    "ros2 doctor --report-failed",
-    "ros2 bag record -a -s mcap -o bags/recorded",
-    "ros2 launch hsv_bringup sil.launch.py real_time_factor:=1 bag:=bags/own",
-    "ros2 bag info bags/recorded",
-    "ros2 bag convert -i bags/recorded -o convert.yaml",
-    "ros2 bag reindex bags/recorded -s mcap",
-    "ros2 run hsv_ctrl tube_mpc --ros-args -p recorder:=false",
-    "ros2 bag record -s mcap -o bags/answers --topics /hsv/command /hsv/tube_status",
-    "ros2 bag play bags/own --topics /hsv/run /hsv/filtered_state /hsv/nominal --rate 5 --delay 3",
-}
-"""Run by tests/graph/test_full_installation.py, or the same with another bag."""
-
-ELSEWHERE = {
-    "sudo apt-get install git g++ make cmake python3 python3-venv python3-dev": "on a new machine",
-    "sudo apt-get install g++ python3-dev python3-venv": "on a new machine",
-    "make run": "make",
-    "make test": "make",
-    "source env.sh": "tests/tools/test_env_sh.py",
-    "source /opt/ros/jazzy/setup.bash": "of the installation",
-    "fastdds shm clean": "of ROS 2",
-    "ros2 run hsv_ctrl notch_filter --ros-args -r __ns:=/veh1 -r __node:=nf2": "tests/graph/test_names.py",
-    "ros2 run hsv_ctrl tube_mpc --ros-args -r hsv/command:=wish": "tests/graph/test_names.py",
-    "hsv run case2 --real-time-factor 1": "the flight of IN_FLIGHT",
-    "hsv watch": "tests/graph/test_watch.py",
-    "hsv-paper figures --only 9": "tests/hsv_paper/test_figures.py",
-    "hsv-paper sensitivity coupling": "tests/hsv_paper/test_sensitivity.py",
-    "hsv-paper claims": "tests/hsv_paper/test_claims.py",
-    "hsv run case1 --live": "tests/graph/test_live.py",
-    "hsv topic /hsv/state --every 50": "tests/graph/test_by_hand.py",
-    "cd examples/node": "tests/graph/test_own_controllers.py",
-    "python3 -m colcon build": "tests/graph/test_own_controllers.py",
-    "source install/local_setup.bash": "test_a_workspace_of_ones_own, tests/graph/test_own_controllers.py",
-    "hsv run regulator.toml": "tests/graph/test_own_controllers.py",
-    "hsv run case1 --external": "tests/graph/test_own_controllers.py",
-    "mkdir -p my_ws/src": "test_a_workspace_of_ones_own",
-    "cd my_ws": "test_a_workspace_of_ones_own",
-    "python3 -m colcon build --symlink-install": "test_a_workspace_of_ones_own",
-    "python3 -m colcon": "a form",
-}
-"""Where what cannot be run as printed by a test is tried, in some form."""
-
 DIFFERENT = {"hsv diff bags/first bags/second": 1}
 """Exit codes other than 0."""
 
 
-def test_every_printed_command_is_run_and_every_command_that_is_run_is_printed() -> None:
-    tables = (HERE, TOGETHER, IN_FLIGHT, FULL, {*ELSEWHERE})
-    assert {command for page in PAGES for command in printed(page)} == set().union(*tables)
-    assert sum(map(len, tables)) == len(set().union(*tables))
+def test_every_printed_command_of_hsv_exists_with_the_options_that_it_is_printed_with() -> None:
+    program = get_command(application(COMMANDS))
+    for line in {line for page in EVERY_PAGE for line in printed(page) if line.startswith("hsv ")}:
+        command, (_, *words) = program, line.split()
+        while words and words[0] in getattr(command, "commands", {}):
+            command = command.commands[words.pop(0)]
+        # Where no subcommand is named, one of them is meant.
+        meant = [command, *getattr(command, "commands", {}).values()]
+        known = {option for each in meant for parameter in each.params for option in parameter.opts}
+        assert command is not program, line
+        assert {word.partition("=")[0] for word in words if word.startswith("--")} <= known | {"--help"}, line
 
 
 @pytest.fixture
@@ -180,12 +140,15 @@ def test_the_nodes_fly_in_terminals_of_their_own(checkout: Path) -> None:
 
 @pytest.mark.long
 def test_a_flight_answers_as_it_is_printed(checkout: Path) -> None:
-    [flight] = [command for command, where in ELSEWHERE.items() if "IN_FLIGHT" in where]
+    commands = [command for page in PAGES for command in printed(page) if command in IN_FLIGHT]
+    assert len(commands) == len(IN_FLIGHT)
     with own_environment() as environment:
         processes = Processes(environment, checkout)
-        popen = processes.start("bash", "-c", f"exec {flight} --bag bags/answering --no-report")
+        popen = processes.start(
+            "bash", "-c", "exec hsv run case2 --real-time-factor 1 --bag bags/answering --no-report"
+        )
         wait_until(lambda: recorded_steps(checkout / "bags" / "answering") > 50, [popen.pid])
-        for command in [command for page in PAGES for command in printed(page) if command in IN_FLIGHT]:
+        for command in commands:
             done = processes.run("bash", "-c", command)
             assert done.returncode == 0, f"{command}: {done.stdout}"
         assert popen.poll() is None
@@ -196,7 +159,13 @@ def test_a_flight_answers_as_it_is_printed(checkout: Path) -> None:
 def test_a_workspace_of_ones_own(tmp_path: Path) -> None:
     """An overlay of a package of the bench takes its place, as the page says."""
     source = ROOT / "ros_ws" / "src" / "hsv_ctrl"
-    lines = [command for command in printed("docs/installation.md") if ELSEWHERE.get(command, "").startswith("test_a_")]
+    lines = [
+        "mkdir -p my_ws/src",
+        "cd my_ws",
+        "python3 -m colcon build --symlink-install",
+        "source install/local_setup.bash",
+    ]
+    assert {*lines} <= {*printed("docs/installation.md")}
     script = [
         *lines[:2],
         f"cp -r {source} src",

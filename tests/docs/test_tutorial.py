@@ -15,7 +15,7 @@ PAGES = {
     "first_flight": pytest.mark.long,
     "own_scenario": (),
     "own_fault": pytest.mark.long,
-    "own_controller": (),
+    "own_controller": pytest.mark.long,
     "reading_a_bag": pytest.mark.long,
     "campaign": pytest.mark.long,
 }

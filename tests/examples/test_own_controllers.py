@@ -13,6 +13,7 @@ from pathlib import Path
 import matplotlib
 import numpy
 import pytest
+from marking import long
 from node_processes import Processes
 from printed_commands import printed
 from pyarrow import parquet
@@ -74,7 +75,7 @@ def installed(tmp_path_factory):
 @pytest.mark.parametrize(
     ("example", "altitude", "velocity"),
     # Integral action takes the error that the fault leaves away; feedback alone does not.
-    [("lqr", 1.0, 0.1), pytest.param("compiled", 30.0, 5.0, marks=pytest.mark.long)],
+    [long("lqr", 1.0, 0.1), long("compiled", 30.0, 5.0)],
 )
 def test_it_flies_without_a_design_and_holds_the_commands(installed, example, altitude, velocity):
     ran = installed(example).hsv("simulate", str(EXAMPLES / example / f"{example}.toml"), "--json")
@@ -148,6 +149,7 @@ def checkout(tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 def test_the_example_in_c_is_built_flown_and_compared_as_its_page_says(checkout, monkeypatch):
     matplotlib.use("agg")
     monkeypatch.chdir(checkout)

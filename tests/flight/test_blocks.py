@@ -1,12 +1,11 @@
 """The loop as a table: its order is found, and what cannot be ordered is refused."""
 
 import pytest
-from flights import components
 
 from hsv.bags.description import CARRIED, CLOCK, TOPICS, graph
 from hsv.base.errors import HsvError
 from hsv.control.controller import CONTROLLER_INPUTS, ControllerInput
-from hsv.flight.blocks import LOOP, Block, Signals, in_order, steps
+from hsv.flight.blocks import LOOP, Block, Signals, in_order
 from hsv.model.signals import SignalType
 
 
@@ -65,8 +64,3 @@ def test_every_node_subscribes_to_no_more_than_what_its_block_needs_and_publishe
 def test_a_controller_takes_its_inputs_in_one_order():
     assert ControllerInput._fields == ("step", *(signal.name for signal in CONTROLLER_INPUTS))
     assert LOOP[3].inputs == CONTROLLER_INPUTS
-
-
-def test_ideal_sensors_say_the_truth():
-    flown = [(signals.step, *(signals.measurement - signals.state)) for signals in steps(components(duration=1.0))]
-    assert flown == [(k, *[0.0] * 9) for k in range(51)]

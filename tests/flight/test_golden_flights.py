@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
+from marking import long
 
 from hsv.core import lanes
 from hsv.flight.assembly import assemble, flight_parameters
@@ -75,14 +76,14 @@ def compare_three_ways(indices):
             assert [each.fingerprint for each in others] == [fly(each).fingerprint for each in group[:-1]], index
 
 
-@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize("part", [part if part % 3 == 0 else long(part) for part in range(PARTS)])
 def test_golden_flights_have_the_bits_that_they_had(part):
     for index in range(part, len(LINES), PARTS):
         parts, expected = golden(index)
         check(fly(parts), expected)
 
 
-@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize("part", [0, long(1), long(2), long(3)])
 def test_some_have_them_step_by_step_and_in_lanes(part):
     compare_three_ways(range(part, len(LINES), 40))
 

@@ -1,10 +1,8 @@
 """Controllers in C in the loop: the same bits as in Python, and what they do wrong ends their own process only."""
 
-import multiprocessing
 import re
 import shutil
 import subprocess
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -109,30 +107,6 @@ def test_c_and_python_answer_the_same_stepwise(flight):
 
 def test_a_copy_goes_on_from_the_state_of_the_first(flight):
     assert from_copied_state(flight(), fly(flight())) == ""
-
-
-def _fingerprint(parts):
-    return fly(parts).fingerprint
-
-
-def test_a_forked_process_has_a_child_of_its_own(flight):
-    parts = flight()
-    alone = fly(parts).fingerprint
-    with multiprocessing.get_context("fork").Pool(1) as pool:
-        assert pool.apply(_fingerprint, (parts,)) == alone
-    assert fly(parts).fingerprint == alone
-
-
-def test_flights_in_threads_share_no_state(flight):
-    parts = flight()
-    alone = fly(parts).fingerprint
-    found = []
-    threads = [threading.Thread(target=lambda: found.append(fly(parts.perturbed({})).fingerprint)) for _ in range(3)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert found == [alone] * 3
 
 
 def test_what_a_library_keeps_beside_its_state_is_found(tmp_path):
@@ -262,17 +236,6 @@ def test_a_path_is_from_the_folder_of_the_file_that_says_it(folder, tmp_path):
 def test_a_library_that_is_not_there_is_named(flight):
     with pytest.raises(ScenarioError, match=r"controller = '.*/absent.so:probe': cannot be read \(No such file"):
         flight(controller="absent.so:probe")
-
-
-def test_what_a_recorded_flight_keeps_is_the_library_s_hash_and_its_source(flight, folder):
-    name = flight().controller.name
-    kept = library_record(name)
-    assert (kept.source_name, kept.source) == ("probe.c", PROBE.read_bytes())
-    before = library_digest(name)
-    assert before == kept.sha256 and len(before) == 64
-    (folder / "other.so").write_bytes((folder / "probe.so").read_bytes() + b"\0")
-    assert library_digest(name.replace("probe.so", "other.so")) != before
-    assert library_record("tube_mpc") is None and library_digest("package.module:Class") == ""
 
 
 def test_a_library_without_its_source_is_prepared_for_a_run_as_it_flies_in_process(tmp_path):

@@ -2,25 +2,13 @@
 
 import numpy as np
 import pytest
-from flights import components, step_by_step
-from numpy.testing import assert_array_equal
+from flights import components
 
 from hsv.base.units import FOOT
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.metrics import flight_metrics
 from hsv.flight.scenario import load_scenario
-
-LIKE_EQ_48 = {"nominal.filtered": True, "feedback.tau_minimum": [0.5]}
-TAU = {"feedback.tau": [0.8], "tau_change.starts": [10.0, 30.0], "tau_change.values": [0.6, 0.9]}
-
-
-@pytest.mark.parametrize("changes", [{}, {"reference.trim": "static"}, LIKE_EQ_48, LIKE_EQ_48 | TAU], ids=str)
-def test_the_compiled_loop_flies_what_the_parts_fly_step_by_step(changes):
-    parts = components("case2_baseline", duration=40.0, **changes)
-    flight, stepped = fly(parts), step_by_step(parts)
-    for name in ("state", "deviation", "nominal_input", "u_unsaturated", "actuator"):
-        assert_array_equal(getattr(flight.history, name), stepped[name], err_msg=name)
 
 
 def test_a_ramp_that_ends_after_the_flight_is_flown_up_to_the_flights_end():

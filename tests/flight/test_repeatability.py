@@ -2,7 +2,6 @@
 
 import os
 import random
-import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +13,7 @@ from hsv.control.controller import StepKernel
 from hsv.flight import repeatability
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
-from hsv.flight.repeatability import findings, from_copied_state, scenario_of, under_load
+from hsv.flight.repeatability import findings, scenario_of, under_load
 from hsv.flight.scenario import load_scenario
 
 FEEDBACK = np.array([[-1e-3, -2e-3, 0.0, 0.0, 0.0], [0.0, 0.0, -2.0, 3.0, 1.2]])
@@ -58,13 +57,6 @@ class Random(Steady):
 
     def more(self, inputs):
         return 1e-9 * random.random() if inputs.step >= 30 else 0.0
-
-
-class Timed(Steady):
-    """Goes by the clock on the wall."""
-
-    def more(self, inputs):
-        return 1e-9 * (time.perf_counter() % 1.0)
 
 
 class Shared(Steady):
@@ -166,10 +158,6 @@ def test_one_that_draws_numbers_is_found_from_the_step_on_in_which_it_does(found
     assert differing["from a copied state"].startswith("the controller: u_unsaturated from step 30 on: [")
 
 
-def test_one_that_goes_by_the_clock_is_found(found):
-    assert found(Timed).keys() == {"flown twice", "after a reset", "from a copied state"}
-
-
 @pytest.mark.parametrize("controller", [Shared, CompiledStatic])
 def test_one_that_shares_its_state_is_found_beside_its_copy(found, controller):
     differing = found(controller)["from a copied state"]
@@ -195,12 +183,6 @@ def test_several_flights_at_a_time_in_several_processes_are_compared():
     finding = under_load(flown, fly(assemble_flight(flown)))
     assert finding.flights >= 4
     assert finding.difference.startswith("u_unsaturated from step 0 on: [")
-
-
-def test_a_copy_of_one_with_memory_goes_on_from_where_it_was():
-    flown = scenario("tube_mpc").model_copy(update={"integral": load_scenario("case1_integral_heavy").integral})
-    parts = assemble_flight(flown)
-    assert from_copied_state(parts, fly(parts)) == ""
 
 
 def test_a_name_is_that_of_a_scenario_or_of_a_controller_in_the_default_one(tmp_path):

@@ -40,11 +40,6 @@ def test_case1_is_the_flight_of_the_paper():
     assert not any(name.startswith("vehicle.perturbation") for name in values)
 
 
-def test_uncertain_scenarios_perturb_all_ten_parameters():
-    for name in ("case1_uncertain", "case1_heavy"):
-        assert len(load_scenario(name).vehicle.perturbation) == 10
-
-
 @pytest.mark.parametrize(
     ("altitude", "step"),
     [("85000 ft", "1500 ft"), ("86500 ft", "-1500 ft"), ("85950 ft", "550 ft"), ("85030 ft", "-30 ft")],
@@ -169,12 +164,6 @@ def test_what_is_not_text_is_refused(tmp_path):
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ScenarioError, match=r"binary.toml': cannot be read \(not text\)"):
         load_scenario(str(path))
-
-
-def test_a_scenario_from_a_file_is_called_after_it(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(CASE1)
-    assert load_scenario(str(path)).name == "mine"
 
 
 def test_a_design_that_is_not_there_is_named():

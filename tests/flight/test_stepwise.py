@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from flights import step_by_step
-from marking import long
 
 from hsv.control.design import ControlDesign
 from hsv.flight.assembly import assemble, flight_parameters
@@ -16,23 +14,6 @@ FOOT = 0.3048
 
 def components(scenario, **changes):
     return assemble({**flight_parameters(load_scenario(scenario)), **changes})
-
-
-@pytest.mark.parametrize(
-    "scenario",
-    ["case1_uncertain", "case1_derived_no_notch", "case1_rmpc", "case1_integral_heavy", "case2", long("case1_qp")],
-)
-def test_steps_equal_the_compiled_loop_bit_for_bit(scenario):
-    parts = components(scenario, duration=104.0)
-    compiled, stepwise = fly(parts), step_by_step(parts)
-    assert stepwise["plant_status"][-1] == compiled.status
-    for name, column in compiled.history.columns().items():
-        assert np.array_equal(column, stepwise[name]), name
-
-
-def test_a_second_flight_of_the_same_components_is_the_same():
-    parts = components("case1", **{"duration": 5.0, "integral.rate": 0.1})
-    assert np.array_equal(fly(parts).history.state, fly(parts).history.state)
 
 
 @pytest.mark.parametrize(

@@ -105,15 +105,6 @@ def test_a_sampled_scenario_takes_its_vehicle_along(folder):
         assert abs(sampled.perturbation["mass"]) == 0.05
 
 
-def test_a_number_couples_as_the_set_it_is():
-    by_name = assemble_flight(load_scenario("case1", SHORT | {"vehicle.coupling": "derived"}))
-    by_number = assemble_flight(load_scenario("case1", SHORT | {"vehicle.coupling": 1}))
-    assert by_name.plant.vehicle == by_number.plant.vehicle
-    assert fly(by_name).fingerprint == fly(by_number).fingerprint
-    stronger = assemble_flight(load_scenario("case1", SHORT | {"vehicle.coupling": 0.65})).plant.vehicle
-    assert stronger.inertial_coupling_1 == 0.65 * by_name.plant.vehicle.inertial_coupling_1
-
-
 @pytest.mark.parametrize(
     ("design", "changes", "status"),
     [

@@ -50,6 +50,7 @@ def test_disturbances_and_errors_are_those_of_the_design(name):
     assert_allclose(found.channels / size, channels / size, rtol=0.0, atol=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["baseline", pytest.param("adjustable", marks=pytest.mark.long)])
 def test_a_shipped_design_passes_with_its_flights_and_sequences(name):
     subject = load_subject(find_design(name))

@@ -36,7 +36,7 @@ from hsv.flight.campaign.summary import Results, limits, shares, worst_flights
 from hsv.flight.scenario import load_scenario, scenario_names, scenario_text
 from hsv.model.vehicle import load_vehicle, vehicle_names, vehicle_text
 
-QUICK, LONG = 25, 10_000
+QUICK, LONG = 5, 10_000
 
 Fuzz = Callable[[st.SearchStrategy[Mutated], Callable[[Mutated], object]], None]
 
@@ -115,7 +115,7 @@ def test_a_vehicle(fuzz: Fuzz, tmp_path: Path) -> None:
 
 
 @hypothesis.given(st.text("0123456789.e+-*/^() ftsdegradN%", max_size=60))
-@settings(max_examples=500, derandomize=True, database=None)
+@settings(max_examples=200, derandomize=True, database=None)
 def test_a_quantity(text: str) -> None:
     with suppress(HsvError):
         parse_quantity(text, "m", "altitude")

@@ -27,6 +27,7 @@ def active_scenario(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_node_in_process_and_replay_are_the_same(processes: Processes, tmp_path: Path) -> None:
     scenario, bag_path = active_scenario(tmp_path), tmp_path / "bag"
     flown = processes.run("hsv", "run", scenario, "--bag", bag_path, "--no-report")

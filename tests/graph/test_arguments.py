@@ -24,7 +24,7 @@ COMPOSED, RECORDER = ("hsv_bringup", "composed"), ("hsv_bringup", "recorder")
 @pytest.mark.parametrize(
     ("node", "arguments", "words"),
     [
-        (PLANT, "-p nosuch:=1", ["parameter nosuch", "plant has none", "nearest is"]),
+        long(PLANT, "-p nosuch:=1", ["parameter nosuch", "plant has none", "nearest is"]),
         long(PLANT, "-p durations:=200.0", ["parameter durations", "nearest is duration"]),
         (PLANT, "-p duration:=200", ["duration = 200", "expected double", "(write 200.0)"]),
         long(PLANT, "-p bag.directory:=here", ["parameter bag.directory", "recorder has"]),
@@ -50,7 +50,7 @@ COMPOSED, RECORDER = ("hsv_bringup", "composed"), ("hsv_bringup", "recorder")
         long(PLANT, "-p duration", ["'-p duration'"]),
         long(PLANT, "--nosuch", ["unknown ROS arguments", "--nosuch"]),
         long(PLANT, "--log-level nosuch", ["'--log-level nosuch'"]),
-        (PLANT, "-- duration=10", ["argument 'duration=10'"]),
+        long(PLANT, "-- duration=10", ["argument 'duration=10'"]),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )

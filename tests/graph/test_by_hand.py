@@ -108,7 +108,7 @@ def test_a_flight_by_hand_is_told_and_can_be_repeated(processes: Processes) -> N
         long(("set", "tau", "0.8 m"), 2, "feedback.tau = '0.8 m': wrong unit"),
         long(("topic", "--every", "0"), 2, "--every"),
         long(("topic", "bad name"), 2, "hsv topic: error: name = 'bad name': expected the name of a topic"),
-        (("topic", "/hsv//state"), 2, "(topic name must not contain repeated '/')"),
+        long(("topic", "/hsv//state"), 2, "(topic name must not contain repeated '/')"),
         long(("topic", "hsv/9x"), 2, "(topic name token must not start with a number)"),
         long(("fault", "list", "--namespace", "a b"), 2, "namespace = 'a b'"),
     ],
@@ -121,7 +121,7 @@ def test_commands_refuse_in_one_line(processes: Processes, words: tuple[str, ...
 
 @pytest.mark.parametrize(
     ("number", "after"),
-    [long(signal.SIGINT, 0.2), (signal.SIGTERM, 2.0), long(signal.SIGINT, 2.0), long(signal.SIGTERM, 0.2)],
+    [long(number, after) for number in (signal.SIGINT, signal.SIGTERM) for after in (0.2, 2.0)],
 )
 def test_a_command_is_interrupted_in_one_line(processes: Processes, number: int, after: float) -> None:
     # However early it comes: on a fast machine 2 s is in the middle of the waiting, on a slow one in the imports.
@@ -136,6 +136,7 @@ def test_a_command_is_interrupted_in_one_line(processes: Processes, number: int,
     assert popen.returncode == 130 and output.splitlines()[-1].endswith("error: interrupted"), output
 
 
+@pytest.mark.long
 def test_topics_are_listed_and_printed_with_units(processes: Processes) -> None:
     bag = processes.folder / "flown"
     flight = processes.start("hsv", "run", "case1", "--real-time-factor", "0.5", "--no-report", "--bag", bag)
@@ -191,7 +192,7 @@ def test_who_does_not_answer_is_given_up_by_name(monkeypatch: pytest.MonkeyPatch
     ("package", "executable", "arguments", "words"),
     [
         long("hsv_plant", "plant", ["-p", "duration:=10"], ["duration = 10", "expected double"]),
-        (
+        long(
             "hsv_plant",
             "plant",
             ["-p", "initial.altitude:=30000.0"],

@@ -25,6 +25,7 @@ def test_a_flight_that_is_not_there_is_refused(results):
         replay_in_process(results, 44)
 
 
+@pytest.mark.long
 @pytest.mark.graph
 def test_a_flight_over_dds_is_the_same_in_every_bit(results, tmp_path, monkeypatch):
     with own_domain() as number:

@@ -24,6 +24,7 @@ pytestmark = pytest.mark.graph
 PERIOD = 0.02
 
 
+@pytest.mark.long
 def test_points_are_commanded_recorded_and_repeated(processes: Processes, tmp_path: Path) -> None:
     bag_path = tmp_path / "flown"
     scenario = short_scenario(tmp_path, duration=3600, fault=6)

@@ -54,6 +54,7 @@ def _history(scenario: Path) -> History:
     return fly(assemble(flight_parameters(load_scenario(str(scenario))))).history
 
 
+@pytest.mark.long
 def test_robust_mpc_flies_as_in_process(processes: Processes) -> None:
     scenario = _shortened(processes, "case1_rmpc", 3, 2)
     bag = _flown(processes, scenario, "rmpc")
@@ -62,6 +63,7 @@ def test_robust_mpc_flies_as_in_process(processes: Processes) -> None:
     assert set(status["status"]) == {TubeStatusCode.NO_SET} and np.isnan(status["level"]).all()
 
 
+@pytest.mark.long
 def test_qp_flies_as_in_process_and_leaving_the_tube_is_told(processes: Processes) -> None:
     scenario = _shortened(processes, "case1_qp", 4, 2, value=0.6)
     bag = _flown(processes, scenario, "left", "--composed")

@@ -79,6 +79,7 @@ def test_a_full_disk_loses_the_flight_by_the_recorders_name(processes: Processes
     assert recorded_steps(bag) >= ON_DISK
 
 
+@pytest.mark.long
 def test_a_bag_that_is_removed_in_flight_ends_the_run_at_once(processes: Processes) -> None:
     bag = processes.folder / "removed"
     run = _start_and_fly(processes, bag)
@@ -90,14 +91,14 @@ def test_a_bag_that_is_removed_in_flight_ends_the_run_at_once(processes: Process
     assert not bag.exists()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP, long(signal.SIGTERM)])
+@pytest.mark.parametrize("number", [signal.SIGINT, long(signal.SIGHUP), long(signal.SIGTERM)])
 def test_interrupt_ends_all_and_closes_the_bag(processes: Processes, number: int) -> None:
     bag, temporary = processes.folder / "interrupted", processes.folder / "temporary"
     temporary.mkdir()
     processes.environment["TMPDIR"] = str(temporary)
     run = _start_and_fly(processes, bag)
     nodes = children(run.pid)
-    if number == signal.SIGINT:
+    if number == signal.SIGTERM:
         _refuse_to_disturb(processes, bag)
     run.send_signal(number)
     output = output_of(run)
@@ -160,6 +161,7 @@ def test_a_hung_node_is_named_and_ends_the_run(processes: Processes, name: str) 
     assert Bag(bag).complete
 
 
+@pytest.mark.long
 def test_a_node_that_hangs_at_its_start_is_named_and_ends_the_run(processes: Processes) -> None:
     scenario = short_scenario(processes.folder)
     run = processes.start("hsv", "run", scenario, "--no-report", "--step-timeout", "6")

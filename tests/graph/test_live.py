@@ -45,6 +45,7 @@ class Watched:
         assert self.popen.returncode == 0, self.text
 
 
+@pytest.mark.long
 def test_five_viewers_one_of_whom_never_reads_change_no_bit(processes: Processes, tmp_path: Path) -> None:
     scenario = short_scenario(tmp_path, duration=20)
     watched = Watched(processes, scenario, "--bag", tmp_path / "bag", "--real-time-factor", "10")

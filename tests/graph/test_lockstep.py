@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from marking import long
 from node_processes import Processes, short_scenario
 from waiting import exit_code_of
 
@@ -51,7 +52,7 @@ def _short_case2(folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize(("flown", "shortened"), [("case1", short_scenario), ("case2", _short_case2)])
+@pytest.mark.parametrize(("flown", "shortened"), [("case1", short_scenario), long("case2", _short_case2)])
 def test_graph_equals_in_process_bit_for_bit(
     request: pytest.FixtureRequest, tmp_path: Path, flown: str, shortened: Callable[[Path], Path]
 ) -> None:

@@ -56,6 +56,7 @@ def by_hand(
     }
 
 
+@pytest.mark.long
 def test_two_graphs_in_one_domain(processes: Processes) -> None:
     scenario = short_scenario(processes.folder, DURATION, 3)
     words = ("hsv", "run", scenario, "--no-report", "--json", "--bag")

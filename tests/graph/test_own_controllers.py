@@ -72,7 +72,8 @@ def flown(processes: Processes, path: Path, name: str, *words: str) -> Bag:
     return Bag(processes.folder / name)
 
 
-@pytest.mark.parametrize("place", [long("hsv_lqr:Lqr"), "lqr_in_c:LqrInC"])
+@pytest.mark.long
+@pytest.mark.parametrize("place", ["hsv_lqr:Lqr", "lqr_in_c:LqrInC"])
 def test_a_class_and_a_function_in_c_fly_as_in_process(processes: Processes, place: str) -> None:
     path = scenario(processes.folder, "lqr", f'controller = "{place}"')
     simulated = processes.run("hsv", "simulate", path)
@@ -87,6 +88,7 @@ def test_a_class_and_a_function_in_c_fly_as_in_process(processes: Processes, pla
         assert replayed.returncode == 0 and "identical in every byte" in replayed.stdout, replayed.stdout
 
 
+@pytest.mark.long
 def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes: Processes) -> None:
     path = scenario(processes.folder, "node")
     bags = [flown(processes, path, "started")]
@@ -158,6 +160,7 @@ def test_a_node_that_goes_wrong_is_named_and_the_bag_is_whole(processes: Process
     assert (exit_code_of(foreign) == -9) if how == "killed" else foreign.poll() is None
 
 
+@pytest.mark.long
 def test_a_controller_that_is_slow_is_named(processes: Processes) -> None:
     path = scenario(processes.folder, "lqr", 'controller = "wrong_controller:SlowLqr"')
     words = ("--step-timeout", "3", "--no-report", "--bag", processes.folder / "slow")
@@ -198,9 +201,3 @@ def test_two_controllers_end_the_run(processes: Processes) -> None:
 def test_a_node_does_not_fly_in_process(processes: Processes) -> None:
     done = processes.run("hsv", "simulate", scenario(processes.folder, "node"))
     assert done.returncode == 2 and "a node of its own, expected hsv run" in last_line(done), done.stdout
-
-
-@pytest.mark.long
-def test_the_node_of_classes_flies_no_other(processes: Processes) -> None:
-    done = processes.run("ros2", "run", "hsv_ctrl", "controller")
-    assert done.returncode == 2 and "the node tube_mpc flies it" in last_line(done), done.stdout

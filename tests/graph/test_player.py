@@ -58,7 +58,7 @@ def test_a_step_at_the_end_is_refused(bag: Path) -> None:
             rclpy.shutdown()
 
 
-@pytest.mark.parametrize("delay", ["nan", long("inf"), long("-1")])
+@pytest.mark.parametrize("delay", [*map(long, ("nan", "inf", "-1"))])
 def test_a_delay_that_never_ends_is_refused(processes: Processes, bag: Path, delay: str) -> None:
     done = processes.run("hsv", "play", bag, "--delay", delay, "--topic", "/hsv/state")
     assert done.returncode == 2
@@ -66,6 +66,7 @@ def test_a_delay_that_never_ends_is_refused(processes: Processes, bag: Path, del
     assert line.startswith(f"player: error: delay = {float(delay)}: expected a finite number")
 
 
+@pytest.mark.long
 def test_a_message_type_that_is_not_installed_is_named(processes: Processes, bag: Path) -> None:
     def foreign(topic: Topic) -> Topic:
         if topic.name != "/hsv/forces":

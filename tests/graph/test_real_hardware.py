@@ -8,7 +8,6 @@ import signal
 import numpy as np
 import pytest
 from injected_fault import last_line
-from marking import long
 from node_processes import Processes, fly_until
 from real_hardware import ELEVATOR, SHORT, scenario_file
 from waiting import output_of
@@ -26,9 +25,10 @@ from hsv.flight.scenario import load_scenario
 pytestmark = pytest.mark.graph
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "words"),
-    [long("everything", ()), ("everything estimated", ()), long("everything estimated", ("--composed",))],
+    [("everything", ()), ("everything estimated", ()), ("everything estimated", ("--composed",))],
 )
 def test_graph_equals_in_process_bit_for_bit(shared_processes: Processes, name: str, words: tuple[str, ...]) -> None:
     scenario = scenario_file(shared_processes.folder, name)

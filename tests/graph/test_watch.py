@@ -47,6 +47,7 @@ def test_a_flight_is_watched_to_its_end_and_its_bits_are_the_same(tmp_path: Path
     assert flight_fingerprint(Bag(bag)) == fly(assemble_flight(load_scenario(str(scenario)))).fingerprint
 
 
+@pytest.mark.long
 def test_where_nobody_flies_it_is_one_line(tmp_path: Path) -> None:
     with own_environment() as environment:
         processes = Processes(environment, tmp_path)

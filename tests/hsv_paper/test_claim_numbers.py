@@ -40,6 +40,7 @@ def test_what_loses_a_step_s_share_of_its_level_decreases():
     assert kept_of_level(A, B, np.zeros((1, 2)), np.diag([4.0, 1.0])) > 1.0
 
 
+@pytest.mark.long
 def test_peaks_fall_but_are_not_eliminated(findings):
     finding = findings["peaks eliminated"]
     assert finding.verdict is Verdict.FAILS

@@ -10,6 +10,7 @@ FINDING = Finding((Reading("first", 0.5, "1", at_most=1.0), Reading("second", 2.
 RANKS = {metric: {name: Rank(123456.0, 2e5, 1, 2) for name in CONTROLLERS} for metric in METRICS}
 
 
+@pytest.mark.long
 def test_a_figure_is_drawn_with_its_page(hsv_paper, tmp_path):
     ran = hsv_paper("figures", "--only", "4", "--out", "drawn")
     assert ran.code == 0

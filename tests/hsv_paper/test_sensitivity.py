@@ -150,6 +150,7 @@ def test_each_group_of_weights_varies_its_own():
     assert softer < own < stiffer
 
 
+@pytest.mark.long
 def test_a_coarse_study_has_a_page_with_its_findings(tmp_path):
     study = STUDIES["coupling"]
     outcome = study.run(Scope(25.0, tmp_path))
@@ -193,6 +194,7 @@ def test_gusts_that_stay_and_those_that_decay():
     assert at.elevator == pytest.approx(hardware.SURFACE.stop, rel=1e-3)
 
 
+@pytest.mark.long
 def test_a_limit_below_the_first_velocity_is_found():
     case, gust = hardware.CASES[3], hardware.GUSTS[1]
     found = hardware.gust_limits(case, gust)["attitude"]
@@ -221,6 +223,7 @@ def test_the_loop_is_lost_between_factors_of_a_half_and_four_tenths(coupling):
     assert at(limit + 1e-3) < 0.0 < at(limit - 1e-3)
 
 
+@pytest.mark.long
 def test_the_certified_range_of_the_factor_ends_before_the_loop_is_lost():
     inputs = read_inputs(find_inputs("adjustable"))
     assert [is_certified(design("adjustable"), inputs, tau) for tau in (0.8, 0.5, 0.4)] == [True, True, False]

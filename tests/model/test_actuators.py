@@ -12,11 +12,9 @@ from scipy.linalg import expm
 
 from hsv.base.errors import ParameterError
 from hsv.model.actuators import (
-    ACTUATOR_PARAMETERS,
     ACTUATOR_SETS,
     actuator_data,
     actuator_map,
-    actuators_at_rest,
 )
 from hsv.model.vehicle import load_vehicle
 
@@ -112,14 +110,6 @@ def test_stops_hold_and_are_left_at_once(order):
     assert position[200] < 0.5
 
 
-def test_position_beyond_a_stop_that_moved_returns_at_the_rate():
-    h, limit = 0.005, 0.4
-    position, _, _ = respond((2, 50.0, 0.7), np.full(200, 1.0), h, start=0.5, high=0.3, rate=limit)
-    assert position.max() < 0.5
-    assert np.diff(position).min() >= -limit * h * (1.0 + 1e-12)
-    assert position[-1] == pytest.approx(0.3, abs=1e-3)
-
-
 @settings(max_examples=100, deadline=None)
 @given(st.sampled_from([0, 1, 2]), st.floats(-0.5, 0.5), st.floats(1.0, 400.0), st.floats(0.05, 1.0))
 def test_equilibrium_stays_to_the_bit(order, where, frequency, damping):
@@ -129,19 +119,6 @@ def test_equilibrium_stays_to_the_bit(order, where, frequency, damping):
     assert_array_equal(position, where)
     assert_array_equal(rate, 0.0)
     assert_array_equal(held, where)
-
-
-def test_ideal_actuator_is_where_its_command_is():
-    commands = np.array([0.3, -0.1, 0.25])
-    for low, high in ((-INF, INF), (0.0, 0.2)):
-        position, _, held = respond((0, INF, 1.0), commands, 0.005, start=0.1, low=low, high=high)
-        assert_array_equal(position, np.clip(commands, low, high))
-        assert_array_equal(held, position)
-
-
-def test_vehicle_is_given_the_middle_of_the_way():
-    position, _, held = respond((2, 50.0, 0.7), np.ones(9), 0.005)
-    assert_allclose(held, 0.5 * (np.concatenate(([0.0], position[:-1])) + position))
 
 
 def test_without_parameters_all_is_ideal_within_the_limits_of_the_vehicle():
@@ -192,8 +169,3 @@ def test_fields_replace_those_of_the_set():
 def test_what_is_no_actuator_is_refused(values, message):
     with pytest.raises(ParameterError, match=message):
         actuator_data(values, VEHICLE, PERIOD)
-
-
-def test_parameters_are_described():
-    assert all(parameter.description for parameter in ACTUATOR_PARAMETERS)
-    assert actuators_at_rest(np.array([0.2, 0.1])).tolist() == [[0.2, 0.0], [0.1, 0.0]]

@@ -12,7 +12,6 @@ from scipy.signal import welch
 from hsv.base.errors import ParameterError
 from hsv.base.units import FOOT
 from hsv.core import lib
-from hsv.core.arithmetic import normals
 from hsv.model.atmosphere import ATMOSPHERE_PARAMETERS, atmosphere_data, atmosphere_state
 
 T = 0.02
@@ -54,6 +53,7 @@ def test_cross_filter_has_drydens_autocorrelation_exactly(r):
         assert C @ np.linalg.matrix_power(F, lag) @ C == pytest.approx(math.exp(-x) * (1.0 - 0.5 * x), abs=1e-12)
 
 
+@pytest.mark.long
 def test_turbulence_has_its_variance_and_autocorrelation(turbulence):
     r = SPEED * T / LENGTH
     for axis, law in enumerate((lambda x: math.exp(-x), lambda x: math.exp(-x) * (1.0 - 0.5 * x))):
@@ -64,6 +64,7 @@ def test_turbulence_has_its_variance_and_autocorrelation(turbulence):
     assert abs(np.mean(turbulence[0] * turbulence[1])) < 0.025
 
 
+@pytest.mark.long
 def test_turbulence_has_drydens_spectrum(turbulence):
     tau = LENGTH / SPEED
     laws = (
@@ -77,62 +78,6 @@ def test_turbulence_has_drydens_spectrum(turbulence):
         expected = 2.0 * law(2j * np.pi * frequency[inside])
         assert_allclose(density[inside] / expected, 1.0, atol=0.25)
         assert np.mean(density[inside] / expected) == pytest.approx(1.0, abs=0.05)
-
-
-def test_turbulence_is_stationary_from_the_first_step():
-    values = {"turbulence.sigma_forward": 1.0, "turbulence.sigma_up": 1.0}
-    first = np.array([flown(values, 2, seed) for seed in range(1500)])[:, :, :2]
-    assert_allclose(first.std(axis=0), 1.0, atol=0.08)
-
-
-def test_over_no_distance_turbulence_stays_what_it_is():
-    assert_array_equal(dryden_cross_map(0.0), [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-
-
-def states(values, steps, seed=3):
-    """Return the states of the atmosphere after every step."""
-    data = atmosphere_data(values, T)
-    state, found = atmosphere_state(data), []
-    for k in range(steps):
-        air = atmosphere_step(data, state, k, seed, ALTITUDE, SPEED)
-        found.append((state.copy(), air))
-    return found
-
-
-@pytest.mark.parametrize(
-    ("sigma", "length", "place", "stream", "factor"),
-    [
-        ("turbulence.sigma_forward", "turbulence.length_forward", ALONG, lib.TURBULENCE_FORWARD, 0),
-        ("density.sigma", "density.length", VARIATION, lib.DENSITY_VARIATION, 2),
-    ],
-)
-def test_a_gauss_markov_process_forgets_as_it_is_driven(sigma, length, place, stream, factor):
-    decay = math.exp(-SPEED * T / 1000.0)
-    x = normals(3, 0, stream)[0]
-    for k, (state, air) in enumerate(states({sigma: 0.2, length: 1000.0}, 5)):
-        if k:
-            x = decay * x + math.sqrt(1.0 - decay**2) * normals(3, k, stream)[0]
-        assert state[place] == pytest.approx(x, rel=1e-12)
-        assert air[factor] == pytest.approx(0.2 * x + (factor == 2), rel=1e-12)
-
-
-def test_turbulence_across_the_path_is_driven_by_two_numbers_a_step():
-    f = dryden_cross_map(SPEED * T / 400.0)
-    F, factor = np.reshape(f[:4], (2, 2)), np.array([[f[4], 0.0], [f[5], f[6]]])
-    z = np.array(normals(3, 0, lib.TURBULENCE_UP))
-    for k, (state, air) in enumerate(states({"turbulence.sigma_up": 2.0, "turbulence.length_up": 400.0}, 5)):
-        if k:
-            z = F @ z + factor @ normals(3, k, lib.TURBULENCE_UP)
-        assert_allclose(state[ACROSS], z, rtol=1e-12)
-        assert air[1] == pytest.approx(z[0] + math.sqrt(3.0) * z[1], rel=1e-12)
-
-
-def test_turbulence_is_a_function_of_seed_and_step():
-    values = {"turbulence.sigma_up": 1.0}
-    assert_array_equal(flown(values, 20, 7), flown(values, 20, 7))
-    assert (flown(values, 20, 7)[:, 1] != flown(values, 20, 8)[:, 1]).all()
-    both = flown({**values, "turbulence.sigma_forward": 1.0}, 20, 7)
-    assert_array_equal(both[:, 1], flown(values, 20, 7)[:, 1])
 
 
 @pytest.mark.parametrize("stays", [True, False])
@@ -163,6 +108,7 @@ def test_wind_is_steady_and_shears_with_altitude():
     assert_allclose(flown(values, 1), [[25.0, -1.0, 1.0]])
 
 
+@pytest.mark.long
 def test_density_is_off_by_a_constant_and_a_gauss_markov_process():
     assert_allclose(flown({"density.offset": -0.05}, 1)[0, 2], 0.95)
     values = {"density.offset": 0.02, "density.sigma": 0.03, "density.length": 2000.0}

@@ -122,27 +122,6 @@ def test_with_a_checksum_what_is_corrupted_is_lost():
     assert_array_equal(measured(corruption=0.1, checksum=True), SENT[last])
 
 
-def test_a_refused_payload_that_comes_once_more_is_whole():
-    numbers = np.full((STEPS, 1), 1.5)
-    numbers[:, 0] += np.arange(STEPS) * 2.0**-20
-    taken = passed(measurement_link({"link.measurement.jitter": 3.0, "link.measurement.corruption": 1.0}), numbers)
-    assert np.abs(taken).max() <= LARGEST
-    sent, words = numbers.view(np.uint64).ravel(), taken.view(np.uint64).ravel()
-    for k in range(10, STEPS):
-        window = sent[k - 10 : k + 1] ^ words[k]
-        assert any(int(word).bit_count() <= 1 for word in window), k
-
-
-def test_each_link_has_draws_of_its_own():
-    link = command_link({"link.command.loss": 0.2}, T)
-    lost = drawn(lib.LINK_LOSS, COMMAND)[0] < 0.2
-    last = np.maximum.accumulate(np.where(lost, -1, np.arange(STEPS)))
-    before = np.array([0.25, 0.21])
-    sent = np.vstack([SENT[:, :2], before])
-    assert_array_equal(passed(link, SENT[:, :2], before=before), sent[last])
-    assert np.any(lost != (drawn(lib.LINK_LOSS, MEASUREMENT)[0] < 0.2))
-
-
 @pytest.mark.parametrize(
     ("field", "value", "message"),
     [

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hsv.base.errors import ParameterError, TrimError
+from hsv.base.errors import ParameterError
 from hsv.core import lib
 from hsv.model.dynamics import advance
 from hsv.model.faults.schedule import ActiveFault
@@ -91,20 +91,6 @@ ADDED = [
 ]
 
 
-def test_statuses_are_those_of_the_message():
-    assert [FlightStatus.RUNNING, FlightStatus.FINISHED, FlightStatus.DIVERGED] == [0, 1, 2]
-
-
-@pytest.mark.parametrize("equipment", [{}, {"sensors__set": "ghv"}])
-def test_sensors_do_not_move_the_vehicle(equipment):
-    bench = plant(**equipment)
-    x = bench.initial.state
-    for share in (1.0, 1.02, 0.97):
-        held = share * bench.initial.input
-        x = advance(x, held, bench.vehicle, 0.02, 2)
-        assert_array_equal(bench.step(held).state, x)
-
-
 def test_the_vehicle_flies_in_the_wind_and_density_of_its_atmosphere():
     bench = plant(wind__forward=20.0, wind__up=-3.0, density__offset=0.05)
     x, held = bench.initial.state.copy(), bench.initial.input
@@ -130,23 +116,6 @@ def test_an_inlet_feels_angle_of_attack_and_mach_number_of_the_air(wind, speed):
         assert (result.forces[2] > 0.0) == started
 
 
-def test_with_actuators_too_a_flight_begins_at_rest():
-    bench = plant(actuator__elevator_deflection__set="elevator_50")
-    held = bench.initial.input
-    for _ in range(2):
-        assert_allclose(bench.step(held).state, bench.initial.state, rtol=1e-9, atol=1e-9)
-        assert_array_equal(bench.step(held).effector, held)
-        bench.step(0.9 * held)
-        bench.reset()
-
-
-def test_result_is_a_copy():
-    bench = plant()
-    first = bench.reset().state
-    bench.step(bench.initial.input * 1.1)
-    assert_array_equal(first, bench.initial.state)
-
-
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
@@ -165,10 +134,3 @@ def test_a_wrong_parameter_is_named(name, value, message):
     with pytest.raises(ParameterError) as caught:
         Plant.from_parameters({**DEFAULTS, name: value})
     assert str(caught.value).startswith(message)
-
-
-def test_errors_share_one_base():
-    from hsv.base.errors import HsvError
-
-    assert issubclass(TrimError, HsvError)
-    assert issubclass(ParameterError, HsvError)

@@ -59,21 +59,6 @@ def test_coefficients_are_named_in_the_order_of_the_equations():
     ]
 
 
-def test_what_is_certain_is_not_varied():
-    tables = vehicle_tables("parker")
-    tables["rigid_body"]["mass"]["uncertainty"] = "0 %"
-    assert parse_vehicle(tables, "mine").uncertainty.keys() == load_vehicle().uncertainty.keys() - {"mass"}
-
-
-def test_units_are_those_of_ones_choice():
-    tables = vehicle_tables("parker")
-    tables["rigid_body"]["mass"]["value"] = "4378.1708811 kg"
-    tables["envelope"]["velocity"] = {"minimum": "2346.96 m/s", "maximum": "9107.424 km/h"}
-    metric, paper = parse_vehicle(tables, "metric"), load_vehicle()
-    assert metric.decoupled.mass == pytest.approx(paper.decoupled.mass, rel=1e-9)
-    assert metric.velocity_range == pytest.approx(paper.velocity_range, rel=1e-12)
-
-
 WRONG = [
     ("rigid_body.mass", None, 'rigid_body.mass: missing, expected a table such as { value = "1.0 kg" }'),
     ("rigid_body", None, "rigid_body: missing, expected a table"),
@@ -166,15 +151,6 @@ def test_a_file_that_is_no_vehicle_is_named(tmp_path, text, message):
         load_vehicle(str(tmp_path / "mine.toml"))
 
 
-def test_a_file_is_read_as_it_is_now(tmp_path):
-    path = tmp_path / "mine.toml"
-    masses = []
-    for mass in ("4400 kg", "4500 kg"):
-        path.write_text(f'extends = "parker"\n[rigid_body]\nmass = {{ value = "{mass}" }}\n')
-        masses.append(load_vehicle(str(path)).decoupled.mass)
-    assert masses == [4400.0, 4500.0]
-
-
 def test_flat_parameters_are_the_whole_vehicle():
     stiffened = load_vehicle("stiffened")
     values = stiffened.to_parameters()
@@ -197,10 +173,6 @@ def test_no_path_in_parameters_is_followed(tmp_path):
         Vehicle.from_parameters({"vehicle.name": str(path)})
     values = load_vehicle("stiffened").to_parameters() | {"vehicle.name": str(path)}
     assert Vehicle.from_parameters(values).digest == load_vehicle("stiffened").digest
-
-
-def test_a_copy_under_another_name_is_the_same_vehicle():
-    assert parse_vehicle(vehicle_tables("parker"), "copy").digest == ""
 
 
 @pytest.mark.parametrize(

@@ -105,6 +105,7 @@ WITHOUT = {
 """Commands, with the extra that each needs."""
 
 
+@pytest.mark.long
 def test_flights_and_bags_need_no_extra_and_a_missing_one_is_named(tmp_path: Path) -> None:
     command = [sys.executable, "-c", WITHOUT_EXTRAS, *WITHOUT]
     ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)

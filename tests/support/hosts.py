@@ -88,20 +88,6 @@ class Hosts:
         there = ["--target", str(self._running[name].pid), "--net", "--ipc", "--uts", "--mount"]
         return ["nsenter", *there, "--", *map(str, words)]
 
-    def cut(self, name: str) -> None:
-        """Disconnect a host: no packet reaches it, and none leaves."""
-        self._tell("cut", name)
-
-    def join(self, name: str) -> None:
-        """Connect a host again."""
-        self._tell("join", name)
-
-    def _tell(self, what: str, name: str) -> None:
-        assert self._relay and self._relay.stdin and self._relay.stdout
-        self._relay.stdin.write(f"{what} {self._namespaces[name]}\n")
-        self._relay.stdin.flush()
-        assert self._relay.stdout.readline() == "done\n"
-
 
 @contextmanager
 def emulated_hosts(*names: str, delay: float, loss: float) -> Iterator[Hosts]:

@@ -1,7 +1,7 @@
 """The network between emulated hosts: carries IP packets between namespaces with a delay and losses.
 
-Run as a process, ``python link_relay.py DELAY LOSS SEED NAMESPACE=ADDRESS...``; on its standard input, ``cut
-NAMESPACE`` and ``join NAMESPACE`` disconnect a host and connect it again. Not every kernel emulates networks itself.
+Run as a process, ``python link_relay.py DELAY LOSS SEED NAMESPACE=ADDRESS...``, until its standard input ends. Not
+every kernel emulates networks itself.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import socket
 import struct
 import sys
 import time
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
 
@@ -46,7 +47,6 @@ def relay(delay: float, loss: float, seed: int, hosts: dict[str, str]) -> None:
     chance = random.Random(seed)
     devices = {namespace: open_device(namespace) for namespace in hosts}
     address = {socket.inet_aton(hosts[namespace]): device for namespace, device in devices.items()}
-    cut: set[int] = set()
     flying: list[tuple[float, int, int, bytes]] = []
     numbers = count()
     waiting = selectors.DefaultSelector()
@@ -57,27 +57,18 @@ def relay(delay: float, loss: float, seed: int, hosts: dict[str, str]) -> None:
         pause = max(flying[0][0] - time.monotonic(), 0.0) if flying else None
         for key, _ in waiting.select(pause):
             if key.fd == sys.stdin.fileno():
-                line = sys.stdin.readline()
-                if not line:
-                    return
-                what, namespace = line.split()
-                (cut.add if what == "cut" else cut.discard)(devices[namespace])
-                print("done", flush=True)
-                continue
+                return
             for packet in _packets(key.fd):
                 goal = packet[16:20]
                 # What goes to nobody in particular is for all others.
                 targets = [address[goal]] if goal in address else [d for d in devices.values() if d != key.fd]
                 for target in targets:
-                    if not {key.fd, target} & cut and chance.random() >= loss:
+                    if chance.random() >= loss:
                         heapq.heappush(flying, (time.monotonic() + delay, next(numbers), target, packet))
         while flying and flying[0][0] <= time.monotonic():
             _, _, target, packet = heapq.heappop(flying)
-            if target not in cut:
-                try:
-                    os.write(target, packet)
-                except OSError:
-                    continue  # the device is down, or its queue full: lost, as on a wire
+            with suppress(OSError):  # the device is down, or its queue full: lost, as on a wire
+                os.write(target, packet)
 
 
 def _packets(device: int) -> list[bytes]:

@@ -40,7 +40,8 @@ def _without_remark(line: str) -> str:
 
 
 def _program(command: str) -> str:
-    words = shlex.split(command, comments=False) if command.count("'") % 2 == 0 else command.split()
+    whole = command.count("'") % 2 == 0 and not command.endswith("\\")  # else it goes on in the next line
+    words = shlex.split(command, comments=False) if whole else command.split()
     while words and re.fullmatch(r"[A-Z_]+=\S*", words[0]):
         words.pop(0)
     return words[0] if words else ""

@@ -32,13 +32,6 @@ def test_boundary_points_stay_inside_under_extreme_disturbances_at_every_vertex(
         assert found.level(errors @ A.T + d @ G.T).max() <= 1.0
 
 
-def test_level_is_one_on_the_half_width_and_zero_at_the_centre(found):
-    assert found.level(found.centre) == pytest.approx(0.0)
-    touching = found.centre + found.Q[:, 0] / found.half_width[0]
-    assert touching[0] - found.centre[0] == pytest.approx(found.half_width[0])
-    assert found.level(touching) == pytest.approx(1.0)
-
-
 def test_half_the_disturbance_gives_half_the_set(found, inputs):
     problem = dataclasses.replace(found.problem, disturbance=found.problem.disturbance.scaled(0.5))
     scales = inputs.invariant_set.state_scale.array(), inputs.invariant_set.input_scale.array()

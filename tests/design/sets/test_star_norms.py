@@ -39,6 +39,7 @@ def tight():
     return load_certified(find_design("tight")).invariant_set()
 
 
+@pytest.mark.long
 def test_bounds_of_uncoupled_states_hold_their_exact_ranges(apart):
     exact = 1.0 / (1.0 - np.diag(apart.system.A[0]))
     bounds = star_norms(apart, apart.centre()).bounds(apart)

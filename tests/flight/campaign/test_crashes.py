@@ -66,14 +66,6 @@ def test_a_flight_that_crashes_is_recorded_and_the_others_are_flown(fly, tmp_pat
     assert "crashed" in (tmp_path / "page.html").read_text()
 
 
-def test_a_campaign_of_which_every_flight_fails_is_recorded(fly, tmp_path):
-    failed = fly("failed", "fail_at = 5", 3)
-    assert failed.crashed.all()
-    assert "step 5: returned 7, expected 0" in failed.row(0)["crashed"]
-    assert shares(failed)[0].within == 0
-    write_campaign_page(failed, tmp_path / "page.html")
-
-
 def test_results_of_two_libraries_are_not_mixed(fly):
     campaign = fly("mixed", "", 2).campaign
     build_probe(library_place(campaign.scenario.controller)[0].parent, "-DSTATE_SIZE=3")

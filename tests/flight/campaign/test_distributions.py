@@ -1,11 +1,11 @@
 """Campaigns over the distributions of a scenario, and their flights flown by themselves."""
 
-import numpy as np
 import pytest
+from marking import long
 
 from hsv.base.errors import ScenarioError
 from hsv.flight.assembly import assemble_flight
-from hsv.flight.campaign.campaign import METHODS, Campaign, plan
+from hsv.flight.campaign.campaign import Campaign, plan
 from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.store import ResultStore
@@ -62,7 +62,7 @@ def test_every_distribution_is_a_factor_beside_those_of_the_command(scenario):
     assert everything["fault[0].effectiveness"].low == 0.9
 
 
-@pytest.mark.parametrize("flight", [0, 7, 19])
+@pytest.mark.parametrize("flight", [7, long(19)])
 def test_a_flight_written_as_a_scenario_flies_by_itself_as_recorded_in_every_bit(flown, flight):
     alone = fly(assemble_flight(parse_scenario(flown.file(flight), "alone")))
     assert alone.fingerprint == flown.row(flight)["fingerprint"]
@@ -81,29 +81,6 @@ def test_every_number_drawn_is_flown(flown):
         assert scenario.notch.zero_damping == (sample["notch.zero_damping"],)
         assert scenario.fault[0].parameters["effectiveness"] == sample["fault[0].effectiveness"]
     assert len(set(flown.column("fingerprint").tolist())) == 20
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_samples_lie_within_the_ends_and_can_be_drawn_alone(scenario, method):
-    campaign = plan(scenario, samples=64, seed=2, scale=0.0, method=method)
-    samples, _ = campaign.draw(range(campaign.samples))
-    assert np.all(samples >= [f.low for f in campaign.factors]) and np.all(
-        samples <= [f.high for f in campaign.factors]
-    )
-    one, _ = campaign.draw(range(40, 41))
-    assert np.array_equal(one[0], samples[40])
-    if method != "corners":
-        # Two thirds of a normal distribution lie within a standard deviation, a third of a uniform one as long.
-        normal = [i for i, f in enumerate(campaign.factors) if f.kind == "normal"]
-        mean = np.array([f.middle for f in campaign.factors])
-        third = np.array([(f.high - f.low) / 6.0 for f in campaign.factors])
-        within = np.mean(np.abs(samples - mean) < third, axis=0)
-        assert np.all(within[normal] > 0.5) and np.all(np.delete(within, normal) < 0.5)
-
-
-def test_a_campaign_with_distributions_reads_back_as_it_was_written(scenario):
-    campaign = plan(scenario)
-    assert Campaign.from_text(campaign.text) == campaign
 
 
 @pytest.mark.parametrize(
@@ -161,13 +138,3 @@ def test_values_that_do_not_go_together_are_told_with_their_flight(tmp_path, out
         ScenarioError, match=r"^flight \d+: scenario 'drawn': command\[0\].end = .*expected a time after start"
     ):
         run_campaign(campaign, ResultStore(out, campaign), Executor())
-
-
-def test_a_vehicle_by_its_name_alone_is_drawn_like_a_table(tmp_path):
-    path = tmp_path / "drawn.toml"
-    text = 'title = "by its name"\nduration = "2 s"\nvehicle = "stiffened"\n[initial]\naltitude = "85500 ft"\n'
-    path.write_text(text + 'velocity = "7900 ft/s"\n')
-    campaign = plan(str(path), samples=2)
-    sample = [factor.high for factor in campaign.factors]
-    assert campaign.flown(0, sample).vehicle.name == "stiffened"
-    assert campaign.flown(0, sample).vehicle.perturbation == {f.name: f.high for f in campaign.factors}

@@ -85,6 +85,7 @@ def test_workers_that_do_not_come_are_waited_for_a_while_and_not_silently(monkey
     assert waited == ["waiting for the scheduler's workers"]
 
 
+@pytest.mark.long
 def test_a_lost_scheduler_is_a_failed_run_that_goes_on_later(planned, cluster, out):
     campaign, store = planned(samples=320), ResultStore(out, planned(samples=320))
     cluster.scale(1)
@@ -153,6 +154,7 @@ def length_of(text, batch):
     return str(len(text)).encode()
 
 
+@pytest.mark.long
 def test_a_batch_that_ends_its_worker_is_named_and_ends_the_campaign_and_not_the_executor():
     before = dict(os.environ)
     with make_executor(2) as workers:
@@ -178,23 +180,6 @@ def test_a_stopped_worker_is_reported_and_waited_for(monkeypatch):
             os.kill(pid, signal.SIGSTOP)
         assert dict(workers.fly(length_of, "text", range(3))) == dict.fromkeys(range(3), b"4")
     assert re.fullmatch(r"waiting for batch 0 and 2 more: stopped worker process \d+, \d+", notices[0])
-
-
-@pytest.mark.long
-def test_a_campaign_without_dask_workers_says_so_and_goes_on(monkeypatch, cluster):
-    monkeypatch.setattr("hsv.flight.campaign.executors.NOTICE", 1.0)
-    notices = []
-
-    def go_on(words):
-        notices.append(words)
-        cluster.scale(1)
-
-    cluster.scale(1)
-    with make_executor(0, cluster.scheduler_address, go_on) as workers:
-        cluster.scale(0)
-        wait_until(lambda: not cluster.scheduler.workers)
-        assert dict(workers.fly(length_of, "text", range(2))) == dict.fromkeys(range(2), b"4")
-    assert "waiting for batch 0 and 1 more: the scheduler has no workers" in notices
 
 
 def a_large_answer(text, batch):
@@ -225,15 +210,6 @@ def test_batches_that_nobody_took_are_not_taken_for_those_of_the_next_campaign()
     with make_executor(2) as workers:
         next(workers.fly(a_large_answer, "", range(6)))
         assert dict(workers.fly(length_of, "text", range(6))) == dict.fromkeys(range(6), b"4")
-
-
-@pytest.mark.long
-def test_workers_killed_while_they_wait_are_replaced():
-    with make_executor(2) as workers:
-        pids = workers.pids()
-        os.kill(pids[0], signal.SIGKILL)  # the pool then ends the other one
-        wait_until(lambda: not any(map(alive, pids)))
-        assert dict(workers.fly(length_of, "text", range(3))) == dict.fromkeys(range(3), b"4")
 
 
 def alive(pid):

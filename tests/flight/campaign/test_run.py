@@ -8,13 +8,14 @@ from contextlib import ExitStack
 import numpy as np
 import pytest
 from full_disk import files_no_larger_than
+from marking import long
 from pyarrow import parquet
 from waiting import wait_until
 
 from hsv.base.errors import CampaignError
 from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import capacity, run_campaign
-from hsv.flight.campaign.sample_runner import SampleRunner, fly_batch
+from hsv.flight.campaign.sample_runner import fly_batch
 from hsv.flight.campaign.store import ResultStore, read_result, result_digest
 from hsv.flight.campaign.summary import Results
 from hsv.flight.campaign.table import CAMPAIGN, DIGEST
@@ -103,7 +104,7 @@ def test_a_finished_campaign_is_not_flown_again(planned, results):
     assert executor.flown == []
 
 
-@pytest.mark.parametrize("change", [{"seed": 4}, {"commit": "later"}])
+@pytest.mark.parametrize("change", [{"seed": 4}, long({"commit": "later"})])
 def test_another_campaign_does_not_mix_with_one_that_is_there(planned, results, out, change):
     other = planned(**change)
     with pytest.raises(CampaignError, match="holds another campaign"):
@@ -153,7 +154,7 @@ def damage(path, how):
         parquet.write_table(parquet.read_table(path).slice(1), path)
 
 
-@pytest.mark.parametrize("how", ["truncated", "a row short"])
+@pytest.mark.parametrize("how", ["truncated", long("a row short")])
 def test_a_damaged_batch_is_flown_again_and_strangers_are_left_out(planned, results, out, how):
     campaign = planned(samples=44)
     with pytest.raises(KeyboardInterrupt):
@@ -184,7 +185,7 @@ def test_a_batch_damaged_inside_is_named_and_flown_the_next_time(planned, result
     assert out.read_bytes() == results.path.read_bytes()
 
 
-@pytest.mark.parametrize("flights", [0, 32])
+@pytest.mark.parametrize("flights", [long(0), 32])
 def test_a_full_disk_is_one_error_and_what_is_finished_is_kept(planned, results, out, flights):
     campaign = planned()
     with ExitStack() as disk:
@@ -246,18 +247,7 @@ def test_what_is_no_result_of_a_campaign_is_refused(tmp_path):
             read_result(tmp_path / name)
 
 
-def test_the_capacity_is_announced_once_before_the_first_batch(planned, out):
-    campaign, events = planned(), []
-    run_campaign(
-        campaign,
-        ResultStore(out, campaign),
-        Executor(),
-        expect=lambda needed: events.append(("expected", needed.flights)),
-        progress=lambda done: events.append(("done", done)),
-    )
-    assert events == [("expected", 44), ("done", 0), ("done", 32), ("done", 44)]
-
-
+@pytest.mark.long
 def test_the_expected_time_and_space_are_of_the_missing_batches_and_the_result(planned, results, out):
     campaign, store = planned(samples=132), ResultStore(out, planned(samples=132))
     whole, rest = (capacity(campaign, store, Executor(), missing) for missing in (range(5), [3, 4]))
@@ -266,19 +256,3 @@ def test_the_expected_time_and_space_are_of_the_missing_batches_and_the_result(p
     run_campaign(campaign, store, Executor())
     kept = sum(len(fly_batch(campaign.text, batch)) for batch in range(5))
     assert whole.bytes == pytest.approx(kept + out.stat().st_size, rel=0.1)
-
-
-def test_a_long_flight_is_timed_by_its_first_steps(planned, monkeypatch):
-    flown, measured = [], SampleRunner._time
-
-    def timed(runner, steps):
-        flown.append(steps)
-        return measured(runner, steps)
-
-    monkeypatch.setattr(SampleRunner, "_time", timed)
-    monkeypatch.setattr("hsv.flight.campaign.sample_runner._FIRST_STEPS", 50)
-    runner = SampleRunner(planned(samples=4))
-    for limit, steps in ((1e9, [1, 50, 150]), (0.0, [1, 50])):
-        monkeypatch.setattr("hsv.flight.campaign.sample_runner._LONG", limit)
-        flown.clear()
-        assert runner.flight_time() > 0.0 and flown == steps

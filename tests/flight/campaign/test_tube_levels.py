@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from flights import components
+from marking import long
 
 from hsv.control.controller import ControllerInput
 from hsv.flight.closed_loop import fly
@@ -23,7 +24,7 @@ def published_levels(parts, flight):
     return levels
 
 
-@pytest.mark.parametrize("scenario", ["case1", "case1_heavy"])
+@pytest.mark.parametrize("scenario", [long("case1"), "case1_heavy"])
 def test_the_worst_level_is_the_largest_that_the_controller_publishes_in_every_bit(scenario):
     parts = components(scenario, duration=110.0)
     flight = fly(parts)

@@ -75,19 +75,6 @@ def test_liquid_oscillation_is_added_and_solid_replaces(frequency):
     assert_allclose(solid[5 * SUBSTEPS :], WAVE[4] + wave[5 * SUBSTEPS :], atol=1e-14)
 
 
-def test_amplitude_of_an_oscillation_stays_over_a_long_flight():
-    # Turns are counted modulo one: sine is taken of small arguments, whenever.
-    fault = elevator("oscillation", amplitude=0.03, frequency=1.4)
-    data, rows = actuator_data({}, VEHICLE, T), fault_rows([EFFECTOR], [(fault, 0, NEVER)], T)
-    effector, state, found = TRIM.copy(), actuators_at_rest(TRIM), []
-    for k in range(4_900_000, 4_900_100):
-        begin_faults(rows, k, 0)
-        move_effectors(data, (state, effector), rows, k, 0, TRIM, ALPHA)
-        found.append(effector[1] - TRIM[1])
-    time = (np.arange(4_900_000, 4_900_100) * T + 0.5 * H) % (1.0 / 1.4)
-    assert_allclose(found, 0.03 * np.sin(2.0 * np.pi * 1.4 * time), atol=1e-8)
-
-
 def test_lock_freezes_position_and_rate_and_frees_them_where_it_held():
     deflection, states = flown([(elevator("lock_in_place"), 20, 40)], actuator=SECOND_ORDER)
     stuck = slice(20 * SUBSTEPS, 40 * SUBSTEPS)
@@ -147,11 +134,6 @@ def test_lower_bandwidth_is_that_of_a_slower_actuator():
         flown([(elevator("bandwidth", natural_frequency=90.0), 0)], actuator=SECOND_ORDER)[0],
         flown([], actuator=SECOND_ORDER)[0],
     )
-
-
-def test_narrower_stops_are_kept():
-    deflection, _ = flown([(elevator("stop_limit", lower=-0.1, upper=0.22), 0)])
-    assert_array_equal(deflection, np.minimum(held(), 0.22))
 
 
 def test_composition_does_not_depend_on_the_order_of_the_list():
@@ -224,31 +206,3 @@ def test_a_late_command_switches_within_the_period(late):
     found = equipped(COMMANDS, late=late)[0]
     assert_allclose(found, x, rtol=1e-5)
     assert np.abs(equipped(COMMANDS, late=late - 0.1)[0] - x).max() > 100.0 * np.abs(found - x).max()
-
-
-@pytest.mark.parametrize("late", [0.4, 2.7])
-def test_an_actuator_follows_a_late_command_from_when_it_is_there(late):
-    flown = plant({"actuator.elevator_deflection.set": "elevator_first_order_20"}, late)
-    before, expected = START.input, START.input[1]
-    for command in START.input + COMMANDS:
-        flown.step(command)
-        expected = before[1] + (expected - before[1]) * math.exp(-20.0 * late * H)
-        expected = command[1] + (expected - command[1]) * math.exp(-20.0 * (T - late * H))
-        assert flown._memory.actuators[1, 0] == pytest.approx(expected, abs=1e-14)
-        before = command
-
-
-def test_vehicle_with_very_fast_actuators_is_nearly_the_bare_one():
-    fast = {
-        "actuator.elevator_deflection.order": [1.0],
-        "actuator.elevator_deflection.natural_frequency": [9e3],
-    }
-    # The first substep of each period is flown at the middle between two commands.
-    assert_allclose(equipped(COMMANDS, fast)[0][:5], equipped(COMMANDS)[0][:5], rtol=1e-3, atol=1e-3)
-
-
-def test_vehicle_in_trim_stays_there_with_actuators():
-    actuators = {**SECOND_ORDER, "actuator.fuel_equivalence_ratio.set": "fuel_10"}
-    x, effector = equipped(np.zeros((50, 2)), actuators)
-    assert_array_equal(effector, START.input)
-    assert_allclose(x, START.state, rtol=1e-9, atol=1e-9)

@@ -42,10 +42,6 @@ def flown(faults, commands, seed=0):
 WAVE = 0.2 + 0.1 * np.sin(0.3 * np.arange(120))
 
 
-def test_without_faults_the_command_passes_to_the_bit():
-    assert_array_equal(flown([], WAVE), WAVE)
-
-
 def test_loss_of_effectiveness_is_a_product_from_its_start():
     expected = WAVE.copy()
     expected[50:] = 0.9 * WAVE[50:]
@@ -135,17 +131,6 @@ def test_memory_begins_anew_whenever_an_intermittent_fault_does():
         assert_array_equal(result[onset : onset + 6], WAVE[onset])
 
 
-def test_a_change_in_flight_leaves_the_memory_of_the_others():
-    slow, lost = elevator("delay", steps=4), elevator("loss_of_effectiveness", effectiveness=0.5)
-    rows = fault_rows([COMMAND], [(slow, 2, NEVER)], T)
-    result = []
-    for k, command in enumerate(WAVE):
-        if k == 30:
-            rows = fault_rows([COMMAND], [(slow, 2, 60), (lost, 30, NEVER)], T, rows)
-        result.append(command_faults(rows, k, 0, [0.4, command])[1])
-    assert_array_equal(result, flown([(lost, 30), (slow, 2, 60)], WAVE))
-
-
 def test_of_two_faults_alike_each_keeps_its_own_memory():
     slow = elevator("delay", steps=4)
     rows = fault_rows([COMMAND], [(slow, 2, NEVER), (slow, 10, NEVER)], T)
@@ -188,14 +173,6 @@ def test_inlet_unstarts_outside_an_ellipse_and_restarts_well_inside_and_late_eno
     assert_array_equal(engine(rich, points)[:, 0], [1.0, 1.0, 0.0, 0.0, 1.0])
 
 
-def test_the_ellipse_of_an_inlet_has_its_centre_and_half_axes():
-    centre = {"angle_of_attack": 0.05, "angle_of_attack_reach": 0.02, "mach": 8.0, "mach_reach": 0.5}
-    fault = Fault.of("engine", "inlet_unstart_outside", centre)
-    for alpha, mach in ((0.02, 0.0), (-0.02, 0.0), (0.0, 0.5), (0.0, -0.5), (0.0141, 0.3536), (-0.0141, 0.3536)):
-        for share, thrust in ((0.99, 1.0), (1.01, 0.0)):
-            assert engine(fault, [(0.05 + share * alpha, 8.0 + share * mach, 0.3)])[0, 0] == thrust
-
-
 def valid(kind, channel):
     """Return a fault of the kind, every parameter that must be given in the middle of its range."""
     table = [p for p in kind_of(kind).parameters if p.default is None]
@@ -219,11 +196,6 @@ def test_every_kind_is_described_and_may_be_scheduled_on_its_channels(name):
         for parameter in (*kind.parameters, *OCCURRENCE_PARAMETERS):
             described = parameter.of(channel)
             assert described.description and described.minimum <= described.default <= described.maximum
-
-
-def test_both_elastic_modes_have_the_same_travels():
-    for state in ("elastic_coordinate", "elastic_rate"):
-        assert CHANNELS[f"{state}_1"] == CHANNELS[f"{state}_2"]
 
 
 def test_codes_are_in_the_order_of_the_table():

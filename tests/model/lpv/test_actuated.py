@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -7,7 +5,7 @@ from scipy.integrate import trapezoid
 from scipy.signal import lsim, lti
 
 from hsv.model.actuators import ACTUATOR_SETS, actuator_map
-from hsv.model.lpv.actuated import actuator_names, actuator_system, held_behind, respond, sampled_actuators
+from hsv.model.lpv.actuated import actuator_system, held_behind, respond, sampled_actuators
 from hsv.model.lpv.linearisation import zero_order_hold
 
 PERIOD = 0.02
@@ -19,14 +17,6 @@ def test_the_published_check_of_the_second_order():
     assert_allclose(sampled.A, [[0.694054, 0.009109], [-22.771946, 0.056440]], atol=5e-7)
     assert_allclose(sampled.B[:, 1], [1.0 - 0.694054, 22.771946], atol=5e-7)
     assert_allclose(sampled.A.ravel(), actuator_map(2, 50.0, 0.7, PERIOD), rtol=1e-12)
-
-
-def test_states_are_named_in_the_order_of_the_channels():
-    assert actuator_names(BOTH) == (
-        "fuel_equivalence_ratio_position",
-        "elevator_deflection_position",
-        "elevator_deflection_rate",
-    )
 
 
 def test_the_mean_position_is_that_of_the_continuous_actuator():
@@ -42,12 +32,6 @@ def test_the_mean_position_is_that_of_the_continuous_actuator():
     assert_allclose(states[0], 0.0)
 
 
-def test_at_rest_actuators_pass_what_they_are_commanded():
-    sampled = sampled_actuators(BOTH, PERIOD)
-    passed = sampled.D + sampled.C @ np.linalg.solve(np.eye(3) - sampled.A, sampled.B)
-    assert_allclose(passed, np.eye(2), atol=1e-12)
-
-
 @pytest.fixture
 def plant():
     generator = np.random.default_rng(3)
@@ -57,14 +41,6 @@ def plant():
 def test_ideal_hardware_leaves_the_held_system_as_it_is(plant):
     for found, expected in zip(held_behind(*plant, PERIOD), zero_order_hold(*plant, PERIOD), strict=True):
         assert np.array_equal(found, expected)
-
-
-def test_fast_actuators_are_nearly_ideal(plant):
-    fast = tuple(replace(actuator, natural_frequency=1e5) for actuator in BOTH)
-    A, B = held_behind(*plant, PERIOD, fast)
-    ideal_A, ideal_B = zero_order_hold(*plant, PERIOD)
-    assert_allclose(A[:3, :3], ideal_A, atol=1e-12)
-    assert_allclose(B[:3], ideal_B, atol=1e-3)
 
 
 @pytest.mark.parametrize("delay", [0.003, 0.02, 0.047])

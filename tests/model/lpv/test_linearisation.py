@@ -12,7 +12,6 @@ from hsv.model.dynamics import jacobian
 from hsv.model.lpv.linearisation import (
     Filter,
     bode,
-    bode_difference,
     extended_derivative,
     extended_jacobian,
     extended_state,
@@ -32,15 +31,6 @@ def test_double_integrator_is_exact():
     A, B = zero_order_hold(np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]), 0.02)
     assert_allclose(A, [[1.0, 0.02], [0.0, 1.0]], rtol=1e-15)
     assert_allclose(B, [[0.5 * 0.02**2], [0.02]], rtol=1e-15)
-
-
-def test_two_half_periods_make_one():
-    rng = np.random.default_rng(1)
-    A, B = rng.normal(size=(4, 4)), rng.normal(size=(4, 2))
-    whole_A, whole_B = zero_order_hold(A, B, 0.1)
-    half_A, half_B = zero_order_hold(A, B, 0.05)
-    assert_allclose(half_A @ half_A, whole_A, rtol=1e-12)
-    assert_allclose(half_A @ half_B + half_B, whole_B, rtol=1e-12)
 
 
 NOTCH = Filter(*series(continuous([NotchSection(15.0, 0.02, 15.0, 0.5)])))
@@ -85,14 +75,6 @@ def test_printed_reading_differs_in_the_kinematics_alone(point):
     assert_allclose(physical[3, 4] * NOTCH.D, 1.0)
 
 
-def test_moving_filter_is_at_rest_for_a_constant_pitch_rate():
-    x = np.zeros(N_STATES)
-    x[4] = 0.3
-    state = extended_state(x, NOTCH)
-    assert_allclose(NOTCH.A @ state[N_STATES:] + NOTCH.B * 0.3, 0.0, atol=1e-12)
-    assert_allclose(state[4], 0.3, rtol=1e-12)  # both filters pass a constant
-
-
 ALTITUDES = np.linspace(*load_vehicle().altitude_range, 4)
 VELOCITIES = np.linspace(*load_vehicle().velocity_range, 5)
 
@@ -135,12 +117,6 @@ def test_oscillator_has_its_frequency_and_damping():
     assert mode.pole.imag > 0.0
 
 
-def test_real_poles_are_listed_singly_fastest_first():
-    found = modes(np.diag([-1.0, 3.0, 0.0]))
-    assert [mode.natural_frequency for mode in found] == [3.0, 1.0, 0.0]
-    assert [mode.damping_ratio for mode in found] == [-1.0, 1.0, 0.0]
-
-
 A, B = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.array([[0.0], [4.0]])
 
 
@@ -156,13 +132,6 @@ def test_discrete_response_is_the_continuous_one_with_half_a_period_of_delay():
     discrete = frequency_response(*zero_order_hold(A, B, 0.01), frequency, 0.01)[:, 0, 0]
     continuous = frequency_response(A, B, frequency)[:, 0, 0] * np.exp(-0.5j * frequency * 0.01)
     assert_allclose(discrete, continuous, rtol=1e-4)
-
-
-def test_difference_in_decibels_and_degrees():
-    response = frequency_response(A, B, np.array([1.0]))
-    magnitude, phase = bode_difference(response * 1.1 * np.exp(0.2j), response)
-    assert_allclose(magnitude, 20.0 * np.log10(1.1))
-    assert_allclose(phase, np.degrees(0.2))
 
 
 def test_frequencies_above_nyquist_are_refused():

@@ -21,6 +21,7 @@ def test_bars_hold_all_that_is_finite():
     assert counts.sum() == 3000 and len(counts) == BINS == len(edges) - 1
 
 
+@pytest.mark.long
 def test_what_is_the_same_in_all_flights_is_said_not_drawn(results):
     page = campaign_page(results)
     assert "The same in all flights: end time 3&nbsp;s" in page

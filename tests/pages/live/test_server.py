@@ -119,6 +119,7 @@ def test_a_new_run_is_shown_alone(hub, server, messages):
     rows(client, hub, 10)
 
 
+@pytest.mark.long
 def test_who_never_reads_holds_nobody_up(hub, server, messages):
     idle = [PageClient(server.url) for _ in range(2)]
     client = PageClient(server.url)
