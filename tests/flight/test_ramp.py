@@ -15,7 +15,7 @@ def test_a_ramp_that_ends_after_the_flight_is_flown_up_to_the_flights_end():
     whole, short = (load_scenario("case2_baseline", {"fault": [], "duration": f"{t} s"}) for t in (100, 40))
     assert short.command[0].end > short.duration
     states = [fly(assemble_flight(scenario)).history.state for scenario in (whole, short)]
-    assert_array_equal(states[0][: len(states[1])], states[1])
+    assert np.array_equal(states[0][: len(states[1])], states[1])
 
 
 def test_climbing_trims_are_followed_closely_and_static_ones_from_far_behind():
