@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from functools import partial
 
 from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Vector3
 from hsv_msgs.msg import Actuator, VehicleState
@@ -136,6 +137,4 @@ def _colour(colour: Colour) -> ColorRGBA:
     return ColorRGBA(r=red, g=green, b=blue, a=alpha)
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node."""
-    return run_node(AirframeNode, "airframe", args)
+main = partial(run_node, AirframeNode, "airframe")

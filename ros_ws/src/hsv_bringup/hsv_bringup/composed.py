@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from functools import partial
 
 from hsv.bags.description import controller_node
 from hsv_bringup.flow_executor import FlowExecutor
@@ -35,6 +36,4 @@ def nodes() -> Iterator[ProcessNode]:
         yield RecorderNode()
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the graph."""
-    return run_nodes(nodes, "composed", args, FlowExecutor)
+main = partial(run_nodes, nodes, "composed", executor_class=FlowExecutor)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -300,6 +300,4 @@ def _service_request(command: Command) -> tuple[Any, Any]:
     return ClearFault, ClearFault.Request(channel=command.channel, type=command.type)
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the live node."""
-    return run_node(LiveNode, LIVE.name, args, executor_class=LiveExecutor)
+main = partial(run_node, LiveNode, LIVE.name, executor_class=LiveExecutor)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -156,6 +156,4 @@ def _ignore(_: bytes) -> None:
     """Ignore a message: the subscription only makes the peer visible, and the emulator itself reads the answers."""
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the peer emulator node."""
-    return run_node(PeerEmulatorNode, "peer_emulator", args)
+main = partial(run_node, PeerEmulatorNode, "peer_emulator")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import mimetypes
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -209,6 +209,4 @@ class RecorderNode(PeerNode):
         self.get_logger().info(f"closed the bag {self.bag.directory}: {self._complete + 1} steps")
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the recorder node."""
-    return run_node(RecorderNode, "recorder", args, BatchExecutor)
+main = partial(run_node, RecorderNode, "recorder", executor_class=BatchExecutor)

@@ -76,15 +76,15 @@ def _print_topics(client: GraphClient, options: argparse.Namespace) -> None:
         answer(text, values, options.json)
 
 
-def _topics(client: GraphClient, wanted: str = "") -> dict[str, list[str]]:
-    """Return the topics of the domain with their types, when all are known or ``wanted`` is published.
+def _topics(client: GraphClient, name: str = "") -> dict[str, list[str]]:
+    """Return the topics of the domain with their types, when all are known or ``name`` is published.
 
     Raises:
         RunError: No node of a graph is there.
     """
 
     def enough() -> bool:
-        return bool(wanted and client.count_publishers(wanted))
+        return bool(name and client.count_publishers(name))
 
     def found() -> bool:
         return enough() or any(map(client.publishers_of, TOPICS)) or any(node_in_role(client, role) for role in graph())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import partial
 
 from hsv.bags.description import CONTROLLER, CONTROLLERS
 from hsv.base.errors import ParameterError
@@ -42,6 +42,4 @@ class ControllerNode(BlockNode):
             self.diagnose(signals, saturated=bool(signals.saturated.any()))
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the node of a custom controller."""
-    return run_node(ControllerNode, CONTROLLER.name, args)
+main = partial(run_node, ControllerNode, CONTROLLER.name)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 
 from hsv_msgs.msg import Reference, Run
 from hsv_msgs.srv import SetCommand
@@ -120,6 +120,4 @@ class NominalTrajectoryNode(BlockNode):
         self._references.publish(message)
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the nominal trajectory node."""
-    return run_node(NominalTrajectoryNode, "nominal_trajectory", args)
+main = partial(run_node, NominalTrajectoryNode, "nominal_trajectory")

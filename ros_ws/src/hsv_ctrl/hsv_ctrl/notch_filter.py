@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import partial
 
 from hsv.bags.description import NOTCH_FILTER
 from hsv.control.estimator import ESTIMATOR_ENABLED
@@ -30,6 +30,4 @@ class NotchFilterNode(BlockNode):
             self.diagnose(signals)
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the notch filter node."""
-    return run_node(NotchFilterNode, "notch_filter", args)
+main = partial(run_node, NotchFilterNode, "notch_filter")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import partial
 
 from hsv_msgs.msg import Run
 from rcl_interfaces.msg import SetParametersResult
@@ -120,9 +120,7 @@ class TubeMpcNode(TubeNode):
         return SetParametersResult(successful=True)
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the Tube-MPC controller node."""
-    return run_node(TubeMpcNode, "tube_mpc", args)
+main = partial(run_node, TubeMpcNode, "tube_mpc")
 
 
 class RobustMpcNode(TubeNode):
@@ -133,6 +131,4 @@ class RobustMpcNode(TubeNode):
         self.component = RobustMpc.from_parameters(*declare_design(self, ROBUST_MPC_PARAMETERS))
 
 
-def robust_main(args: Sequence[str] | None = None) -> int:
-    """Run the robust MPC controller node."""
-    return run_node(RobustMpcNode, "robust_mpc", args)
+robust_main = partial(run_node, RobustMpcNode, "robust_mpc")

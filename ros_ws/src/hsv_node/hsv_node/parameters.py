@@ -35,7 +35,7 @@ def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] 
             continue
         default = (defaults or {}).get(parameter.name, parameter.default)
         override = node._parameter_overrides.get(parameter.name)
-        # Neither a file nor rclpy knows of what an empty list is one: there it is no value at all.
+        # Neither YAML nor rclpy can tell the element type of an empty list.
         empty = parameter.kind.endswith("_array") and (default == [] if override is None else override.value is None)
         try:
             declared = _declare_empty(node, parameter) if empty else _declare(node, parameter, default)
@@ -46,7 +46,7 @@ def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] 
 
 
 def _declare(node: Node, parameter: Parameter, default: Any) -> Any:
-    # What is given has to be of the type that an empty list does not tell.
+    # A given value must have the type that an empty default cannot tell.
     declared = _array_type(parameter) if default == [] else default
     return node.declare_parameter(parameter.name, declared, _descriptor(parameter)).value
 
@@ -57,7 +57,7 @@ def _array_type(parameter: Parameter) -> RosParameter.Type:
 
 def _declare_empty(node: Node, parameter: Parameter) -> Any:
     kind = _array_type(parameter)
-    # Its type is declared first, then its value set, and then it may be read-only.
+    # Declare the type first, then set the value; only then may the parameter be read-only.
     node.declare_parameter(parameter.name, kind, ParameterDescriptor(), ignore_override=True)
     node.set_parameters([RosParameter(parameter.name, kind, [])])
     node.set_descriptor(parameter.name, _descriptor(parameter, kind))
@@ -67,12 +67,12 @@ def _declare_empty(node: Node, parameter: Parameter) -> Any:
 def declare_vehicle(node: Node) -> None:
     """Declare the vehicle's parameters on ``node``.
 
-    Those that are not given are those of the vehicle that ``vehicle.name`` names.
+    A parameter that is not given has the value of the vehicle named by ``vehicle.name``.
 
     Raises:
         ParameterError, VehicleError: A wrong value, named, or no vehicle of that name.
     """
-    # Of a vehicle that is given whole nothing is looked up: units take a moment to import.
+    # Skip the look-up for a vehicle that is given completely, because importing the units takes time.
     if all(given(node, parameter.name) for parameter in VEHICLE_PARAMETERS):
         declare(node, VEHICLE_PARAMETERS)
         return
@@ -81,7 +81,7 @@ def declare_vehicle(node: Node) -> None:
 
 
 def given(node: Node, name: str) -> bool:
-    """Return whether the parameter ``name`` was given to ``node`` at its start, in a file or on the command line."""
+    """Return whether the parameter ``name`` was given to ``node`` in a file or on the command line."""
     return name in node._parameter_overrides
 
 
@@ -121,9 +121,9 @@ def refuse_unknown(node: Node, role: str, of_others: frozenset[str]) -> None:
     controller = str(chosen.value) if chosen else ""
     tables = {name: {parameter.name for parameter in table} for name, table in NODE_PARAMETERS.items()}
     if role == CONTROLLER.name:
-        # It may be told all of the flight: who wrote it knows what it looks at.
+        # A custom controller may receive every parameter of the flight.
         tables[role] = {p.name for p in own_parameters(controller)}.union(*tables.values())
-    # What a controller of one's own has for parameters it alone knows.
+    # The parameters of a custom controller are known to its class only.
     known = controller in ("", *CONTROLLERS)
     own = {*node.get_parameters_by_prefix(""), *(p.name for p in LOCKSTEP_PARAMETERS if role), *tables.get(role, ())}
     for name in node._parameter_overrides:
@@ -144,7 +144,7 @@ def _descriptor(parameter: Parameter, kind: RosParameter.Type | None = None) -> 
     )
     if kind is not None:
         descriptor.type = kind.value
-    # ROS knows ranges with two ends, and of single numbers; what a list must satisfy stands in the words above.
+    # ROS has ranges for single numbers only, with two ends; the constraint in words covers lists.
     if math.isfinite(parameter.minimum) or math.isfinite(parameter.maximum):
         if parameter.kind == "double":
             largest = sys.float_info.max

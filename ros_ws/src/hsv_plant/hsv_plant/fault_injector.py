@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import partial
 
 from hsv_msgs.msg import Run
 from hsv_msgs.srv import ClearFault, InjectFault
@@ -111,6 +111,4 @@ class FaultInjectorNode(BlockNode):
         return response
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the fault injector node."""
-    return run_node(FaultInjectorNode, "fault_injector", args)
+main = partial(run_node, FaultInjectorNode, "fault_injector")

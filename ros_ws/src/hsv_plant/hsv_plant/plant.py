@@ -7,6 +7,7 @@ import signal
 import time
 import uuid
 from collections.abc import Sequence
+from functools import partial
 
 import rclpy
 from hsv_msgs.msg import Ready, RecorderProgress, Reference, Run, VehicleState
@@ -323,6 +324,4 @@ def unresponsive(
         helper.destroy_node()
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the plant node."""
-    return run_node(PlantNode, "plant", args)
+main = partial(run_node, PlantNode, "plant")

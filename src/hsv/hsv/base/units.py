@@ -229,8 +229,8 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
 def _converted(text: str, unit: str) -> float | None:
     """Return a quantity in ``unit``, or ``None`` if the dimensions differ; cached for campaigns."""
     number, written = _number_and_unit(text)
-    (square, dimension), (wanted_square, wanted) = _squared(written), _squared(unit)
-    return _scaled(number, square / wanted_square) if dimension == wanted else None
+    (square, dimension), (other_square, other) = _squared(written), _squared(unit)
+    return _scaled(number, square / other_square) if dimension == other else None
 
 
 def _number_and_unit(text: str) -> tuple[Fraction, str]:

@@ -113,8 +113,8 @@ def _without_options(command: Callable[..., Any]) -> Callable[[], None]:
     return listed
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _version(requested: bool) -> None:
+    if requested:
         console.print(f"hsv {hsv.__version__}")
         raise typer.Exit
 

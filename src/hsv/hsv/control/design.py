@@ -124,7 +124,8 @@ class TubeSet:
 
     def farthest(self, error: np.ndarray) -> str:
         """Return the name of the component of e - c that is largest for its half-width."""
-        index = int(np.argmax(np.abs(error - self.centre) / self.half_width))
+        with np.errstate(over="ignore"):
+            index = int(np.argmax(np.abs(error - self.centre) / self.half_width))
         return STATE_NAMES[index] if index < N_RIGID else f"filter_{index - N_RIGID + 1}"
 
 

@@ -6,7 +6,7 @@ Stepwise flight, nodes, replay, recorder and parameter pages use this table. The
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from operator import attrgetter
@@ -14,14 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsv.base.errors import HsvError
 from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInput, ControllerResult
-from hsv.control.controllers import build_controller
 from hsv.model import signals as types
 from hsv.model.signals import N_INPUTS, PITCH_RATE, SignalType
 
 if TYPE_CHECKING:  # a node imports only its own component
-    from hsv.base.parameters import Parameter
     from hsv.control.design import ControlDesign
     from hsv.control.nominal_trajectory import NominalTrajectory
     from hsv.control.notch_filter import NotchFilter
@@ -96,9 +93,8 @@ class Block:
     """A block of the closed loop, stepped once per period."""
 
     name: str
-    component: str
-    """Class of the component as ``module:Class``, with PARAMETERS, ``from_parameters`` and ``reset``; empty if the
-    parameters choose it. It is imported on first use."""
+    built_by: str
+    """Function that builds the component from flat parameters, as ``module:name``; it is imported on first use."""
     inputs: tuple[SignalType, ...]
     """Inputs of the same step, with direct feedthrough to the outputs."""
     outputs: tuple[SignalType, ...]
@@ -111,11 +107,6 @@ class Block:
     designed: bool = False
     """Whether the component is built from a control design."""
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters of the component, without those of the design."""
-        return tuple(self._class().PARAMETERS)
-
     def build(self, values: Mapping[str, Any], design: ControlDesign | None = None) -> Any:
         """Build the component.
 
@@ -126,21 +117,9 @@ class Block:
         Raises:
             ParameterError, DesignError, TrimError: A wrong value, named.
         """
-        build = self._class().from_parameters
+        module, _, path = self.built_by.partition(":")
+        build = attrgetter(path)(import_module(module))
         return build(values, design) if self.designed else build(values)
-
-    def _class(self) -> Any:
-        module, _, name = self.component.partition(":")
-        return getattr(import_module(module), name)
-
-
-@dataclass(frozen=True)
-class ControllerBlock(Block):
-    """The controller block, whose component is chosen by the parameters."""
-
-    def build(self, values: Mapping[str, Any], design: ControlDesign | None = None) -> Controller:
-        """Build the controller named in ``values``."""
-        return build_controller(values, design)
 
 
 def _fly(plant: Plant, signals: Signals) -> None:
@@ -185,7 +164,7 @@ _controller_inputs = attrgetter(*(signal.name for signal in CONTROLLER_INPUTS))
 
 VEHICLE = Block(
     "plant",
-    "hsv.model.plant:Plant",
+    "hsv.model.plant:Plant.from_parameters",
     inputs=(),
     outputs=(types.MEASUREMENT, types.STATE, types.STATUS, types.FORCES, types.EFFECTOR, types.AIR),
     step=_fly,
@@ -194,7 +173,7 @@ VEHICLE = Block(
 )
 NOTCH_FILTER = Block(
     "notch_filter",
-    "hsv.control.notch_filter:NotchFilter",
+    "hsv.control.notch_filter:NotchFilter.from_parameters",
     inputs=(types.MEASUREMENT,),
     outputs=(types.ESTIMATE, types.FILTERED_PITCH_RATE, types.FILTER_STATE),
     step=_filter,
@@ -203,7 +182,7 @@ NOTCH_FILTER = Block(
 )
 NOMINAL_TRAJECTORY = Block(
     "nominal_trajectory",
-    "hsv.control.nominal_trajectory:NominalTrajectory",
+    "hsv.control.nominal_trajectory:NominalTrajectory.from_parameters",
     inputs=(types.MEASUREMENT,),
     outputs=(
         types.REFERENCE,
@@ -218,64 +197,25 @@ NOMINAL_TRAJECTORY = Block(
     state=(types.DEVIATION,),
     designed=True,
 )
-CONTROLLER = ControllerBlock(
+CONTROLLER = Block(
     "controller",
-    "",
+    "hsv.control.controllers:build_controller",
     inputs=CONTROLLER_INPUTS,
     outputs=(types.COMMAND, types.SATURATED, types.DIAGNOSTICS),
     step=_control,
+    designed=True,
 )
 FAULT_INJECTOR = Block(
     "fault_injector",
-    "hsv.model.faults.injector:FaultInjector",
+    "hsv.model.faults.injector:FaultInjector.from_parameters",
     inputs=(types.COMMAND,),
     outputs=(types.ACTUATOR, types.ACTIVE_FAULTS),
     step=_actuate,
 )
 
 
-def in_order(blocks: Sequence[Block]) -> tuple[Block, ...]:
-    """Return ``blocks`` sorted so that each block follows the sources of its inputs.
-
-    Raises:
-        HsvError: A signal has no source or two, an input differs from its source in unit or size, or there is an
-            algebraic loop.
-    """
-    sources: dict[str, tuple[Block, SignalType]] = {}
-    for block in blocks:
-        for signal in block.outputs:
-            if signal.name in sources:
-                other = sources[signal.name][0].name
-                raise HsvError(f"{block.name}: gives {signal.name}, expected no other block to, {other} does")
-            sources[signal.name] = block, signal
-    for block in blocks:
-        for signal in (*block.inputs, *block.delayed):
-            if signal.name not in sources:
-                raise HsvError(f"{block.name}: needs {signal.name}, expected one of {', '.join(sources)}")
-            source, output = sources[signal.name]
-            if signal != output:
-                needed, found = (f"{s.size} in {s.unit!r}" for s in (signal, output))
-                raise HsvError(f"{block.name}: needs {signal.name}, {needed}, expected {found} as {source.name} gives")
-    ordered: list[Block] = []
-
-    def place(block: Block, path: tuple[Block, ...]) -> None:
-        if block in path:
-            names = " -> ".join(b.name for b in (*path[path.index(block) :], block))
-            raise HsvError(
-                f"algebraic loop {names}: expected a block in it that needs a signal of the step before only"
-            )
-        if block not in ordered:
-            for signal in block.inputs:
-                place(sources[signal.name][0], (*path, block))
-            ordered.append(block)
-
-    for block in blocks:
-        place(block, ())
-    return tuple(ordered)
-
-
-LOOP = in_order((VEHICLE, NOTCH_FILTER, NOMINAL_TRAJECTORY, CONTROLLER, FAULT_INJECTOR))
-"""The blocks of the closed loop in the order of a step."""
+LOOP = (VEHICLE, NOTCH_FILTER, NOMINAL_TRAJECTORY, CONTROLLER, FAULT_INJECTOR)
+"""The blocks of the closed loop in the order of a step: each follows the sources of its inputs."""
 
 
 def steps(components: Components) -> Iterator[Signals]:

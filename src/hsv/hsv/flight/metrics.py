@@ -44,37 +44,24 @@ class Metric:
     """Whether the metric is a number of steps"""
 
 
+def _tracking(axis: str, symbol: str, unit: str, integral: str) -> dict[str, Metric]:
+    """Return the metrics of an axis: its name, symbol and unit (SI), and the unit of the integral of its error."""
+    error = f"{symbol} - {symbol}_r"
+    settled = f"last time before the fault that {axis} is more than 2 % of the step off"
+    over = f"largest excess over the {axis} step before the fault, share of the step"
+    return {
+        f"{axis}_rise_time": Metric("s", f"10 % to 90 % of the {axis} step", Group.tracking),
+        f"{axis}_settling_time": Metric("s", settled, Group.tracking),
+        f"{axis}_overshoot": Metric("1", over, Group.tracking, share=True),
+        f"{axis}_integral_absolute_error": Metric(integral, f"integral of |{error}|", Group.tracking),
+        f"{axis}_error_maximum": Metric(unit, f"largest |{error}|", Group.tracking),
+        f"{axis}_end_error": Metric(unit, f"{error} at the end", Group.tracking),
+    }
+
+
 METRICS = {
-    "altitude_rise_time": Metric("s", "10 % to 90 % of the altitude step", Group.tracking),
-    "altitude_settling_time": Metric(
-        "s",
-        "last time before the fault that altitude is more than 2 % of the step off",
-        Group.tracking,
-    ),
-    "altitude_overshoot": Metric(
-        "1",
-        "largest excess over the altitude step before the fault, share of the step",
-        Group.tracking,
-        share=True,
-    ),
-    "altitude_integral_absolute_error": Metric("m s", "integral of |h - h_r|", Group.tracking),
-    "altitude_error_maximum": Metric("m", "largest |h - h_r|", Group.tracking),
-    "altitude_end_error": Metric("m", "h - h_r at the end", Group.tracking),
-    "velocity_rise_time": Metric("s", "10 % to 90 % of the velocity step", Group.tracking),
-    "velocity_settling_time": Metric(
-        "s",
-        "last time before the fault that velocity is more than 2 % of the step off",
-        Group.tracking,
-    ),
-    "velocity_overshoot": Metric(
-        "1",
-        "largest excess over the velocity step before the fault, share of the step",
-        Group.tracking,
-        share=True,
-    ),
-    "velocity_integral_absolute_error": Metric("m", "integral of |V - V_r|", Group.tracking),
-    "velocity_error_maximum": Metric("m/s", "largest |V - V_r|", Group.tracking),
-    "velocity_end_error": Metric("m/s", "V - V_r at the end", Group.tracking),
+    **_tracking("altitude", "h", "m", "m s"),
+    **_tracking("velocity", "V", "m/s", "m"),
     "post_fault_attitude_deviation": Metric(
         "rad",
         "largest change of angle of attack or pitch angle after the fault from its mean over the 5 s before",

@@ -4,14 +4,28 @@ from __future__ import annotations
 
 import re
 
-from hsv.bags.description import LIVE, RECORDER, ROBUST_MPC, TUBE_MPC, NodeDescription, graph
+from hsv.bags.description import (
+    FAULT_INJECTOR,
+    LIVE,
+    NOMINAL_TRAJECTORY,
+    NOTCH_FILTER,
+    PLANT,
+    RECORDER,
+    ROBUST_MPC,
+    TUBE_MPC,
+    NodeDescription,
+    graph,
+)
 from hsv.bags.infrastructure_parameters import LIVE_PARAMETERS, PACE_PARAMETERS, RECORDER_PARAMETERS
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter
 from hsv.base.units import parse_quantity
 from hsv.control.controllers import controller_class
 from hsv.control.design import CERTIFICATE_PARAMETERS, DESIGN_PARAMETERS
-from hsv.flight.blocks import FAULT_INJECTOR, NOMINAL_TRAJECTORY, NOTCH_FILTER, VEHICLE
+from hsv.control.nominal_trajectory import NominalTrajectory
+from hsv.control.notch_filter import NotchFilter
+from hsv.model.faults.injector import FaultInjector
+from hsv.model.plant import Plant
 
 
 def _designed(own: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
@@ -29,12 +43,12 @@ def own_parameters(controller: str) -> tuple[Parameter, ...]:
 
 
 NODE_PARAMETERS: dict[str, tuple[Parameter, ...]] = {
-    VEHICLE.name: (*VEHICLE.parameters, *PACE_PARAMETERS),
-    NOTCH_FILTER.name: NOTCH_FILTER.parameters,
-    NOMINAL_TRAJECTORY.name: _designed(NOMINAL_TRAJECTORY.parameters),
+    PLANT.name: (*Plant.PARAMETERS, *PACE_PARAMETERS),
+    NOTCH_FILTER.name: NotchFilter.PARAMETERS,
+    NOMINAL_TRAJECTORY.name: _designed(NominalTrajectory.PARAMETERS),
     TUBE_MPC.name: (*own_parameters(TUBE_MPC.name), *CERTIFICATE_PARAMETERS),
     ROBUST_MPC.name: own_parameters(ROBUST_MPC.name),
-    FAULT_INJECTOR.name: FAULT_INJECTOR.parameters,
+    FAULT_INJECTOR.name: FaultInjector.PARAMETERS,
     RECORDER.name: RECORDER_PARAMETERS,
     LIVE.name: LIVE_PARAMETERS,
 }

@@ -118,7 +118,7 @@ def prepare(
     text = text or scenario_text(scenario_name)
     name = Path(scenario_name).stem
     if options.external:
-        # What the bag keeps is what is flown: it is not the published flight of this scenario.
+        # The bag keeps this scenario, which is not the published one.
         text = with_controller(text, NODE, name)
     scenario = parse_scenario(text, name)
     with blamed_on(scenario):
@@ -149,7 +149,7 @@ def prepare(
         (folder / name).write_text(content, encoding="utf-8")
     default = f"{scenario.name}_{now:%Y%m%dT%H%M%SZ}"
     bag = _new_directory([bag] if bag else [bags / default, *(bags / f"{default}_{n}" for n in range(2, 100))])
-    # Where it stays, unlike the folder of this run: parameters that were dumped from the nodes can be loaded later.
+    # The permanent path, unlike the folder of this run: parameters dumped from the nodes can be loaded later.
     certified = (
         {"design.certificate": str(design_file.with_suffix(".certificate.json").absolute())}
         if design_file and "certificate.json" in files
@@ -188,18 +188,18 @@ def prepare(
 
 
 def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:
-    """Return what is to be started to fly with ``controller``, what ends the run last.
+    """Return the nodes to start for a flight with ``controller``; the last one ends the run.
 
     Raises:
         ParameterError: The controller is a node that cannot be found.
     """
-    flown = controller_node(controller)
-    if flown.executable and flown.foreign:
+    node = controller_node(controller)
+    if node.executable and node.foreign:
         try:
-            executable(flown)
+            executable(node)
         except RunError as error:
             raise ParameterError(f"controller = {controller!r}: {error}") from None
-    nodes = ((flown,) if flown.foreign else ()) + (COMPOSED,) if composed else graph(controller)
+    nodes = ((node,) if node.foreign else ()) + (COMPOSED,) if composed else graph(controller)
     return tuple(node for node in nodes if node.executable)
 
 
@@ -217,12 +217,12 @@ def provenance(controller: str, name: str, design_hash: str, seed: int) -> dict[
     }
 
 
-def recorded_files(values: Mapping[str, Mapping[str, Any]], flown: Mapping[str, Any]) -> dict[str, str]:
-    """Return the attachments of a bag whose run was not prepared here, by name: parameters and certificate.
+def recorded_files(values: Mapping[str, Mapping[str, Any]], designed: Mapping[str, Any]) -> dict[str, str]:
+    """Return the attachments of a bag of a run started by hand, by name: parameters and certificate.
 
     Args:
         values: Flat parameters of every node, by its role.
-        flown: Parameters of the node whose design it is.
+        designed: Parameters of the node that has the design.
     """
     sections = ParameterSections.gathered(values)
     design = {parameter.name for parameter in DESIGN_PARAMETERS}
@@ -230,14 +230,14 @@ def recorded_files(values: Mapping[str, Mapping[str, Any]], flown: Mapping[str, 
         "design.yaml": sections.only(sections.names & design).to_yaml(),
         "scenario.yaml": sections.only(sections.names - design).to_yaml(),
     }
-    certificate = find_certificate(flown.get("design.name", ""), flown.get("design.certificate", ""))
+    certificate = find_certificate(designed.get("design.name", ""), designed.get("design.certificate", ""))
     return files | attached_certificate(certificate)
 
 
 def _new_directory(candidates: Sequence[Path]) -> Path:
-    """Make and return the first of ``candidates`` that is not there.
+    """Make and return the first of ``candidates`` that does not exist.
 
-    Here and not by the recorder: of two runs with one name, one is refused before it has started anything.
+    The recorder would do so too late: the second of two runs with one name is refused before it starts anything.
     """
     for path in candidates:
         try:

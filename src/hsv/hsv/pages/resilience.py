@@ -11,7 +11,7 @@ from hsv.base.units import UnitSystem
 from hsv.flight.campaign.store import write_whole
 from hsv.flight.resilience.faults import OBSERVED, SEVERITIES, TRIED, Moment
 from hsv.flight.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND
-from hsv.flight.resilience.summary import Cell, ResilienceResults, parameter_words, said_boundaries
+from hsv.flight.resilience.summary import Cell, ResilienceResults, parameter_words, boundaries_in_words
 from hsv.flight.scenario import scenario_table
 from hsv.pages.engine import render
 
@@ -56,7 +56,7 @@ def flight_text(cell: Cell) -> str:
     worst, case = cell.worst, cell.case
     subject, fault = case.subject, TRIED[case.fault]
     table = scenario_table(subject.file(case.moment, worst.vehicle, fault, worst.value), subject.name)
-    words = f"{case.fault.replace('_', ' ')} ({fault.parameter.replace('_', ' ')} {fault.said(worst.value)})"
+    words = f"{case.fault.replace('_', ' ')} ({fault.parameter.replace('_', ' ')} {fault.in_words(worst.value)})"
     table["title"] = (
         f"{subject.name} with {words} from {subject.start(case.moment):g} s, {vehicle_words(worst.vehicle)}"
     )
@@ -95,7 +95,7 @@ def resilience_page(results: ResilienceResults, template: str, command: str) -> 
         units=UnitSystem.metric,
         sections=SECTIONS,
         sentence=sentence(results),
-        said_boundaries=said_boundaries,
+        boundaries_in_words=boundaries_in_words,
         corners=max(len(subject.vehicles) for subject in results.campaign.subjects) - 1,
         parameter_words=parameter_words,
         flight_file=flight_file,

@@ -10,12 +10,12 @@ from hsv.flight.blocks import LOOP, VEHICLE, Block
 _TOLERANCES = {
     "plant": (
         1e-10,
-        "one period from the recorded state: the vehicle alone is unstable, a longer flight without its controller "
-        "would magnify the last bit in which flights from before the portable arithmetic differ",
+        "one period from the recorded state: the vehicle alone is unstable, and a longer flight without its controller "
+        "would magnify a difference in the last bit",
     ),
     "notch_filter": (
         1e-12,
-        "a stable filter: other roundings of its coefficients, as before the portable arithmetic, die out",
+        "a stable filter, in which rounding errors decay",
     ),
     "nominal_trajectory": (
         1e-10,

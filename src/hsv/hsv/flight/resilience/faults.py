@@ -90,7 +90,7 @@ class TriedFault:
             return {**own, "stop": written(rounded(start + value), self.unit)}
         return {**own, self.parameter: written(value, self.unit)}
 
-    def said(self, *values: float) -> str:
+    def in_words(self, *values: float) -> str:
         """Return ``values`` of the parameter in words."""
         return f"{', '.join(f'{value:.3g}' for value in values)}{'' if self.unit == '1' else ' ' + self.unit}"
 

@@ -133,23 +133,23 @@ class ResilienceResults:
         return [flight for cell in self.cells for flight in cell.flights]
 
 
-def said_boundary(fault: TriedFault, boundary: Boundary) -> str:
+def boundary_in_words(fault: TriedFault, boundary: Boundary) -> str:
     """Return in words how far the nominal vehicle survives."""
     if boundary.survived is None:
-        return f"lost at {fault.said(fault.harmless)}"
+        return f"lost at {fault.in_words(fault.harmless)}"
     if boundary.lost is None:
-        return f"all, to {fault.said(fault.worst)}"
-    return f"to {fault.said(fault.value(boundary.survived))}"
+        return f"all, to {fault.in_words(fault.worst)}"
+    return f"to {fault.in_words(fault.value(boundary.survived))}"
 
 
-def said_boundaries(fault: TriedFault, boundaries: Mapping[Moment, Boundary]) -> list[str]:
+def boundaries_in_words(fault: TriedFault, boundaries: Mapping[Moment, Boundary]) -> list[str]:
     """Return the survived range of the nominal vehicle at each time as texts; equal texts are given once."""
-    return list(dict.fromkeys(said_boundary(fault, boundaries[moment]) for moment in Moment))
+    return list(dict.fromkeys(boundary_in_words(fault, boundaries[moment]) for moment in Moment))
 
 
 def parameter_words(name: str) -> str:
     """Return the description of a fault's severity: mild, medium and severe values, range, and fixed parameters."""
     fault = TRIED[name]
     fixed = "".join(f", {key.replace('_', ' ')} {value}" for key, value in fault.fixed.items())
-    tried = f"{fault.said(*fault.values)} ({fault.harmless:g} to {fault.said(fault.worst)}){fixed}"
+    tried = f"{fault.in_words(*fault.values)} ({fault.harmless:g} to {fault.in_words(fault.worst)}){fixed}"
     return f"{fault.parameter.replace('_', ' ')} {tried}"
