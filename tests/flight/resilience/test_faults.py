@@ -68,8 +68,8 @@ def test_corners_are_mirror_images_and_what_solves_in_flight_has_none(campaign):
 
 def test_a_campaign_survives_its_own_text(campaign):
     assert ResilienceCampaign.from_text(campaign.text).text == campaign.text
-    assert [case.text for case in ResilienceCampaign.from_text(campaign.text).batches] == [
-        c.text for c in campaign.batches
+    assert [case.text for case in ResilienceCampaign.from_text(campaign.text).cases] == [
+        case.text for case in campaign.cases
     ]
 
 

@@ -8,10 +8,10 @@ import tomli_w
 
 from hsv.base.errors import CampaignError, reason
 from hsv.base.units import UnitSystem
-from hsv.flight.campaign.store import write_whole
+from hsv.flight.campaign.run import write_whole
 from hsv.flight.resilience.faults import OBSERVED, SEVERITIES, TRIED, Moment
 from hsv.flight.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND
-from hsv.flight.resilience.summary import Cell, ResilienceResults, parameter_words, boundaries_in_words
+from hsv.flight.resilience.summary import Cell, ResilienceResults, boundaries_in_words, parameter_words
 from hsv.flight.scenario import scenario_table
 from hsv.pages.engine import render
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 import tomli_w
@@ -20,6 +20,7 @@ from hsv.base.units import percent, rounded, written
 from hsv.control.library import library_digest
 from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.assembly import assemble, blamed_on, design_parameters, scenario_parameters
+from hsv.flight.campaign.run import Batch
 from hsv.flight.distribution import KINDS, Distribution
 from hsv.flight.scenario import Scenario, scenario_at_means, scenario_table, scenario_text, set_field
 from hsv.model.dynamics import COEFFICIENT_UNITS
@@ -58,14 +59,6 @@ class Factor(Distribution):
     def field(self) -> str:
         """The field of the scenario."""
         return _PERTURBATION + self.name if self.is_perturbation else self.name
-
-
-class Batch(NamedTuple):
-    """A number of flights that are flown and stored together, see :class:`hsv.flight.campaign.run.Batch`."""
-
-    label: str
-    flights: int
-    kind: int = 0
 
 
 @dataclass(frozen=True)

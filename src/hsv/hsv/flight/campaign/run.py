@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import time
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol
+from pathlib import Path
+from typing import ClassVar, NamedTuple, Protocol
 
+from hsv.base.errors import CampaignError, reason
 from hsv.flight.campaign.executors import Executor, Job
 
 
-class Batch(Protocol):
-    """A number of flights that are flown and stored together."""
+class Batch(NamedTuple):
+    """A number of flights that are flown and stored together; its number is its place in the campaign."""
 
-    @property
-    def label(self) -> str:
-        """Name in messages."""
-
-    @property
-    def flights(self) -> int:
-        """Number of flights."""
-
-    @property
-    def kind(self) -> int:
-        """Number of the kind of flights; those of one kind take about the same time."""
+    label: str
+    """Name in messages"""
+    flights: int
+    kind: int = 0
+    """Number of the kind of flights; those of one kind take about the same time"""
 
 
 class Plan(Protocol):
@@ -36,31 +35,51 @@ class Plan(Protocol):
 
     @property
     def batches(self) -> Sequence[Batch]:
-        """All batches; a batch is called by its place in the list."""
+        """All batches."""
 
 
-class Store(Protocol):
+class Store(ABC):
     """The place where the results of a campaign are kept, and the jobs that make them."""
 
-    @property
-    def fly(self) -> Job:
-        """The job that flies a batch."""
+    fly: ClassVar[Job]
+    """The job that flies a batch"""
+    time: ClassVar[Job]
+    """The job that returns how long (s, as a text) a flight takes, by the number of its kind"""
 
-    @property
-    def time(self) -> Job:
-        """The job that returns how long (s, as a text) a flight takes, by the number of its kind."""
+    def __init__(self, place: Path, lock: Path) -> None:
+        """Keep the results in a file or folder; ``lock`` is a file next to them."""
+        self._place, self._lock = place, lock
 
-    def opened(self, *, restart: bool = False) -> AbstractContextManager[set[int]]:
-        """Lock the place, and yield the numbers of the finished batches."""
+    @contextmanager
+    def opened(self, *, restart: bool = False) -> Iterator[set[int]]:
+        """Yield the numbers of the finished batches; only one process at a time may hold a campaign.
 
+        Args:
+            restart: Whether to discard existing results.
+
+        Raises:
+            CampaignError: The place belongs to another campaign, cannot be made, or is in use.
+        """
+        with writing(self._place):
+            self._lock.parent.mkdir(parents=True, exist_ok=True)
+        with locked(self._lock, f"{self._place}: in use, another process is flying this campaign"):
+            yield self.finished(restart)
+
+    @abstractmethod
+    def finished(self, restart: bool) -> set[int]:
+        """Return the numbers of the finished batches; errors as for :meth:`opened`."""
+
+    @abstractmethod
     def keep(self, batch: int, content: bytes) -> None:
-        """Store the result of a batch."""
+        """Store the result of a batch atomically."""
 
-    def finish(self) -> None:
-        """Complete the results once all batches are there."""
-
+    @abstractmethod
     def space(self, flights: int, batches: int) -> int:
         """Return the disk space (bytes) that the results of so many batches take."""
+
+    @abstractmethod
+    def finish(self) -> None:
+        """Complete the results once all batches are there."""
 
 
 @dataclass(frozen=True)
@@ -138,3 +157,60 @@ def capacity(plan: Plan, store: Store, executor: Executor, missing: Sequence[int
     longest = max(batch.flights * seconds[batch.kind] for batch in left)
     flights = sum(batch.flights for batch in left)
     return Capacity(flights, cores, max(wall_time, longest), store.space(flights, len(left)))
+
+
+@contextmanager
+def locked(path: Path, complaint: str) -> Iterator[None]:
+    """Hold the lock file ``path``, which exists only while it is held, or if its holder was killed.
+
+    Raises:
+        CampaignError: Another process holds it, and the message is ``complaint``; or it cannot be made.
+    """
+    while True:
+        try:
+            stream = path.open("w")
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise CampaignError(complaint) from None
+        except OSError as error:
+            raise CampaignError(f"{path}: cannot be locked ({reason(error)})") from error
+        with stream:
+            # The last holder may have removed the file in the meantime, and a third process made another one.
+            if not path.exists() or not os.path.samestat(path.stat(), os.fstat(stream.fileno())):
+                continue
+            try:
+                yield
+                return
+            finally:
+                path.unlink(missing_ok=True)
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file atomically.
+
+    Raises:
+        CampaignError: It cannot be written.
+    """
+    temporary = path.with_name(path.name + ".unfinished")
+    with writing(path, temporary):
+        temporary.write_bytes(content)
+        replace_file(temporary, path)
+
+
+@contextmanager
+def writing(path: Path, temporary: Path | None = None) -> Iterator[None]:
+    """Convert system errors to an error that names ``path``, and remove an incomplete ``temporary`` file."""
+    try:
+        yield
+    except OSError as error:
+        if temporary:
+            temporary.unlink(missing_ok=True)
+        kept = "; finished batches are kept" if temporary else ""
+        raise CampaignError(f"{path}: cannot be written ({reason(error)}){kept}") from error
+
+
+def replace_file(temporary: Path, path: Path) -> None:
+    """Move a finished file into place, on the disk before it has its name."""
+    with temporary.open("rb") as stream:
+        os.fsync(stream.fileno())
+    temporary.replace(path)

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
-import os
 import shutil
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from hsv.base.errors import CampaignError, DocumentError, reason
+from hsv.base.errors import CampaignError, DocumentError
 from hsv.base.files import open_regular, read_text
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
+from hsv.flight.campaign.run import Store, replace_file, write_whole, writing
 from hsv.flight.campaign.sample_runner import fly_batch, time_flight
 from hsv.flight.campaign.table import CAMPAIGN, DIGEST, ENVELOPE, WRITTEN, schema
 
@@ -26,48 +24,33 @@ _ROWS = 1024
 """Rows that are written at a time, as far as whole batches have them: a group of rows takes as long as its rows."""
 
 
-class ResultStore:
+class ResultStore(Store):
     """The store of the batches of one campaign; a stored batch is complete even if the process is killed."""
 
     fly = staticmethod(fly_batch)
     time = staticmethod(time_flight)
 
     def __init__(self, out: Path, campaign: Campaign) -> None:
+        super().__init__(out, out.with_name(out.name + ".lock"))
         self.out = out
         self.folder = out.with_name(out.name + ".parts")
         self._campaign = campaign
 
-    @contextmanager
-    def opened(self, *, restart: bool = False) -> Iterator[set[int]]:
-        """Yield the numbers of the finished batches; only one process at a time may hold a campaign.
-
-        Args:
-            restart: Whether to discard existing batches.
-
-        Raises:
-            CampaignError: The file or folder belongs to another campaign, cannot be made, or is in use.
-        """
-        with _writing(self.out):
-            self.out.parent.mkdir(parents=True, exist_ok=True)
-        lock = self.out.with_name(self.out.name + ".lock")
-        with locked(lock, f"{self.out}: in use, another process is flying this campaign"):
-            if restart:
-                shutil.rmtree(self.folder, ignore_errors=True)
-                self.out.unlink(missing_ok=True)
-            if self.out.exists():
-                self._check(read_result(self.out)[0], self.out)
-                shutil.rmtree(self.folder, ignore_errors=True)
-                yield set(range(len(self._campaign.batches)))
-                return
-            self._describe()
-            yield {batch for batch in range(len(self._campaign.batches)) if self._is_whole(batch)}
+    def finished(self, restart: bool) -> set[int]:
+        """Return the numbers of the finished batches."""
+        if restart:
+            shutil.rmtree(self.folder, ignore_errors=True)
+            self.out.unlink(missing_ok=True)
+        batches = range(len(self._campaign.batches))
+        if self.out.exists():
+            self._check(read_result(self.out)[0], self.out)
+            shutil.rmtree(self.folder, ignore_errors=True)
+            return set(batches)
+        self._describe()
+        return {batch for batch in batches if self._is_whole(batch)}
 
     def keep(self, batch: int, content: bytes) -> None:
-        """Store a finished batch atomically.
-
-        Raises:
-            CampaignError: It cannot be written.
-        """
+        """Store a finished batch atomically."""
         write_whole(self._part(batch), content)
 
     def finish(self) -> None:
@@ -81,7 +64,7 @@ class ResultStore:
         temporary = self.out.with_name(self.out.name + ".unfinished")
         envelope = Envelope.empty()
         columns = schema(self._campaign)
-        with _writing(self.out, temporary):
+        with writing(self.out, temporary):
             with pq.ParquetWriter(temporary, columns, **WRITTEN) as writer:
                 together, batches = max(1, _ROWS // self._campaign.batch), len(self._campaign.batches)
                 for first in range(0, batches, together):
@@ -93,7 +76,7 @@ class ResultStore:
                     writer.write_table(pa.concat_tables(parts))
                 kept = {CAMPAIGN: self._campaign.text.encode(), ENVELOPE: envelope.encode().encode()}
                 writer.add_key_value_metadata(kept | {DIGEST: result_digest(kept)})
-            _replace(temporary, self.out)
+            replace_file(temporary, self.out)
         shutil.rmtree(self.folder)
 
     def space(self, flights: int, batches: int) -> int:
@@ -111,7 +94,7 @@ class ResultStore:
                 raise CampaignError(f"{described}: {error}; --restart begins anew") from error
             self._check(found, self.folder)
             return
-        with _writing(self.folder):
+        with writing(self.folder):
             self.folder.mkdir(exist_ok=True)
         write_whole(described, self._campaign.text.encode())
 
@@ -188,60 +171,3 @@ def result_digest(kept: Mapping[bytes, bytes]) -> bytes:
     """Return the hexadecimal SHA-256 of the metadata."""
     texts = [kept.get(key, b"") for key in (CAMPAIGN, ENVELOPE)]
     return hashlib.sha256(b"".join(b"%d:%s" % (len(text), text) for text in texts)).hexdigest().encode()
-
-
-@contextmanager
-def locked(path: Path, complaint: str) -> Iterator[None]:
-    """Hold the lock file ``path``, which exists only while it is held, or if its holder was killed.
-
-    Raises:
-        CampaignError: Another process holds it, and the message is ``complaint``; or it cannot be made.
-    """
-    while True:
-        try:
-            stream = path.open("w")
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise CampaignError(complaint) from None
-        except OSError as error:
-            raise CampaignError(f"{path}: cannot be locked ({reason(error)})") from error
-        with stream:
-            # The last holder may have removed the file in the meantime, and a third process made another one.
-            if not path.exists() or not os.path.samestat(path.stat(), os.fstat(stream.fileno())):
-                continue
-            try:
-                yield
-                return
-            finally:
-                path.unlink(missing_ok=True)
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file atomically.
-
-    Raises:
-        CampaignError: It cannot be written.
-    """
-    temporary = path.with_name(path.name + ".unfinished")
-    with _writing(path, temporary):
-        temporary.write_bytes(content)
-        _replace(temporary, path)
-
-
-@contextmanager
-def _writing(path: Path, temporary: Path | None = None) -> Iterator[None]:
-    """Convert system errors to an error that names ``path``, and remove an incomplete ``temporary`` file."""
-    try:
-        yield
-    except OSError as error:
-        if temporary:
-            temporary.unlink(missing_ok=True)
-        kept = "; finished batches are kept" if temporary else ""
-        raise CampaignError(f"{path}: cannot be written ({reason(error)}){kept}") from error
-
-
-def _replace(temporary: Path, path: Path) -> None:
-    """Move a finished file into place, on the disk before it has its name."""
-    with temporary.open("rb") as stream:
-        os.fsync(stream.fileno())
-    temporary.replace(path)

@@ -15,6 +15,7 @@ from hsv.base.errors import CampaignError
 from hsv.base.units import rounded, written
 from hsv.control.library import library_digest
 from hsv.flight.assembly import blamed_on, design_parameters
+from hsv.flight.campaign.run import Batch
 from hsv.flight.campaign.variants import FlightVariants
 from hsv.flight.corners import screening_corners
 from hsv.flight.resilience.faults import OBSERVED, TRIED, Moment, TriedFault
@@ -109,8 +110,13 @@ class ResilienceCampaign:
     faults: tuple[str, ...]
     """Names in :data:`hsv.flight.resilience.faults.TRIED`."""
 
+    @property
+    def batches(self) -> list[Batch]:
+        """A batch for each case."""
+        return [Batch(case.label, case.flights, case.kind) for case in self.cases]
+
     @cached_property
-    def batches(self) -> list[Case]:
+    def cases(self) -> list[Case]:
         """All cases, in a fixed order."""
         return [
             Case(subject, fault, moment, kind)

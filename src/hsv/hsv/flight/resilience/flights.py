@@ -194,7 +194,7 @@ def time_flight(text: str, kind: int) -> bytes:
 
 def fly_case(text: str, number: int) -> bytes:
     """Fly a case, by its number, of the campaign written in ``text``; return its flights and boundary as JSON."""
-    case = _campaign(text).batches[number]
+    case = _campaign(text).cases[number]
     runner, fault = _runner(text, case.kind, case.moment), TRIED[case.fault]
     flown = [
         runner.outcome(severity, vehicle, fault, value)

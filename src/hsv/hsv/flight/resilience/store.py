@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-from hsv.base.errors import CampaignError, reason
 from hsv.base.files import parse_json, read_text
-from hsv.flight.campaign.store import locked, write_whole
+from hsv.flight.campaign.run import Store, write_whole
 from hsv.flight.resilience.campaign import Case, ResilienceCampaign
 from hsv.flight.resilience.flights import Boundary, FlownFault, fly_case, time_flight
 from hsv.flight.sources import DIGITS, code_digest, digest_of, drop_older
@@ -20,7 +17,7 @@ Outcome = tuple[tuple[FlownFault, ...], Boundary]
 """Flights of a case, and the severities between which the controller is lost."""
 
 
-class CaseStore:
+class CaseStore(Store):
     """The store of the results of a campaign's cases; several campaigns can share a folder."""
 
     fly = staticmethod(fly_case)
@@ -28,34 +25,18 @@ class CaseStore:
 
     def __init__(self, out: Path, campaign: ResilienceCampaign) -> None:
         self.folder = out / "cases"
-        self._cases = campaign.batches
+        super().__init__(self.folder, self.folder / ".lock")
+        self._cases = campaign.cases
         # The digest is of the code that is loaded: files may change during the flights.
-        self._code = [code_digest().encode()]
+        self._code = code_digest().encode()
 
-    @contextmanager
-    def opened(self, *, restart: bool = False) -> Iterator[set[int]]:
-        """Lock the folder, and yield the numbers of the finished cases; only one process at a time may fly into it.
+    def finished(self, restart: bool) -> set[int]:
+        """Return the numbers of the finished cases."""
+        return {n for n, case in enumerate(self._cases) if not restart and self.read(case) is not None}
 
-        Args:
-            restart: Whether to fly all cases again.
-
-        Raises:
-            CampaignError: The folder cannot be made, or is in use.
-        """
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise CampaignError(f"{self.folder}: cannot be made ({reason(error)})") from error
-        with locked(self.folder / ".lock", f"{self.folder}: in use, another process is flying this campaign"):
-            yield {n for n, case in enumerate(self._cases) if not restart and self.read(case) is not None}
-
-    def keep(self, number: int, content: bytes) -> None:
-        """Store the results of a case, and remove those of other code.
-
-        Raises:
-            CampaignError: They cannot be written.
-        """
-        path = self._path(self._cases[number])
+    def keep(self, batch: int, content: bytes) -> None:
+        """Store the results of a case, and remove those of other code."""
+        path = self._path(self._cases[batch])
         write_whole(path, content)
         drop_older(path)
 
@@ -75,5 +56,5 @@ class CaseStore:
             return None
 
     def _path(self, case: Case) -> Path:
-        digest = digest_of([case.text.encode(), *self._code])
+        digest = digest_of([case.text.encode(), self._code])
         return self.folder / f"{case.label}_{digest[:DIGITS]}.json"

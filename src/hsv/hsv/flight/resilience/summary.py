@@ -112,7 +112,7 @@ class ResilienceResults:
             for fault in campaign.faults
             for subject in campaign.subjects
         }
-        for case in campaign.batches:
+        for case in campaign.cases:
             if (outcome := store.read(case)) is None:
                 raise CampaignError(f"{store.folder}: {case.label} is missing; the same command flies it")
             square, (flights, boundary) = squares[case.fault, case.subject.name], outcome
