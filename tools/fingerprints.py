@@ -22,7 +22,7 @@ def main() -> None:
     table = {}
     for name in scenario_names():
         scenario = load_scenario(name)
-        if scenario.nominal.law == "family":
+        if scenario.settings.get("nominal.law", "family") == "family":
             design = read_design(find_design(scenario.design))
             flight = fly(assemble_flight(scenario, design))
             table[name] = {"design_hash": design.digest, "fingerprint": flight.fingerprint}

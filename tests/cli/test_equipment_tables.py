@@ -146,7 +146,7 @@ def test_what_is_wrong_is_refused_with_one_line_that_names_it(text, message):
 
 def test_the_flight_is_right_without_what_is_wrong():
     right = flight(GUST + 'up = ["1 m/s", "2 ft/s"]\nlengths = ["500 m", "1000 ft"]')
-    assert parse_scenario(right, "flight").equipment == {
+    assert parse_scenario(right, "flight").settings == {
         "gust.starts": [5.0, 8.0],
         "gust.up": [1.0, 0.6096],
         "gust.lengths": [500.0, 304.8],

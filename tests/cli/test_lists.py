@@ -89,7 +89,7 @@ def test_parameters_are_printed_in_the_unit_of_their_channel(hsv):
 def test_a_scenario_may_name_the_set_in_the_table_that_is_printed(hsv, name):
     described = hsv("list", "equipment", name, "--json").json
     text = f'{scenario_text("case1")}\n[{described["table"]}]\nset = "{name}"\n'
-    assert parse_scenario(text, "flight").equipment == {f"{described['table']}.set": name}
+    assert parse_scenario(text, "flight").settings == {f"{described['table']}.set": name}
     assert f'[{described["table"]}] set = "{name}"' in hsv("list", "equipment", name).out
 
 

@@ -41,7 +41,7 @@ def test_the_plan_is_inside_the_tightened_inputs_and_the_governor_takes_it_as_it
     flight, bounds = flights["case1_governed"], read_design(find_design("governed")).plan_bounds
     plan = flight.reference_input + flight.history.nominal_input
     assert np.all((plan > bounds.input_minimum) & (plan < bounds.input_maximum))
-    again = governed("case1_governed", load_scenario("case1_governed").reference.blend).reference
+    again = governed("case1_governed", load_scenario("case1_governed").settings["reference.blend"]).reference
     times = load_scenario("case1_governed").commands.times
     assert again.corners[-1].time - again.corners[-2].time == pytest.approx(times[-1] - times[-2])
 

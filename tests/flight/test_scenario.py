@@ -105,9 +105,10 @@ def test_metres_serve_as_well_as_feet():
             "limits.saturated_steps = 0.5: expected a whole number of at least 0",
         ),
         ('duration = "200 s"', 'duration = "２００ s"', "duration = '２００ s': cannot be read"),
-        ("[limits]", "[notch]\nenabled = 1\n[limits]", "notch.enabled = 1: expected a valid boolean"),
+        ("[limits]", "[notch]\nenabled = 1\n[limits]", "notch.enabled = 1: expected bool"),
         ("[limits]", "[notch]\nzero_frequency = 15\n[limits]", "notch.zero_frequency = 15: the unit is missing"),
         ("[limits]", '[notch]\nzero_damping = "1 s"\n[limits]', "notch.zero_damping = '1 s': wrong unit"),
+        ("[limits]", "[notch]\nzero_damping = [-1, 2]\n[limits]", "notch.zero_damping[0] = -1: expected from 0 to 10"),
         ('[vehicle]\nmodel = "CM"', "[vehicle]\nmodel = 3", "vehicle.model = 3: expected 'CM' or 'DM'"),
         ("[vehicle]", "[vehicle", "Expected ']' at the end of a table declaration (at line"),
         ('title = "', 'title = 3 # "', "title = 3: expected a text"),
@@ -115,7 +116,7 @@ def test_metres_serve_as_well_as_feet():
         (
             'title = "',
             'controller = "robust_mpc"\nrobust_mpc.gain_index = -1\ntitle = "',
-            "robust_mpc.gain_index = -1: expected at",
+            "robust_mpc.gain_index = -1: expected integer from 0 to 63",
         ),
     ],
 )
@@ -198,7 +199,6 @@ end = "1.1 s"
             '[[tube.change]]\nstart = "5 s"\ntau = 1\n[[tube.change]]\nstart = "6 s"\ntau = 0.01\n[limits]',
             r"tube\.change\[1\]\.tau\[0\] = 0\.01: expected .*certified",
         ),
-        ("[limits]", "[notch]\nzero_damping = [-1, 2]\n[limits]", r"notch\.zero_damping\[0\] = -1\.0: expected"),
         (
             "[limits]",
             '[notch]\nzero_frequency = ["15 rad/s", "19 rad/s"]\n[limits]',
@@ -251,7 +251,6 @@ def test_commands_add_up_to_breakpoints():
     ]
     at_once = 'velocity_change = "10 ft/s"'
     assert shown(scenario(at_once, ramp))[0] == (0.0, 85500.0, 7910.0)
-    assert scenario(ramp)["reference.trim"] == "climbing"
 
 
 @pytest.mark.parametrize(

@@ -53,4 +53,4 @@ velocity = "7900 ft/s"
 up = "2 m/s"
 """
     flown = [parse_scenario(text, "wind"), parse_scenario(with_controller(text, "node:", "wind"), "wind")]
-    assert flown[0].equipment and flown[0].equipment == flown[1].equipment
+    assert flown[0].settings and flown[0].settings == flown[1].settings

@@ -76,9 +76,9 @@ def test_every_number_drawn_is_flown(flown):
         # Before them stands the change that leads to the same goal from another start.
         assert scenario.command[1].altitude_change == sample["command[0].altitude_change"]
         assert scenario.command[1].start == scenario.command[1].end == sample["command[0].start"]
-        assert scenario.integral.rate == sample["integral.rate"]
+        assert scenario.settings["integral.rate"] == sample["integral.rate"]
         assert scenario.vehicle.perturbation == {"mass": sample["mass"]}
-        assert scenario.notch.zero_damping == (sample["notch.zero_damping"],)
+        assert scenario.settings["notch.zero_damping"] == [sample["notch.zero_damping"]]
         assert scenario.fault[0].parameters["effectiveness"] == sample["fault[0].effectiveness"]
     assert len(set(flown.column("fingerprint").tolist())) == 20
 
@@ -121,8 +121,8 @@ def test_of_numbers_of_steps_whole_ones_are_drawn(tmp_path):
     campaign = plan(str(path), samples=40, scale=0.0, factors=ranges)
     drawn = campaign.draw(range(40))[0]
     flown = [campaign.flown(flight, sample) for flight, sample in enumerate(drawn)]
-    assert {scenario.equipment["link.command.delay"] for scenario in flown} == {0.0, 1.0, 2.0}
-    assert {scenario.equipment["sensors.altitude.latency"][0] for scenario in flown} == {0.0, 1.0, 2.0}
+    assert {scenario.settings["link.command.delay"] for scenario in flown} == {0.0, 1.0, 2.0}
+    assert {scenario.settings["sensors.altitude.latency"][0] for scenario in flown} == {0.0, 1.0, 2.0}
     assert {scenario.fault[0].parameters["steps"] for scenario in flown} == {1.0, 2.0, 3.0}
     assert Campaign.from_text(campaign.text) == campaign
     corners = plan(str(path), method="corners", scale=0.0, factors=ranges)

@@ -42,7 +42,8 @@ def governed(name: str, blend: float) -> GovernedScenario:
             "tube_mpc with a design that has tightened inputs"
         )
     if not isinstance(law, FamilyLaw):
-        raise GovernorError(f"scenario {scenario.name!r}: nominal.law = {scenario.nominal.law!r}: expected 'family'")
+        given = scenario.settings["nominal.law"]
+        raise GovernorError(f"scenario {scenario.name!r}: nominal.law = {given!r}: expected 'family'")
     design, allowed = controller.design, controller.design.plan_bounds
     bounds = input_bounds(allowed, components.plant.data.actuators)
     governor = Governor(law.data, scenario.vehicle.described.decoupled, design.period, bounds)

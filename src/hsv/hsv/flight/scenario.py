@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -20,6 +20,10 @@ from hsv.control.design import TAU, rigid_factors
 from hsv.control.effectiveness import EFFECTIVENESS_PARAMETERS
 from hsv.control.estimator import ESTIMATOR_PARAMETERS
 from hsv.control.library import inside
+from hsv.control.nominal_trajectory import NominalTrajectory
+from hsv.control.notch_filter import FLOWN_NOTCH_PARAMETERS, NOTCH_PARAMETERS
+from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS
+from hsv.control.tube_law import TUBE_PARAMETERS
 from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.distribution import KINDS, Distribution
 from hsv.flight.metrics import METRICS
@@ -28,12 +32,7 @@ from hsv.flight.tables import (
     CommandTable,
     FaultTable,
     InitialTable,
-    IntegralTable,
-    NominalTable,
-    NotchTable,
     Reading,
-    ReferenceTable,
-    RobustMpcTable,
     Table,
     Time,
     TubeTable,
@@ -67,17 +66,12 @@ class Scenario(Table):
     vehicle: VehicleTable = VehicleTable()
     initial: InitialTable
     command: tuple[CommandTable, ...] = ()
-    reference: ReferenceTable = ReferenceTable()
-    notch: NotchTable = NotchTable()
-    nominal: NominalTable = NominalTable()
     tube: TubeTable = TubeTable()
-    integral: IntegralTable = IntegralTable()
-    robust_mpc: RobustMpcTable = RobustMpcTable()
     fault: tuple[FaultTable, ...] = ()
     seed: Annotated[StrictInt, Field(ge=0, le=SEED_PARAMETER.maximum)] = 0
     """Seed of all random numbers"""
-    equipment: dict[str, Any] = Field(default_factory=dict)
-    """Parameters of real hardware, SI; in a file, the tables of actuators, air, sensors, links and estimators"""
+    settings: dict[str, Any] = Field(default_factory=dict)
+    """Parameters of the components, SI, by their names in a file, where they are in the tables :data:`SETTINGS`"""
     own: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Tables of a custom controller, as written; only its class, which is not loaded here, knows their meaning"""
     limits: dict[str, float] = Field(default_factory=dict)
@@ -101,18 +95,9 @@ class Scenario(Table):
             "vehicle.coupling": self.vehicle.coupling,
             "initial.altitude": self.initial.altitude,
             "initial.velocity": self.initial.velocity,
-            "reference.trim": self.reference.trim,
-            "notch.enabled": self.notch.enabled,
             "controller": self.controller,
-            "nominal.law": self.nominal.law,
-            "integral.rate": self.integral.rate,
-            "robust_mpc.gain_index": self.robust_mpc.gain_index,
         }
         values |= {f"reference.{name}": list(column) for name, column in self.commands._asdict().items()}
-        if self.reference.blend:
-            values["reference.blend"] = self.reference.blend
-        flown = self.notch.model_dump(exclude={"enabled"})
-        values |= {f"notch.flown.{name}": list(numbers) for name, numbers in flown.items() if numbers}
         values |= {f"vehicle.perturbation.{name}": value for name, value in self.vehicle.perturbation.items()}
         if self.tube.tau:
             values["feedback.tau"] = list(self.tube.tau)
@@ -128,27 +113,41 @@ class Scenario(Table):
             values["fault.parameters"] = [written_parameters(fault.parameters) for fault in self.fault]
             values["fault.starts"] = [fault.start for fault in self.fault]
             values["fault.stops"] = [NEVER_TIME if fault.stop is None else fault.stop for fault in self.fault]
-        return values | {"seed": self.seed} | self.equipment
+        settings = {_FLOWN_NOTCH.get(name, name): value for name, value in self.settings.items()}
+        return values | {"seed": self.seed} | settings
 
 
 PERIOD = 0.02
 """Control period, s, with which equipment is checked before the design is known; the result does not depend on it."""
 
-_EQUIPMENT_PARAMETERS = (
+_FLOWN_NOTCH = {p.name.replace("notch.flown.", "notch."): p.name for p in FLOWN_NOTCH_PARAMETERS}
+"""Parameters of a notch filter that replaces the design's, by their names in a file."""
+
+_LOOP_PARAMETERS = ("reference.trim", "reference.blend", "notch.enabled", "nominal.law", "integral.rate")
+"""Parameters of reference, filter and laws that a file sets; a design or the scenario's commands set the others."""
+
+_PARAMETERS = (
+    *(
+        parameter
+        for parameter in (*NominalTrajectory.PARAMETERS, *NOTCH_PARAMETERS, *TUBE_PARAMETERS)
+        if parameter.name in _LOOP_PARAMETERS
+    ),
+    *(replace(parameter, name=name) for name, parameter in zip(_FLOWN_NOTCH, FLOWN_NOTCH_PARAMETERS, strict=True)),
+    *ROBUST_MPC_PARAMETERS,
     *EQUIPMENT_PARAMETERS,
     *COMMAND_LINK_PARAMETERS,
     *ESTIMATOR_PARAMETERS,
     *EFFECTIVENESS_PARAMETERS,
 )
 
-EQUIPMENT = frozenset(parameter.name.partition(".")[0] for parameter in _EQUIPMENT_PARAMETERS)
-"""Tables of hardware, which is ideal by default, and of the estimators of the state and of the effectiveness."""
+SETTINGS = frozenset(parameter.name.partition(".")[0] for parameter in _PARAMETERS)
+"""Tables of the components: reference, notch filter, laws, hardware (ideal by default) and estimators."""
 
-_NO_KEYS = ("name", "own", "equipment")
+_NO_KEYS = ("name", "own", "settings")
 """Fields that are not keys of a file."""
 
-_CONTROLLER_TABLES = ("tube", "integral", "effectiveness", "robust_mpc")
-"""Tables of the shipped controllers."""
+_CONTROLLER_TABLES = dict.fromkeys(("tube", "integral", "effectiveness"), "tube_mpc") | {"robust_mpc": "robust_mpc"}
+"""Tables that only one of the shipped controllers reads."""
 
 REPLACED = ("limits",)
 """Tables that a scenario does not share with the one it extends."""
@@ -331,9 +330,9 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
         if key in table:
             why = ", a scenario is called by its file" if key == "name" else ""
             raise _refused(name, f"{key}: unknown key{why}")
-    equipment = {key: value for key, value in table.items() if key in EQUIPMENT}
+    settings = {key: value for key, value in table.items() if key in SETTINGS}
     own = _custom_tables(table)
-    table = {key: value for key, value in _with_definition(table, name).items() if key not in (own | equipment)}
+    table = {key: value for key, value in _with_definition(table, name).items() if key not in (own | settings)}
     vehicle = {"coupling": "", **table.get("vehicle", {})}
     try:
         reading = Reading(VehicleTable.model_construct(**vehicle).described)
@@ -345,7 +344,7 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
                 key: {k: reading.custom_value(f"{key}.{k}", value) for k, value in entries.items()}
                 for key, entries in own.items()
             },
-            "equipment": table_values(_EQUIPMENT_PARAMETERS, equipment, reading.number),
+            "settings": table_values(_PARAMETERS, settings, reading.number),
             "fault": [
                 reading.fault(f"fault[{i}]", row) if isinstance(row, dict) else row for i, row in enumerate(faults)
             ]
@@ -355,7 +354,7 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
             "vehicle": vehicle,
         }
         scenario = Scenario.model_validate(given, context=reading)
-        _check(scenario)
+        _check(scenario, complete)
     except ValidationError as error:
         raise _refused(name, _first_problem(error)) from error
     except HsvError as error:
@@ -372,7 +371,7 @@ def _custom_tables(table: dict[str, Any]) -> dict[str, Any]:
     """Return the tables of a custom controller."""
     if table.get("controller", Scenario.model_fields["controller"].default) in SHIPPED_CONTROLLERS:
         return {}
-    known = Scenario.model_fields.keys() | EQUIPMENT
+    known = Scenario.model_fields.keys() | SETTINGS
     return {key: value for key, value in table.items() if isinstance(value, dict) and key not in known}
 
 
@@ -390,19 +389,18 @@ def _limits(table: object) -> dict[str, float]:
     }
 
 
-def _check(scenario: Scenario) -> None:
+def _check(scenario: Scenario, tables: Collection[str]) -> None:
+    """Refuse what contradicts itself in a scenario, whose file has these ``tables``."""
     if not scenario.design and scenario.controller in SHIPPED_CONTROLLERS:
         raise ScenarioError(f"design = '': expected one, {scenario.controller} flies with its gains")
     for name, value in scenario.vehicle.perturbation.items():
         if name not in scenario.vehicle.described.uncertainty:
             expected = ", ".join(scenario.vehicle.described.uncertainty)
             raise ScenarioError(f"vehicle.perturbation.{name} = {value}: no such parameter, expected one of {expected}")
-    for table, controller in (("robust_mpc", "robust_mpc"), ("integral", "tube_mpc"), ("tube", "tube_mpc")):
-        if table in scenario.model_fields_set and scenario.controller != controller:
+    for table, controller in _CONTROLLER_TABLES.items():
+        if table in tables and scenario.controller != controller:
             raise ScenarioError(f"{table}: {scenario.controller} does not read it, expected controller {controller}")
-    if scenario.controller != "tube_mpc" and any(name.startswith("effectiveness.") for name in scenario.equipment):
-        raise ScenarioError(f"effectiveness: {scenario.controller} does not read it, expected controller tube_mpc")
-    if "nominal" in scenario.model_fields_set and scenario.controller == "robust_mpc":
+    if "nominal" in tables and scenario.controller == "robust_mpc":
         raise ScenarioError("nominal: robust_mpc does not read it, expected one that follows the nominal state")
     for index, command in enumerate(scenario.command):
         if not {"altitude_change", "velocity_change"} & command.model_fields_set:
@@ -418,9 +416,9 @@ def _check(scenario: Scenario) -> None:
             Fault.of(fault.channel, fault.type, fault.parameters)
         except ParameterError as error:
             raise ScenarioError(str(error).replace("fault.", f"fault[{index}].", 1)) from error
-    if scenario.equipment:
+    if scenario.settings:
         try:
-            check_equipment(scenario.equipment, scenario.vehicle.described.decoupled, PERIOD)
+            check_equipment(scenario.settings, scenario.vehicle.described.decoupled, PERIOD)
         except ParameterError as error:
             raise ScenarioError(str(error).removeprefix("parameter ")) from error
     check_envelope(scenario.commands, scenario.command, scenario.vehicle.described)
@@ -434,7 +432,7 @@ def _check_starts(scenario: Scenario) -> None:
         "command[{}].start": [command.start for command in scenario.command],
         "tube.change[{}].start": changes,
         "fault[{}].start": [fault.start for fault in scenario.fault],
-        "gust.starts[{}]": scenario.equipment.get("gust.starts", ()),
+        "gust.starts[{}]": scenario.settings.get("gust.starts", ()),
     }
     for field, times in starts.items():
         for index, start in enumerate(times):
@@ -496,5 +494,5 @@ def _siblings(location: tuple[int | str, ...]) -> list[str]:
             annotation = model.model_fields[part].annotation
             model = annotation if isinstance(annotation, type) else annotation.__args__[0]
     if model is Scenario:
-        return [name for name in (*model.model_fields, *sorted(EQUIPMENT)) if name not in _NO_KEYS]
+        return [name for name in (*model.model_fields, *sorted(SETTINGS)) if name not in _NO_KEYS]
     return list(model.model_fields)

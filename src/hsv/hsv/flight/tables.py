@@ -16,8 +16,6 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
-    StrictBool,
-    StrictInt,
     ValidationInfo,
     field_validator,
 )
@@ -146,16 +144,12 @@ def enveloped(axis: str, unit: str) -> BeforeValidator:
     return BeforeValidator(parse)
 
 
-def quantities(unit: str) -> BeforeValidator:
-    """Return a validator of one or several quantities in ``unit``."""
-
-    def parse(given: object, info: ValidationInfo) -> tuple[float, ...]:
-        texts = given if isinstance(given, list | tuple) else [given]
-        if not texts:
-            raise QuantityError(f"{info.field_name} = []: expected one value at least")
-        return tuple(_ends_and_mean(text, unit, info)[1] for text in texts)
-
-    return BeforeValidator(parse)
+def _numbers(given: object, info: ValidationInfo) -> tuple[float, ...]:
+    """Return one or several dimensionless numbers."""
+    texts = given if isinstance(given, list | tuple) else [given]
+    if not texts:
+        raise QuantityError(f"{info.field_name} = []: expected one value at least")
+    return tuple(_ends_and_mean(text, "1", info)[1] for text in texts)
 
 
 def envelope(limits: tuple[float, float], unit: str) -> str:
@@ -186,8 +180,7 @@ def _coupling(given: object, info: ValidationInfo) -> str:
 Coupling = Annotated[str, BeforeValidator(_coupling)]
 Change = Annotated[float, quantity("1", -0.9, 10.0, shown="-90 % to +1000 %", bare=False)]
 Time = Annotated[float, quantity("s", 0.0, 1e5, shown="a time from 0 s to 100000 s")]
-Frequencies = Annotated[tuple[float, ...], quantities("rad/s")]
-Numbers = Annotated[tuple[float, ...], quantities("1")]
+Numbers = Annotated[tuple[float, ...], BeforeValidator(_numbers)]
 
 
 class Table(BaseModel):
@@ -248,29 +241,6 @@ class CommandTable(Table):
         return max(0.0, (time - self.start) / (self.end - self.start)) if self.end > self.start else 0.0
 
 
-class ReferenceTable(Table):
-    """The reference: trim of a ramp, that of the climb or of a standing point; half the time of a blended corner."""
-
-    trim: Literal["climbing", "static"] = "climbing"
-    blend: Time = 0.0
-
-
-class NotchTable(Table):
-    """The notch filter in flight: values that replace those of the design, one value or one per section."""
-
-    enabled: StrictBool = True
-    zero_frequency: Frequencies = ()
-    zero_damping: Numbers = ()
-    pole_frequency: Frequencies = ()
-    pole_damping: Numbers = ()
-
-
-class NominalTable(Table):
-    """The law of the nominal input."""
-
-    law: Literal["family", "kothare_online", "qp"] = "family"
-
-
 class TauChangeTable(Table):
     """A change of the tube's factor in flight."""
 
@@ -283,18 +253,6 @@ class TubeTable(Table):
 
     tau: Numbers = ()
     change: tuple[TauChangeTable, ...] = ()
-
-
-class IntegralTable(Table):
-    """Integral action on altitude and velocity errors, a named extension of the tube law."""
-
-    rate: Annotated[float, quantity("1/s", 0.0, 1.0, shown="0 / s to 1 / s")] = 0.0
-
-
-class RobustMpcTable(Table):
-    """The robust MPC controller."""
-
-    gain_index: Annotated[StrictInt, Field(ge=0)] = 0
 
 
 class FaultTable(Table):

@@ -86,7 +86,7 @@ def replay_over_dds(
     repeated = runner.outcome(FlightReading.of(data, runner.level(data), flight_fingerprint(recorded)))
     told = not (
         measurement_errors(joined(recorded, equipment_topics(recorded)))
-        or prepared.scenario.equipment.get(ESTIMATOR_ENABLED.name)
+        or prepared.scenario.settings.get(ESTIMATOR_ENABLED.name)
     )
     if repeated["tube_level"] is not None and told:
         # What the controller itself published, not what is computed from its messages. It is that of the state it is

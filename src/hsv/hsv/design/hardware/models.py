@@ -313,5 +313,5 @@ def _remeasure(models: dict[str, Model], unbounded: list[str], plan: Plan, equip
 
 def declared_actuators(scenario: Scenario) -> str:
     """Return the published actuators that a scenario flies, separated by commas, or that they are ideal."""
-    sets = [scenario.equipment.get(f"actuator.{channel}.set", IDEAL) for channel in INPUT_NAMES]
+    sets = [scenario.settings.get(f"actuator.{channel}.set", IDEAL) for channel in INPUT_NAMES]
     return ",".join(name for name in sets if name != IDEAL) or IDEAL
