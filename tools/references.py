@@ -17,7 +17,6 @@ from mcap.reader import make_reader
 
 from hsv.bags.description import ROSOUT
 from hsv.bags.reader import Bag
-from hsv.bags.topic import Topic
 from hsv.bags.writer import BagWriter
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -64,9 +63,8 @@ def main() -> int:
 def _without_paths(folder: Path, target: Path) -> Path:
     """Write the bag in ``folder`` to ``target``, message by message, without the paths of this machine in its log."""
     bag = Bag(folder)
-    topics = [Topic(t.name, t.type, bag.definition(t.name), t.type_hash, bag.qos(t.name)) for t in bag.topics.values()]
     target.parent.mkdir(exist_ok=True)
-    writer = BagWriter(target, topics, bag.custom_data)
+    writer = BagWriter(target, bag.topics.values(), bag.custom_data)
     for name, data in bag.attachments.items():
         writer.attach(name, bag.media_types[name], data)
     with bag.path.open("rb") as stream:

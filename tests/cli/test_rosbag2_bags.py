@@ -134,7 +134,7 @@ def test_wall_clock_log_times_change_nothing(hsv: Hsv, tmp_path: Path, form: dic
     assert bag.complete
     for topic in original.topics:
         latched = topic in map(resolved, TRANSIENT_LOCAL)
-        assert (bag.qos(topic).durability == "transient_local") == latched or topic == ROSOUT, topic
+        assert (bag.topics[topic].qos.durability == "transient_local") == latched or topic == ROSOUT, topic
         # What has no stamp of its own counts for the step before, which may be one of another topic of that step.
         assert np.abs(bag.times(topic) - original.times(topic)).max(initial=0) <= 20_000_000, topic
 

@@ -26,10 +26,7 @@ def changed_bag(
 ) -> Path:
     """Write ``source`` again to ``target`` with other topics (None: left out), messages, attachments or custom data."""
     bag = Bag(source)
-    recorded = [
-        Topic(t.name, t.type, bag.definition(t.name), t.type_hash, bag.qos(t.name)) for t in bag.topics.values()
-    ]
-    changed = [(topic.name, topics(topic)) for topic in recorded]
+    changed = [(name, topics(topic)) for name, topic in bag.topics.items()]
     kept = {name: topic for name, topic in changed if topic}
     writer = BagWriter(target, list(kept.values()), bag.custom_data | dict(custom_data))
     for name, data in (bag.attachments | dict(attachments)).items():

@@ -7,10 +7,8 @@ import re
 import numpy as np
 import pytest
 from full_disk import files_no_larger_than
-from recorded_flight import message_types
 
 from hsv.bags.reader import Bag
-from hsv.bags.topic import Qos, Topic
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import RecordingError
 from hsv.flight.metrics import METRICS
@@ -171,12 +169,7 @@ def test_a_design_without_a_set_is_said_to_have_none(bags):
 
 
 def test_without_attachments_there_is_a_page_but_no_verdict(quiet, tmp_path):
-    types = message_types()
-    topics = [
-        Topic(t.name, t.type, types.generate_msgdef(t.type, ros_version=2)[0], t.type_hash, Qos())
-        for t in quiet.topics.values()
-    ]
-    writer = BagWriter(tmp_path / "bare", topics)
+    writer = BagWriter(tmp_path / "bare", quiet.topics.values())
     for topic in quiet.topics:
         for time, data in quiet.messages(topic):
             writer.write(topic, time, data)
@@ -187,11 +180,7 @@ def test_without_attachments_there_is_a_page_but_no_verdict(quiet, tmp_path):
 
 
 def test_a_bag_without_a_flight_is_refused(quiet, tmp_path):
-    types = message_types()
-    topics = [
-        Topic(t.name, t.type, types.generate_msgdef(t.type, ros_version=2)[0], t.type_hash, Qos())
-        for t in quiet.topics.values()
-    ]
+    topics = quiet.topics.values()
     BagWriter(tmp_path / "empty", topics).close()
     with pytest.raises(RecordingError, match="no complete step"):
         reported_runs([Bag(tmp_path / "empty")])

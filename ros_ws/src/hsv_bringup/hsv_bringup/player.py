@@ -56,7 +56,9 @@ class PlayerNode(ProcessNode):
                     _relative(bag, topic), "others to play, or a place of their own (ROS_DOMAIN_ID, --namespace)"
                 )
         self._outputs = {
-            topic: self.create_publisher(_message_class(bag, topic), _relative(bag, topic), _profile(bag.qos(topic)))
+            topic: self.create_publisher(
+                _message_class(bag, topic), _relative(bag, topic), _profile(bag.topics[topic].qos)
+            )
             for topic in topics
         }
         self._instants = _instants(bag, topics)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from hsv.bags.topic import Topic
 from hsv.base.errors import DocumentError
 from hsv.base.files import parse_yaml, read_text
 
@@ -22,51 +22,8 @@ FILE_NAME = "metadata.yaml"
 ROOT = "rosbag2_bagfile_information"
 VERSION = 9
 DISTRO = "jazzy"
-EMPTY_BAG_START = 2**63 - 1
-"""Starting time (ns) of a bag without messages in rosbag2."""
-
-
-@dataclass
-class Tally:
-    """Number of messages, with the first and the last log time (ns)."""
-
-    count: int = 0
-    start: int = EMPTY_BAG_START
-    end: int = 0
-
-    def add(self, time: int) -> None:
-        """Count a message."""
-        self.count += 1
-        self.start = min(self.start, time)
-        self.end = max(self.end, time)
-
-    @classmethod
-    def of(cls, parts: Iterable[Tally]) -> Tally:
-        """Return the tally of all ``parts`` together."""
-        counted = [part for part in parts if part.count]
-        return cls(
-            sum(part.count for part in counted),
-            min((part.start for part in counted), default=EMPTY_BAG_START),
-            max((part.end for part in counted), default=0),
-        )
-
-    @property
-    def duration(self) -> int:
-        """Time from the first to the last message, ns."""
-        return max(self.end - self.start, 0)
-
-
-@dataclass(frozen=True)
-class TopicInformation:
-    """A topic in metadata.yaml."""
-
-    name: str
-    type: str
-    qos: str
-    """The offered profiles, as YAML."""
-    type_hash: str
-    messages: int
-    encoding: str = "cdr"
+EMPTY_SPAN = 2**63 - 1, 0
+"""First and last time (ns) of a bag without messages in rosbag2."""
 
 
 class _Quoted(str):
@@ -85,26 +42,35 @@ _Dumper.add_representer(
 
 
 def information(
-    file: str, tally: Tally, topics: Sequence[TopicInformation], custom: Mapping[str, str], distro: str = DISTRO
+    file: str, topics: Sequence[Topic], span: tuple[int, int], custom: Mapping[str, str], distro: str = DISTRO
 ) -> dict[str, Any]:
-    """Return the metadata of a bag with one file, with all keys that rosbag2 requires."""
-    start, duration = {"nanoseconds_since_epoch": tally.start}, {"nanoseconds": tally.duration}
+    """Return the metadata of a bag with one file, with all keys that rosbag2 requires.
+
+    Args:
+        file: Name of the file.
+        topics: The topics with their numbers of messages.
+        span: First and last log time (ns); :data:`EMPTY_SPAN` without messages.
+        custom: Custom data.
+        distro: ROS 2 distribution of the recorder.
+    """
+    start, duration = {"nanoseconds_since_epoch": span[0]}, {"nanoseconds": max(span[1] - span[0], 0)}
+    count = sum(topic.count for topic in topics)
     return {
         "version": VERSION,
         "storage_identifier": "mcap",
         "duration": dict(duration),
         "starting_time": dict(start),
-        "message_count": tally.count,
+        "message_count": count,
         "topics_with_message_count": [
             {
                 "topic_metadata": {
                     "name": topic.name,
                     "type": topic.type,
                     "serialization_format": topic.encoding,
-                    "offered_qos_profiles": parse_yaml(topic.qos or "[]"),
+                    "offered_qos_profiles": [topic.qos.as_dict()],
                     "type_description_hash": _Quoted(topic.type_hash),
                 },
-                "message_count": topic.messages,
+                "message_count": topic.count,
             }
             for topic in topics
         ],
@@ -112,7 +78,7 @@ def information(
         "compression_format": _Quoted(""),
         "compression_mode": _Quoted(""),
         "relative_file_paths": [file],
-        "files": [{"path": file, "starting_time": start, "duration": duration, "message_count": tally.count}],
+        "files": [{"path": file, "starting_time": start, "duration": duration, "message_count": count}],
         "custom_data": {key: _Quoted(value) for key, value in custom.items()},
         "ros_distro": distro,
     }

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from heapq import merge
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Metadata, Schema
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from numpy.typing import NDArray
 from rosbags.interfaces.typing import ConstValue
 from rosbags.typesys.store import Typestore
@@ -29,8 +30,8 @@ from hsv.bags.metadata import (
     read_metadata,
 )
 from hsv.bags.roles import TYPES, namespace_of, roles
-from hsv.bags.scan import MESSAGE_HEADER, Damage, Scan, content
-from hsv.bags.topic import Qos
+from hsv.bags.scan import Damage, Scan
+from hsv.bags.topic import Qos, Topic
 from hsv.bags.track import Track
 from hsv.bags.typestore import message_types
 from hsv.bags.units import Units, units_of
@@ -43,32 +44,6 @@ _USUAL = {resolved(role): kind for role, kind in TYPES.items()}
 _STAMP_START, _STAMP_END = 4, 12
 """Bytes of the stamp in the messages of a step: seconds and nanoseconds, four bytes each."""
 _BIG_ENDIAN = b"\x00\x00"
-
-
-@dataclass(frozen=True, slots=True)
-class RecordedTopic:
-    """A topic of a bag with its number of messages."""
-
-    name: str
-    type: str
-    count: int
-    type_hash: str
-
-
-@dataclass
-class _Recorded:
-    """A topic in the files of a bag; its channels may differ in their quality of service only."""
-
-    channel: Channel
-    schema: Schema
-    log_times: list[int] = field(default_factory=list)
-    messages: list[bytes] = field(default_factory=list)
-
-    def sort(self) -> None:
-        """Put the messages into the order of their log times: MCAP does not demand it of a file."""
-        order = sorted(range(len(self.log_times)), key=self.log_times.__getitem__)
-        self.log_times = [self.log_times[row] for row in order]
-        self.messages = [self.messages[row] for row in order]
 
 
 @dataclass
@@ -126,23 +101,15 @@ class Bag:
         """Names of the topics by their role, see :mod:`hsv.bags.description`."""
         self.namespace = ROOT
         """Namespace of the graph."""
-        self._topics: dict[str, _Recorded] = {}
+        self.topics: dict[str, Topic] = {}
+        """The topics by name, including topics without messages."""
+        self.undecodable: dict[str, Topic] = {}
+        """Topics of others that are not ROS 2 messages in CDR; only a recovery copies them."""
+        self._messages: dict[str, list[Message]] = defaultdict(list)
+        self._profiles: dict[str, str] = {}
         self._columns: dict[str, Columns] = {}
         self._read()
         self._check()
-
-    @property
-    def topics(self) -> dict[str, RecordedTopic]:
-        """The topics by name, including topics without messages."""
-        return {
-            name: RecordedTopic(
-                name,
-                recorded.schema.name,
-                len(recorded.messages),
-                recorded.channel.metadata.get("topic_type_hash", ""),
-            )
-            for name, recorded in self._topics.items()
-        }
 
     def name_of(self, role: str) -> str:
         """Return the name of the topic in ``role``, or its default name if it is not in the bag."""
@@ -151,7 +118,7 @@ class Bag:
     @cached_property
     def span(self) -> tuple[int, int]:
         """First and last time in the bag, ns; zeros without messages."""
-        times = [(int(times.min()), int(times.max())) for times in map(self.times, self._topics) if len(times)]
+        times = [(int(times.min()), int(times.max())) for times in map(self.times, self.topics) if len(times)]
         return (min(first for first, _ in times), max(last for _, last in times)) if times else (0, 0)
 
     def times(self, topic: str) -> NDArray[np.int64]:
@@ -160,10 +127,10 @@ class Bag:
         Raises:
             RecordingError: The topic is not in the bag, or a message of a step is too short for a stamp.
         """
-        recorded, name = self._of(topic), self.name_of(topic)
+        name = self._topic(topic).name
         if name in self._step_topics:
-            return self._stamps(name, recorded.messages)
-        log_times = np.array(recorded.log_times, np.uint64)
+            return self._stamps(name, self._data(name))
+        log_times = self._log_times(name)
         received, stamps = self._clock
         if np.array_equal(received.astype(np.int64), stamps):
             return log_times.astype(np.int64)  # the recorder used simulated time
@@ -172,7 +139,12 @@ class Bag:
 
     def messages(self, topic: str) -> list[tuple[int, bytes]]:
         """Return simulated time (ns) and CDR with its header of each recorded message of a topic."""
-        return list(zip(self.times(topic).tolist(), self._of(topic).messages, strict=True))
+        return list(zip(self.times(topic).tolist(), self._data(self.name_of(topic)), strict=True))
+
+    def recorded(self) -> Iterator[tuple[str, Message]]:
+        """Yield topic and record of all messages, also of undecodable topics, in the order of their log times."""
+        topics = ([(topic, message) for message in messages] for topic, messages in self._messages.items())
+        return merge(*topics, key=lambda found: found[1].log_time)
 
     def columns(self, topic: str) -> Columns:
         """Return all decoded messages of a topic, one array per field; the result is cached.
@@ -190,7 +162,8 @@ class Bag:
 
     def units(self, topic: str) -> dict[str, Units]:
         """Return the units of the fields of a topic, by field path as in :meth:`columns`."""
-        return units_of(self.definition(topic), self.types.fielddefs, self.topics[self.name_of(topic)].type)
+        found = self._topic(topic)
+        return units_of(found.definition, self.types.fielddefs, found.type)
 
     def decode(self, topic: str) -> Iterator[tuple[int, Any]]:
         """Yield time (ns) and deserialized message of each message of a topic.
@@ -206,10 +179,11 @@ class Bag:
         Raises:
             RecordingError: The topic is not in the bag, or its definition cannot be used.
         """
-        recorded, name = self._of(topic), self.name_of(topic)
-        if (kind := recorded.schema.name) not in self.types.fielddefs:
-            raise RecordingError(f"{self.path}: topic {name}: the definition of {kind} cannot be used")
-        return Track(name, kind, self.types, self.times(topic).tolist(), recorded.messages, str(self.path))
+        found = self._topic(topic)
+        if found.type not in self.types.fielddefs:
+            raise RecordingError(f"{self.path}: topic {found.name}: the definition of {found.type} cannot be used")
+        times, data = self.times(topic).tolist(), self._data(found.name)
+        return Track(found.name, found.type, self.types, times, data, str(self.path))
 
     def text(self, name: str) -> str:
         """Return an attachment as text.
@@ -224,19 +198,9 @@ class Bag:
         except UnicodeDecodeError as error:
             raise RecordingError(f"{self.path}: attachment {name}: {error}, expected text") from None
 
-    def definition(self, topic: str) -> str:
-        """Return the recorded definition of a topic's type, including its dependencies."""
-        return self._text(self._of(topic).schema)
-
-    def qos(self, topic: str) -> Qos:
-        """Return the recorded quality of service of a topic, or else that with which the graph offers it."""
-        latched = self.name_of(topic) in map(self.name_of, TRANSIENT_LOCAL)
-        usual = Qos(durability="transient_local" if latched else "volatile")
-        return Qos.from_yaml(self._of(topic).channel.metadata.get("offered_qos_profiles", ""), usual)
-
     def constants(self, topic: str) -> dict[str, ConstValue]:
         """Return the constants in the recorded definition of a topic's type."""
-        return {name: value for name, _, value in self.types.fielddefs[self._of(topic).schema.name][0]}
+        return {name: value for name, _, value in self.types.fielddefs[self._topic(topic).type][0]}
 
     def constant(self, topic: str, name: str) -> ConstValue:
         """Return a constant in the recorded definition of a topic's type.
@@ -246,7 +210,7 @@ class Bag:
         """
         found = self.constants(topic)
         if name not in found:
-            raise RecordingError(f"{self.path}: definition of {self._of(topic).schema.name}: no constant {name}")
+            raise RecordingError(f"{self.path}: definition of {self._topic(topic).type}: no constant {name}")
         return found[name]
 
     @cached_property
@@ -254,23 +218,21 @@ class Bag:
         """The message types by the definitions in the bag."""
         ours: dict[str, str] = {}
         others: dict[str, str] = {}
-        for topic, recorded in self._topics.items():
-            (ours if _is_ours(topic) or topic in self.roles.values() else others)[recorded.schema.name] = self._text(
-                recorded.schema
-            )
+        for name, topic in self.topics.items():
+            (ours if _is_ours(name) or name in self.roles.values() else others)[topic.type] = topic.definition
         return message_types(list(ours.items()), str(self.path), list(others.items()))
 
-    def _text(self, schema: Schema) -> str:
-        try:
-            return schema.data.decode("utf-8-sig").replace("\r\n", "\n")
-        except UnicodeDecodeError as error:
-            raise RecordingError(f"{self.path}: a definition of a message is no text: {error}") from None
-
-    def _of(self, topic: str) -> _Recorded:
+    def _topic(self, topic: str) -> Topic:
         name = self.name_of(topic)
-        if name in self._topics:
-            return self._topics[name]
+        if name in self.topics:
+            return self.topics[name]
         raise RecordingError(f"{self.path}: no topic {name}, only {', '.join(sorted(self.topics))}")
+
+    def _data(self, name: str) -> list[bytes]:
+        return [message.data for message in self._messages[name]]
+
+    def _log_times(self, name: str) -> NDArray[np.uint64]:
+        return np.array([message.log_time for message in self._messages[name]], np.uint64)
 
     def _stamps(self, topic: str, messages: list[bytes]) -> NDArray[np.int64]:
         """Return the stamps (n,) of the messages of a step topic, ns; they follow the header of the CDR."""
@@ -289,8 +251,7 @@ class Bag:
     def _clock(self) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:
         """Log times (n,) of all messages of steps, ascending, and the latest stamp (n,) up to each of them, ns."""
         steps = sorted(self._step_topics)
-        log_times = (np.array(self._topics[topic].log_times, np.uint64) for topic in steps)
-        received = np.concatenate([np.array([], np.uint64), *log_times])
+        received = np.concatenate([np.array([], np.uint64), *map(self._log_times, steps)])
         stamps = np.concatenate([np.array([], np.int64), *(self.times(topic) for topic in steps)])
         order = np.argsort(received, kind="stable")
         return received[order], np.maximum.accumulate(stamps[order].astype(np.int64))
@@ -319,59 +280,46 @@ class Bag:
                     f"metadata.yaml states {stated} messages in {file.name}, which has {expected}"
                 )
             self.loss.counted &= expected is not None or not scan.damages
+            # Messages of unknown topics are lost, too.
             self.loss.messages += max((scan.indexed if expected is None else expected) - found, orphans, 0)
             self.loss.attachments += max(statistics.attachment_count - attachments, 0) if statistics else 0
-        for recorded in self._topics.values():
-            recorded.sort()
+        for messages in self._messages.values():
+            messages.sort(key=lambda message: message.log_time)  # MCAP does not demand it of a file
         self.loss.counted &= not self.loss.files
         self.custom_data = self.custom_data or custom_data(recorded_by)
         self.distro = str(recorded_by.get("ros_distro") or DISTRO)
-        kinds = {name: recorded.schema.name for name, recorded in self._topics.items()}
-        self.roles = roles(kinds, self.custom_data, str(self.path))
+        self.roles = roles({name: topic.type for name, topic in self.topics.items()}, self.custom_data, str(self.path))
         self.namespace = namespace_of(self.roles)
+        latched = set(map(self.name_of, TRANSIENT_LOCAL))
+        for topics in (self.topics, self.undecodable):
+            for name, topic in topics.items():
+                usual = Qos(durability="transient_local" if name in latched else "volatile")
+                qos = Qos.from_yaml(self._profiles[name], usual)
+                topics[name] = replace(topic, qos=qos, count=len(self._messages[name]))
 
     def _read_file(self, scan: Scan, unpacker: Unpacker) -> tuple[int, int, int, dict[str, Any]]:
         """Add the contents of a file; return the numbers of messages, orphans, attachments, and rosbag2's metadata."""
-        unpack, size = MESSAGE_HEADER.unpack_from, MESSAGE_HEADER.size
         schemas: dict[int, Schema] = {}
         channels: dict[int, Channel] = {}
-        # Channels of one topic share lists, in the order of the file.
-        lists: dict[int, tuple[list[int], list[bytes]]] = {}
+        messages: list[Message] = []
         attachments = 0
         rosbag2: dict[str, Any] = {}
-        for opcode, body in scan.records():
-            match opcode:
-                case Opcode.MESSAGE:
-                    channel_id, _, time, _ = unpack(body)
-                    if channel_id not in lists:  # its channel is lost, or only in the summary
-                        lists[channel_id] = [], []
-                    times, messages = lists[channel_id]
-                    times.append(time)
-                    messages.append(bytes(body[size:]))
-                case Opcode.SCHEMA:
-                    schema = Schema.read(content(body))
-                    schemas.setdefault(schema.id, schema)  # the first has the checksum of its chunk
-                case Opcode.CHANNEL:
-                    channel = Channel.read(content(body))
-                    if channel.id not in channels:
-                        channels[channel.id] = channel
-                        first = next(c.id for c in channels.values() if c.topic == channel.topic)
-                        shared, early = lists.setdefault(first, ([], [])), lists.get(channel.id)
-                        if early is not None and early is not shared:
-                            shared[0].extend(early[0])
-                            shared[1].extend(early[1])
-                        lists[channel.id] = shared
-                case Opcode.ATTACHMENT:
-                    attached = Attachment.read(content(body))
+        for record in scan.records():
+            match record:
+                case Message():
+                    messages.append(record)
+                case Schema():
+                    schemas.setdefault(record.id, record)  # the first has the checksum of its chunk
+                case Channel():
+                    channels.setdefault(record.id, record)
+                case Attachment():
                     attachments += 1
-                    self.attachments[attached.name] = attached.data
-                    self.media_types[attached.name] = attached.media_type
-                case Opcode.METADATA:
-                    metadata = Metadata.read(content(body))
-                    if metadata.name == CUSTOM_DATA:
-                        self.custom_data |= metadata.metadata
-                    elif metadata.name == ROSBAG2:
-                        rosbag2 = parsed(metadata.metadata.get(SERIALIZED, "")) or rosbag2
+                    self.attachments[record.name] = record.data
+                    self.media_types[record.name] = record.media_type
+                case Metadata() if record.name == CUSTOM_DATA:
+                    self.custom_data |= record.metadata
+                case Metadata() if record.name == ROSBAG2:
+                    rosbag2 = parsed(record.metadata.get(SERIALIZED, "")) or rosbag2
         for channel in list(channels.values()):
             try:
                 self._declare(channel, schemas.get(channel.schema_id))
@@ -379,43 +327,54 @@ class Bag:
                 if not scan.damages:
                     raise
                 del channels[channel.id]  # its definition is lost or damaged
-        read = 0
-        for topic, number in {channel.topic: channel.id for channel in channels.values()}.items():
-            found = [(time, unpacker.message(data)) for time, data in zip(*lists[number], strict=True)]
-            whole = [(time, message) for time, message in found if message is not None]
-            read += len(whole)
-            if topic in self._topics:
-                self._topics[topic].log_times += [time for time, _ in whole]
-                self._topics[topic].messages += [message for _, message in whole]
-        orphans = sum(len(times) for number, (times, _) in lists.items() if number not in channels)
+        read = orphans = 0
+        for message in messages:
+            channel = channels.get(message.channel_id)
+            if channel is None:  # it is lost
+                orphans += 1
+            elif (data := unpacker.message(message.data)) is not None:
+                read += 1
+                message.data = data
+                self._messages[channel.topic].append(message)
         return read, orphans, attachments, rosbag2
 
     def _declare(self, channel: Channel, schema: Schema | None) -> None:
-        """Add the topic of a channel; foreign topics whose messages cannot be decoded are skipped."""
+        """Add the topic of a channel."""
         name = channel.topic
         decodable = schema is not None and (schema.encoding, channel.message_encoding) == ("ros2msg", "cdr")
-        if not decodable and not _is_ours(name):
-            return
-        if schema is None or not decodable:
+        if not decodable and _is_ours(name):
             raise RecordingError(f"{self.path}: topic {name}: expected a ROS 2 message in CDR")
+        if schema is None:
+            return
         if schema.name != (expected := _USUAL.get(name, schema.name)):
             raise RecordingError(f"{self.path}: topic {name} is {schema.name}, expected {expected}")
-        first = self._topics.setdefault(name, _Recorded(channel, schema)).schema
-        if (schema.name, schema.data) != (first.name, first.data):
+        text = schema.data.decode("utf-8-sig" if decodable else "utf-8", errors="surrogateescape")
+        topic = Topic(
+            name,
+            schema.name,
+            text.replace("\r\n", "\n") if decodable else text,
+            channel.metadata.get("topic_type_hash", ""),
+            Qos(),  # depends on the roles of all topics
+            schema_encoding=schema.encoding,
+            encoding=channel.message_encoding,
+        )
+        self._profiles.setdefault(name, channel.metadata.get("offered_qos_profiles", ""))
+        first = (self.topics if decodable else self.undecodable).setdefault(name, topic)
+        if (topic.type, topic.definition) != (first.type, first.definition):
             raise RecordingError(f"{self.path}: topic {name}: recorded with two definitions, expected one")
 
     def _check(self) -> None:
-        if not self._topics and self.loss.damages:
+        if not self.topics and self.loss.damages:
             file, damage = self.loss.damages[0]
             raise RecordingError(f"{file}: is damaged, and nothing of it can be read ({damage})")
-        if not self._topics and not self.complete:
+        if not self.topics and not self.complete:
             raise RecordingError(f"{self.path}: is truncated before its first messages")
         if RUN in self.roles and (found := self.constants(RUN).get("INTERFACE_VERSION", 1)) != INTERFACE_VERSION:
             raise RecordingError(
                 f"{self.path}: interface version {found}, recorded by commit "
                 f"{self.custom_data.get('commit', 'unknown')}: expected version {INTERFACE_VERSION}"
             )
-        if not any(_OURS in topic for topic in (*self._topics, *map(resolved, self.roles))):
+        if not any(_OURS in topic for topic in (*self.topics, *map(resolved, self.roles))):
             raise RecordingError(f"{self.path}: has no topic below {_OURS}, expected a bag of this project")
 
 

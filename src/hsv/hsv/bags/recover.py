@@ -2,39 +2,18 @@
 
 from __future__ import annotations
 
-import os
+import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
 
-from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Metadata, Schema
-from mcap.writer import Writer
-
-from hsv.bags.files import Unpacker, find_files, locked
-from hsv.bags.metadata import (
-    CUSTOM_DATA,
-    FILE_NAME,
-    ROSBAG2,
-    Tally,
-    TopicInformation,
-    file_names,
-    information,
-    message_counts,
-    read_metadata,
-    record,
-    write_metadata,
-)
+from hsv.bags.files import find_files, locked
+from hsv.bags.metadata import FILE_NAME, file_names, message_counts, read_metadata
 from hsv.bags.reader import Bag
-from hsv.bags.scan import MESSAGE_HEADER, Scan, content
-from hsv.bags.topic import repaired_profiles
-from hsv.bags.writer import CHUNK_BYTES, mcap_path
+from hsv.bags.writer import BagWriter
 from hsv.base.errors import RecordingError
-
-_PROFILES = "offered_qos_profiles"
-"""Key of the quality of service in the metadata of a channel."""
 
 RECOVERED = {"recovered": "true"}
 """Custom data that mark a recovered bag, whose end may not be the end of the run."""
@@ -69,25 +48,17 @@ def recover(path: Path | str, target: Path | None = None) -> Recovery:
     """
     with _exclusively(find_files(Path(path))[0]):
         bag = Bag(path)
-        messages = sum(topic.count for topic in bag.topics.values())
+        messages = sum(topic.count for topic in (*bag.topics.values(), *bag.undecodable.values()))
         if bag.complete and not bag.loss and _has_its_metadata(bag, messages):
             return Recovery(bag, bag.folder, messages, changed=False)
         folder = bag.folder.absolute()
         target = (target or folder.with_name(f"{folder.name}_recovered")).absolute()
+        if target.exists():
+            raise RecordingError(f"out = {str(target)!r}: exists already, expected a new bag directory")
         try:
-            target.mkdir(parents=True)
-        except FileExistsError:
-            raise RecordingError(f"out = {str(target)!r}: exists already, expected a new bag directory") from None
-        except OSError as error:
-            raise RecordingError(f"out = {str(target)!r}: cannot be made: {error.strerror}") from None
-        try:
-            write_metadata(target, _rewrite(bag, mcap_path(target)))
-        except BaseException as error:
-            for part in (mcap_path(target), target / FILE_NAME):
-                part.unlink(missing_ok=True)
-            target.rmdir()
-            if isinstance(error, OSError):
-                raise RecordingError(f"out = {str(target)!r}: cannot be written: {error.strerror}") from None
+            _copy(bag, target)
+        except BaseException:
+            shutil.rmtree(target, ignore_errors=True)
             raise
     return Recovery(bag, target, messages, changed=True)
 
@@ -106,15 +77,16 @@ def finalise(directory: Path) -> None:
         if bag.loss:
             raise RecordingError(f"{bag.path}: is damaged, hsv recover makes a new bag of what is whole")
         (mcap,) = bag.files
-        part = mcap.with_suffix(".mcap.part")
         try:
-            values = _rewrite(bag, part, mcap.name)
-            part.replace(mcap)
-            write_metadata(directory, values)
-        except OSError as error:
-            raise RecordingError(f"{mcap}: cannot be repaired: {error.strerror}") from None
-        finally:
-            part.unlink(missing_ok=True)
+            with TemporaryDirectory(dir=directory) as part:
+                made = Path(part, directory.name)
+                _copy(bag, made).replace(mcap)
+                (made / FILE_NAME).replace(directory / FILE_NAME)
+        except (OSError, RecordingError) as error:
+            refused = error if isinstance(error, OSError) else error.__cause__
+            if not isinstance(refused, OSError):
+                raise
+            raise RecordingError(f"{mcap}: cannot be repaired: {refused.strerror}") from None
 
 
 def _has_its_metadata(bag: Bag, messages: int) -> bool:
@@ -142,91 +114,13 @@ def _exclusively(files: list[Path]) -> Iterator[None]:
         yield
 
 
-def _rewrite(bag: Bag, path: Path, name: str = "") -> dict[str, Any]:
-    """Write the intact data of ``bag`` to the file ``path``; return the metadata, which call it ``name``."""
-    custom = bag.custom_data | RECOVERED
-    with path.open("wb") as stream:
-        writer = Writer(stream, chunk_size=CHUNK_BYTES)
-        writer.start(profile="ros2")
-        copy = _Copy(writer)
-        for file in bag.files:
-            copy.add(Unpacker(file))
-        values = information(name or path.name, *copy.tallied(), custom, bag.distro)
-        writer.add_metadata(CUSTOM_DATA, custom)
-        writer.add_metadata(ROSBAG2, record(values))
-        writer.finish()
-        stream.flush()
-        os.fsync(stream.fileno())
-    return values
-
-
-class _Copy:
-    """A copy of several files into one, with equal schemas and channels merged."""
-
-    def __init__(self, writer: Writer) -> None:
-        self._writer = writer
-        self._schemas: dict[tuple[str, str, bytes], int] = {}
-        self._channels: dict[str, int] = {}
-        self._topics: dict[str, tuple[Channel, Schema]] = {}
-        self._tallies: dict[str, Tally] = {}
-
-    def add(self, file: Unpacker) -> None:
-        """Copy the intact data of a file."""
-        found = list(Scan(file).records())
-        schemas: dict[int, Schema] = {}
-        numbers: dict[int, tuple[int, Tally]] = {}
-        # Read definitions first, because in a file with a damaged beginning they are at the end.
-        for schema in (Schema.read(content(body)) for opcode, body in found if opcode == Opcode.SCHEMA):
-            schemas.setdefault(schema.id, schema)  # the first has the checksum of its chunk
-        for channel in (Channel.read(content(body)) for opcode, body in found if opcode == Opcode.CHANNEL):
-            if channel.id not in numbers and channel.schema_id in schemas:
-                numbers[channel.id] = self._channel(channel, schemas[channel.schema_id])
-        for opcode, body in found:
-            match opcode:
-                case Opcode.MESSAGE:
-                    number, sequence, log_time, publish_time = MESSAGE_HEADER.unpack_from(body)
-                    if number not in numbers:
-                        continue
-                    message = file.message(bytes(body[MESSAGE_HEADER.size :]))
-                    if message is None:
-                        continue
-                    channel_id, tally = numbers[number]
-                    self._writer.add_message(channel_id, log_time, message, publish_time, sequence)
-                    tally.add(log_time)
-                case Opcode.ATTACHMENT:
-                    kept = Attachment.read(content(body))
-                    self._writer.add_attachment(kept.create_time, kept.log_time, kept.name, kept.media_type, kept.data)
-                case Opcode.METADATA:
-                    metadata = Metadata.read(content(body))
-                    if metadata.name not in (CUSTOM_DATA, ROSBAG2):  # written anew at the end
-                        self._writer.add_metadata(metadata.name, metadata.metadata)
-
-    def tallied(self) -> tuple[Tally, list[TopicInformation]]:
-        """Return the tally of the copied messages and the copied topics for metadata.yaml."""
-        topics = [
-            TopicInformation(
-                name,
-                schema.name,
-                channel.metadata.get(_PROFILES, ""),
-                channel.metadata.get("topic_type_hash", ""),
-                self._tallies[name].count,
-                channel.message_encoding,
-            )
-            for name, (channel, schema) in self._topics.items()
-        ]
-        return Tally.of(self._tallies.values()), topics
-
-    def _channel(self, channel: Channel, schema: Schema) -> tuple[int, Tally]:
-        key = (schema.name, schema.encoding, schema.data)
-        if key not in self._schemas:
-            self._schemas[key] = self._writer.register_schema(*key)
-        name = channel.topic
-        if name not in self._channels:
-            profiles = repaired_profiles(channel.metadata.get(_PROFILES, ""))
-            channel = replace(channel, metadata={**channel.metadata, _PROFILES: profiles})
-            self._topics[name] = channel, schema
-            self._tallies[name] = Tally()
-            self._channels[name] = self._writer.register_channel(
-                name, channel.message_encoding, self._schemas[key], channel.metadata
-            )
-        return self._channels[name], self._tallies[name]
+def _copy(bag: Bag, target: Path) -> Path:
+    """Write the intact data of ``bag`` to a new bag; return its file."""
+    topics = (*bag.topics.values(), *bag.undecodable.values())
+    writer = BagWriter(target, topics, bag.custom_data | RECOVERED, bag.distro)
+    for name, data in bag.attachments.items():
+        writer.attach(name, bag.media_types[name], data)
+    for topic, message in bag.recorded():
+        writer.write(topic, message.log_time, message.data, message.publish_time)
+    writer.close()
+    return writer.path

@@ -1,7 +1,7 @@
 """Scan of the records of an MCAP file that continues after damages.
 
 The readers of the ``mcap`` package end at the first damage. This scan continues with the next chunk, attachment or end
-of data. The package decodes the records, decompresses chunks and checks checksums.
+of data. The package parses the records.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import takewhile
 from typing import Any
 
 from mcap import records as kinds
@@ -24,11 +25,9 @@ from hsv.bags.files import COMPRESSIONS, Unpacker
 
 _FRAME = struct.Struct("<BQ")
 """Opcode and length at the start of a record."""
-MESSAGE_HEADER = struct.Struct("<HIQQ")
+_MESSAGE = struct.Struct("<HIQQ")
 """Channel id, sequence, log time and publish time at the start of a message record; the data follow."""
-_INDEX_HEADER = struct.Struct("<HI")
-_INDEX_ENTRY = 16
-_CHECKSUM = struct.Struct("<I")
+_CHECKSUM = 4
 
 # The start of a chunk, an attachment or an end of data with a length below 2^40.
 _CANDIDATE = re.compile(rb"(?=[\x06\x09\x0f].{5}\x00{3})", re.DOTALL)
@@ -36,12 +35,13 @@ _CANDIDATE = re.compile(rb"(?=[\x06\x09\x0f].{5}\x00{3})", re.DOTALL)
 _DAMAGE = (EndOfFile, struct.error, UnicodeDecodeError, OverflowError, MemoryError)
 """Exceptions of the package for records whose lengths or texts are wrong."""
 
-_RECORDS = {
+_KINDS: dict[int, Any] = {
     Opcode.HEADER: kinds.Header,
     Opcode.FOOTER: kinds.Footer,
     Opcode.SCHEMA: kinds.Schema,
     Opcode.CHANNEL: kinds.Channel,
     Opcode.CHUNK: kinds.Chunk,
+    Opcode.MESSAGE_INDEX: kinds.MessageIndex,
     Opcode.CHUNK_INDEX: kinds.ChunkIndex,
     Opcode.ATTACHMENT: kinds.Attachment,
     Opcode.ATTACHMENT_INDEX: kinds.AttachmentIndex,
@@ -51,27 +51,20 @@ _RECORDS = {
     Opcode.SUMMARY_OFFSET: kinds.SummaryOffset,
     Opcode.DATA_END: kinds.DataEnd,
 }
-"""Record types that the package parses; a record is consistent if its fields fill it exactly."""
+
+Found = tuple[int, kinds.McapRecord | None, int]
+"""Start, record and end; the record is None for a private kind."""
 
 
 @dataclass(frozen=True)
 class Damage:
-    """A damaged part of a file."""
+    """A damaged part of a file; ``offset`` is its first byte."""
 
     offset: int
-    """First byte."""
-    length: int
-    """Length in bytes."""
     what: str
-    """Description of the damaged record."""
 
     def __str__(self) -> str:
         return f"{self.what} at byte {self.offset}"
-
-
-def content(body: memoryview) -> ReadDataStream:
-    """Return the body of a record as a stream for the ``read`` functions of ``mcap.records``."""
-    return ReadDataStream(BytesIO(body))
 
 
 class Scan:
@@ -92,8 +85,6 @@ class Scan:
         """Number of messages in the indexes of the chunks."""
         self._file = file
         self._data = memoryview(file.data)
-        self._chunks: set[int] = set()
-        """Digests of the chunks so far, so that a duplicated chunk is read once."""
 
     @property
     def is_mcap(self) -> bool:
@@ -101,126 +92,109 @@ class Scan:
         magic = MCAP0_MAGIC
         return self._data[: len(magic)] == magic[: len(self._data)] or self._next(0) is not None
 
-    def records(self) -> Iterator[tuple[int, memoryview]]:
-        """Yield opcode and body of every intact record except indexes; chunks are replaced by their records.
+    def records(self) -> Iterator[kinds.McapRecord]:
+        """Yield every intact record of the data section; chunks are replaced by their records.
 
         Data with a wrong checksum, or without a valid record, are skipped and added to :attr:`damages`. A record cut
         off at the end of the file, as left by a killed writer, is skipped as well.
         """
-        position = len(MCAP0_MAGIC)
-        if self._data[:position] != MCAP0_MAGIC:
-            self.damages.append(Damage(0, position, "the beginning"))
+        data, chunks = self._data, set[int]()
+        position: int | None = len(MCAP0_MAGIC)
+        if data[:position] != MCAP0_MAGIC:
+            self.damages.append(Damage(0, "the beginning"))
         summary, counted, new = 0, None, True
-        while position < len(self._data):
-            end = self._end(position)
-            if end is None:
-                following = self._next(position + 1)
-                if following is None:
-                    return
-                self.damages.append(Damage(position, following - position, "what lies"))
-                position = following
-                continue
-            opcode, body = self._data[position], self._data[position + _FRAME.size : end]
-            match opcode:
-                case Opcode.CHUNK:
-                    digest = hash(bytes(body))
-                    new = digest not in self._chunks
-                    self._chunks.add(digest)
-                    damages = len(self.damages)
-                    if new:
-                        yield from self._unpacked(position, body)
-                    if len(self.damages) > damages:  # an intact chunk may begin inside a damaged one
-                        end = min(self._next(position + 1) or end, end)
-                case Opcode.MESSAGE_INDEX:
-                    self.indexed += new * ((len(body) - _INDEX_HEADER.size) // _INDEX_ENTRY)
-                case Opcode.ATTACHMENT if not _fits_checksum(body, body):
-                    self.damages.append(Damage(position, end - position, "an attachment"))
-                case Opcode.DATA_END:
-                    summary = end
-                case Opcode.STATISTICS:
-                    counted = kinds.Statistics.read(content(body))
-                case Opcode.FOOTER:
-                    self.closed = True
-                    if not summary or _fits_checksum(self._data[summary:end], body):
-                        self.statistics = counted
-                    else:
-                        self.damages.append(Damage(summary, position - summary, "the summary"))
-                    return
-                case _:
-                    yield opcode, body
-            position = end
-
-    def _end(self, position: int) -> int | None:
-        """Return the end of the record at ``position``; None if there is no consistent record."""
-        if not self._may_begin(position) or position + _FRAME.size > len(self._data):
-            return None
-        opcode, length = _FRAME.unpack_from(self._data, position)
-        start = position + _FRAME.size
-        body = self._data[start : start + length]
-        match opcode:
-            case Opcode.MESSAGE:
-                fits = length >= MESSAGE_HEADER.size and self._may_begin(start + length)
-            case _ if opcode > Opcode.DATA_END:  # a private record, to be skipped
-                fits = self._may_begin(start + length)
-            case Opcode.MESSAGE_INDEX:
-                entries = length - _INDEX_HEADER.size
-                fits = entries >= 0 and _INDEX_HEADER.unpack_from(body)[1] == entries and entries % _INDEX_ENTRY == 0
-            case _:
-                fits = _is_filled(_RECORDS[Opcode(opcode)], body)
-        return start + int(length) if fits else None
-
-    def _may_begin(self, position: int) -> bool:
-        """Return whether a record, or the end of the file, is possible at ``position``."""
-        if position + _FRAME.size > len(self._data):
-            return True
-        opcode, length = _FRAME.unpack_from(self._data, position)
-        return bool(opcode and position + _FRAME.size + length <= len(self._data))
+        while position is not None:
+            for start, record, end in _walk(data, position):
+                position = end
+                match record:
+                    case kinds.Chunk():
+                        new = (digest := hash(record.data)) not in chunks  # a doubled chunk is read once
+                        chunks.add(digest)
+                        found, what = self._unpacked(record) if new else ([], "")
+                        yield from found
+                        if what:
+                            self.damages.append(Damage(start, what))
+                            following = self._next(start + 1)  # an intact chunk may begin inside a damaged one
+                            if following is not None and following < end:
+                                position = following
+                                break
+                    case kinds.MessageIndex():
+                        self.indexed += new * len(record.records)
+                    case kinds.Attachment() if not _fits_checksum(data[start + _FRAME.size : end]):
+                        self.damages.append(Damage(start, "an attachment"))
+                    case kinds.DataEnd():
+                        summary = end
+                    case kinds.Statistics():
+                        counted = record
+                    case kinds.Footer():
+                        self.closed = True
+                        if not summary or _fits_checksum(data[summary:end]):
+                            self.statistics = counted
+                        else:
+                            self.damages.append(Damage(summary, "the summary"))
+                        return
+                    case kinds.McapRecord():
+                        yield record
+            else:
+                damaged, position = position, self._next(position + 1)
+                if position is not None:
+                    self.damages.append(Damage(damaged, "what lies"))
 
     def _next(self, position: int) -> int | None:
         """Return the start of the next intact chunk, attachment or end of data, or None."""
         candidates = (match.start() for match in _CANDIDATE.finditer(self._data, position))
-        return next((at for at in candidates if self._end(at) is not None), None)
+        return next((at for at in candidates if next(_walk(self._data, at), None)), None)
 
-    def _unpacked(self, offset: int, body: memoryview) -> Iterator[tuple[int, memoryview]]:
-        """Yield the records of a chunk: all or none, or up to the first damage in a chunk without a checksum."""
-        try:
-            chunk = kinds.Chunk.read(content(body))
-        except _DAMAGE:
-            self.damages.append(Damage(offset, len(body), "a chunk"))
+    def _unpacked(self, chunk: kinds.Chunk) -> tuple[list[kinds.McapRecord], str]:
+        """Return the records of a chunk and a description of its damage, empty without one.
+
+        The records are all or none, or those before the first damage in a chunk without a checksum.
+        """
+        if chunk.compression not in ("", *COMPRESSIONS.values()):
+            return [], f"a chunk (unsupported compression type {chunk.compression}, expected zstd, lz4 or none)"
+        data, whole = self._file.unpacked(chunk.data, chunk.compression)
+        if not whole or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
+            return [], "a chunk"
+        known = kinds.Message | kinds.Channel | kinds.Schema
+        found = list(takewhile(lambda found: isinstance(found[1], known), _walk(memoryview(data), 0)))
+        end = found[-1][2] if found else 0
+        return [record for _, record, _ in found if record], "part of a chunk" if end < len(data) else ""
+
+
+def _walk(data: memoryview, position: int) -> Iterator[Found]:
+    """Yield the consistent records from ``position`` on: known kinds are filled exactly by their fields."""
+    while position < len(data) and _may_begin(data, position):
+        opcode, length = _FRAME.unpack_from(data, position) if position + _FRAME.size <= len(data) else (0, 0)
+        start, end = position + _FRAME.size, position + _FRAME.size + length
+        record = None
+        if opcode in _KINDS:
+            stream = ReadDataStream(BytesIO(data[start:end]))
+            try:
+                record = _KINDS[opcode].read(stream)
+            except _DAMAGE:
+                return
+            if stream.count != length:
+                return
+        elif not opcode or not _may_begin(data, end):
             return
-        if (compression := chunk.compression) not in ("", *COMPRESSIONS.values()):
-            problem = f"a chunk (unsupported compression type {compression}, expected zstd, lz4 or none)"
-            self.damages.append(Damage(offset, len(body), problem))
-            return
-        unpacked, whole = self._file.unpacked(chunk.data, compression)
-        if not whole or chunk.uncompressed_crc not in (0, zlib.crc32(unpacked)):
-            self.damages.append(Damage(offset, len(body), "a chunk"))
-            return
-        data = memoryview(unpacked)
-        found, position, head = [], 0, _FRAME.size
-        while position + head <= len(data):
-            opcode, length = _FRAME.unpack_from(data, position)
-            end = position + head + length
-            if end > len(data) or opcode not in (Opcode.MESSAGE, Opcode.CHANNEL, Opcode.SCHEMA):
-                break
-            found.append((opcode, data[position + head : end]))
-            position = end
-        if position < len(data):
-            self.damages.append(Damage(offset, len(body), "part of a chunk"))
-            found = found[:-1]  # the last one may be damaged
-        yield from found
+        elif opcode == Opcode.MESSAGE:
+            if length < _MESSAGE.size:
+                return
+            channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(data, start)
+            record = kinds.Message(channel, log_time, bytes(data[start + _MESSAGE.size : end]), publish_time, sequence)
+        yield position, record, end
+        position = end
 
 
-def _is_filled(kind: Any, body: memoryview) -> bool:
-    stream = content(body)
-    try:
-        kind.read(stream)
-    except _DAMAGE:
-        return False
-    return bool(stream.count == len(body))
+def _may_begin(data: memoryview, position: int) -> bool:
+    """Return whether a record, or the end of the data, is possible at ``position``."""
+    if position + _FRAME.size > len(data):
+        return True
+    opcode, length = _FRAME.unpack_from(data, position)
+    return bool(opcode and position + _FRAME.size + length <= len(data))
 
 
-def _fits_checksum(data: memoryview, record: memoryview) -> bool:
-    """Return whether ``data`` fits the checksum at the end of ``record``; zero means no checksum."""
-    (expected,) = _CHECKSUM.unpack(record[-_CHECKSUM.size :])
-    return expected in (0, zlib.crc32(data[: -_CHECKSUM.size]))
+def _fits_checksum(data: memoryview) -> bool:
+    """Return whether ``data`` fit the checksum at their end; zero means no checksum."""
+    expected = int.from_bytes(data[-_CHECKSUM:], "little")
+    return expected in (0, zlib.crc32(data[:-_CHECKSUM]))

@@ -17,6 +17,8 @@ from hsv.bags.metadata import CUSTOM_DATA
 from hsv.bags.overview import OVERVIEW_SCHEMA, OVERVIEW_TOPIC, OVERVIEW_TYPE, overview_message
 from hsv.bags.reader import Bag
 from hsv.bags.steps import joined
+from hsv.bags.topic import Qos, Topic
+from hsv.bags.writer import Schemas, register
 from hsv.base.errors import RecordingError
 from hsv.model.airframe.pose import Sample
 from hsv.model.airframe.scene import RATE, SCENE_TOPIC, TRANSFORMS_TOPIC, frame_transforms, scene
@@ -78,19 +80,15 @@ def write_scene(bag: Bag, target: Path, exaggeration: float | None = None) -> No
 
 def _channels(writer: Writer, bag: Bag) -> dict[str, int]:
     """Register every topic; return the channel numbers by topic."""
-    channels, schemas = {}, {}
-    for name, topic in bag.topics.items():
-        if topic.type not in schemas:
-            schemas[topic.type] = writer.register_schema(topic.type, "ros2msg", bag.definition(name).encode())
-        metadata = {"offered_qos_profiles": bag.qos(name).as_yaml(), "topic_type_hash": topic.type_hash}
-        channels[name] = writer.register_channel(name, "cdr", schemas[topic.type], metadata)
+    topics = list(bag.topics.values())
     for name, message in ((SCENE_TOPIC, scene(0)), (TRANSFORMS_TOPIC, frame_transforms(Sample(*[0.0] * 6), 0))):
         schema = message.get_schema()
-        number = writer.register_schema(schema.name, schema.encoding, schema.data)
-        channels[name] = writer.register_channel(name, "protobuf", number)
-    number = writer.register_schema(OVERVIEW_TYPE, "jsonschema", json.dumps(OVERVIEW_SCHEMA).encode())
-    channels[OVERVIEW_TOPIC] = writer.register_channel(OVERVIEW_TOPIC, "json", number)
-    return channels
+        definition = schema.data.decode(errors="surrogateescape")
+        topics.append(Topic(name, schema.name, definition, "", Qos(), 0, schema.encoding, "protobuf"))
+    definition = json.dumps(OVERVIEW_SCHEMA)
+    topics.append(Topic(OVERVIEW_TOPIC, OVERVIEW_TYPE, definition, "", Qos(), 0, "jsonschema", "json"))
+    schemas: Schemas = {}
+    return {topic.name: register(writer, topic, schemas) for topic in topics}
 
 
 def _pictures(bag: Bag, exaggeration: float | None) -> list[Message]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import cache
 from typing import Any
 
 import yaml
@@ -49,38 +50,21 @@ class Qos:
         }
 
     @classmethod
+    @cache
     def from_yaml(cls, text: str, usual: Qos) -> Qos:
-        """Return the first profile in a text as from :meth:`as_yaml`; missing entries are those of ``usual``."""
-        given = (_readable_profiles(text, usual) or [usual.as_dict()])[0]
-        for key, value in given.items():
-            if isinstance(value, dict):
-                given[key] = int(value["sec"]) * 10**9 + int(value["nsec"])
-        return cls(**given)
+        """Return the first profile in a text as from :meth:`as_yaml`; unusable entries are those of ``usual``."""
+        try:
+            profiles = parse_yaml(text)
+        except DocumentError:
+            return usual
+        given = profiles[0] if isinstance(profiles, list) and profiles else {}
+        if not isinstance(given, dict):
+            return usual
+        return cls(**{key: _usable(key, given.get(key), default) for key, default in asdict(usual).items()})
 
     def as_yaml(self) -> str:
         """Return the profile as the YAML list in the metadata of an MCAP channel."""
         return yaml.safe_dump([self.as_dict()], sort_keys=False)
-
-
-def _readable_profiles(text: str, usual: Qos) -> list[dict[str, Any]]:
-    """Return the profiles in the metadata of a channel, with those of ``usual`` for damaged entries."""
-    try:
-        profiles = parse_yaml(text)
-    except DocumentError:
-        return []
-    if not isinstance(profiles, list) or not all(isinstance(profile, dict) for profile in profiles):
-        return []
-    return [
-        {key: _sound(key, profile.get(key), value) for key, value in usual.as_dict().items()} for profile in profiles
-    ]
-
-
-def repaired_profiles(text: str) -> str:
-    """Return the ``text`` of profiles, repaired if it is damaged; empty if it cannot be repaired."""
-    profiles = _readable_profiles(text, Qos())
-    if not profiles:
-        return ""
-    return text if profiles == parse_yaml(text) else yaml.safe_dump(profiles, sort_keys=False)
 
 
 _WORDS = {
@@ -92,14 +76,15 @@ _WORDS = {
 """The words of rosbag2; Humble and Iron write their numbers, the positions here, as rmw counts them."""
 
 
-def _sound(key: str, value: Any, default: Any) -> Any:
-    if isinstance(default, dict):
-        times = value if isinstance(value, dict) else {}
-        return value if all(isinstance(times.get(part), int) for part in default) else default
-    words = _WORDS.get(key, (value,))
-    if type(value) is int and key in _WORDS and 0 <= value < len(words):
-        return words[value]
-    return value if isinstance(value, type(default)) and value in words else default
+def _usable(key: str, value: Any, default: Any) -> Any:
+    """Return an entry of a profile, a duration in nanoseconds, or ``default`` if it has no valid value."""
+    if words := _WORDS.get(key):
+        if type(value) is int and 0 <= value < len(words):
+            return words[value]
+        return value if value in words else default
+    if isinstance(value, dict) and all(isinstance(value.get(part), int) for part in ("sec", "nsec")):
+        value = value["sec"] * 10**9 + value["nsec"]
+    return value if type(value) is type(default) else default
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,3 +99,7 @@ class Topic:
     type_hash: str
     """``RIHS01_`` and 64 hexadecimal digits; empty if unknown."""
     qos: Qos
+    count: int = 0
+    """Number of recorded messages."""
+    schema_encoding: str = "ros2msg"
+    encoding: str = "cdr"

@@ -6,20 +6,13 @@ import errno
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
 
 from hsv.bags.files import locked
-from hsv.bags.metadata import (
-    CUSTOM_DATA,
-    ROSBAG2,
-    Tally,
-    TopicInformation,
-    information,
-    record,
-    write_metadata,
-)
+from hsv.bags.metadata import CUSTOM_DATA, DISTRO, EMPTY_SPAN, ROSBAG2, information, record, write_metadata
 from hsv.bags.topic import Topic
 from hsv.base.errors import RecordingError
 
@@ -28,10 +21,22 @@ CHUNK_BYTES = 16 * 1024
 _RECORD_OVERHEAD = 31
 """Size of an MCAP message record without its data, bytes."""
 
+Schemas = dict[tuple[str, str, str], int]
+"""Ids of the registered schemas by type, encoding and definition."""
+
 
 def mcap_path(directory: Path) -> Path:
     """Return the MCAP file of a bag directory, named as rosbag2 names the first file."""
     return directory / f"{directory.name}_0.mcap"
+
+
+def register(writer: Writer, topic: Topic, schemas: Schemas) -> int:
+    """Register a topic with an MCAP writer, and its definition unless it is in ``schemas``; return the channel id."""
+    key = topic.type, topic.schema_encoding, topic.definition
+    if key not in schemas:
+        schemas[key] = writer.register_schema(*key[:2], topic.definition.encode(errors="surrogateescape"))
+    metadata = {"offered_qos_profiles": topic.qos.as_yaml(), "topic_type_hash": topic.type_hash}
+    return writer.register_channel(topic.name, topic.encoding, schemas[key], metadata)
 
 
 class BagWriter:
@@ -45,13 +50,18 @@ class BagWriter:
         directory: The bag directory, ``<name>/`` with ``<name>_0.mcap``; new or empty.
         topics: The topics known at the start.
         custom_data: Data of the run known at the start (run id, seed, commit, design hash).
+        distro: ROS 2 distribution of the recorder.
 
     Raises:
         RecordingError: The directory is not empty or cannot be created.
     """
 
     def __init__(
-        self, directory: Path | str, topics: Iterable[Topic] = (), custom_data: Mapping[str, str] | None = None
+        self,
+        directory: Path | str,
+        topics: Iterable[Topic] = (),
+        custom_data: Mapping[str, str] | None = None,
+        distro: str = DISTRO,
     ) -> None:
         self.directory = Path(directory).absolute()
         self.path = mcap_path(self.directory)
@@ -68,10 +78,12 @@ class BagWriter:
         # Chunks are ended by flush() below: the limit of the library would leave them in the buffer of the stream.
         self._writer = Writer(self._stream, chunk_size=2**31, compression=CompressionType.ZSTD)
         self._writer.start(profile="ros2")
-        self._schemas: dict[tuple[str, str], int] = {}
+        self._schemas: Schemas = {}
         self._channels: dict[str, int] = {}
         self._topics: dict[str, Topic] = {}
-        self._tallies: dict[str, Tally] = {}
+        self._counts: dict[str, int] = {}
+        self._span = EMPTY_SPAN
+        self._distro = distro
         self._custom_data: dict[str, str] = {}
         self._pending = 0
         self.add_custom_data(custom_data or {})
@@ -86,39 +98,32 @@ class BagWriter:
         """
         if topic.name in self._channels:
             raise RecordingError(f"topic {topic.name}: is in the bag already, expected a new name")
-        key = (topic.type, topic.definition)
-        if key not in self._schemas:
-            self._schemas[key] = self._writer.register_schema(topic.type, "ros2msg", topic.definition.encode())
-        self._channels[topic.name] = self._writer.register_channel(
-            topic.name,
-            "cdr",
-            self._schemas[key],
-            {"offered_qos_profiles": topic.qos.as_yaml(), "topic_type_hash": topic.type_hash},
-        )
+        self._channels[topic.name] = register(self._writer, topic, self._schemas)
         self._topics[topic.name] = topic
-        self._tallies[topic.name] = Tally()
+        self._counts[topic.name] = 0
 
     def __contains__(self, topic: str) -> bool:
         """Return whether the bag has this topic."""
         return topic in self._channels
 
-    def write(self, topic: str, time_ns: int, data: bytes) -> None:
+    def write(self, topic: str, time_ns: int, data: bytes, publish_time: int | None = None) -> None:
         """Write one message.
 
         Args:
             topic: Name of an added topic.
-            time_ns: Simulated time (ns), written as log time and as publish time.
+            time_ns: Log time, simulated (ns).
             data: The message in CDR with its header of four bytes.
+            publish_time: Publish time (ns); default: the log time.
 
         Raises:
             RecordingError: The topic was not added, or the file cannot be written (no space left).
         """
-        try:
-            channel = self._channels[topic]
-        except KeyError:
-            raise RecordingError(f"topic {topic}: not in the bag, expected one that was added before") from None
-        self._writer.add_message(channel, time_ns, data, time_ns)
-        self._tallies[topic].add(time_ns)
+        if topic not in self._channels:
+            raise RecordingError(f"topic {topic}: not in the bag, expected one that was added before")
+        published = time_ns if publish_time is None else publish_time
+        self._writer.add_message(self._channels[topic], time_ns, data, published)
+        self._counts[topic] += 1
+        self._span = min(self._span[0], time_ns), max(self._span[1], time_ns)
         self._pending += len(data) + _RECORD_OVERHEAD
         if self._pending >= CHUNK_BYTES:
             self.flush()
@@ -148,14 +153,13 @@ class BagWriter:
             custom_data: Data known only at the end (outcome, wall time), added to the earlier ones.
         """
         self.add_custom_data(custom_data or {})
-        topics = [
-            TopicInformation(name, topic.type, topic.qos.as_yaml(), topic.type_hash, self._tallies[name].count)
-            for name, topic in self._topics.items()
-        ]
-        values = information(self.path.name, Tally.of(self._tallies.values()), topics, self._custom_data)
+        topics = [replace(topic, count=self._counts[name]) for name, topic in self._topics.items()]
+        values = information(self.path.name, topics, self._span, self._custom_data, self._distro)
         with self._writing():
             self._writer.add_metadata(ROSBAG2, record(values))
             self._writer.finish()
+            self._stream.flush()
+            os.fsync(self._stream.fileno())
             self._stream.close()
             write_metadata(self.directory, values)
 
@@ -172,4 +176,4 @@ class BagWriter:
         try:
             yield
         except OSError as error:
-            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from None
+            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
