@@ -11,13 +11,14 @@ from builtin_interfaces.msg import Time
 from flown_bags import types
 from hsv_msgs import msg
 from rclpy.serialization import serialize_message
-from rosbags.serde import SerdeError
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
 from hsv.bags import description
 from hsv.bags.description import INTERFACE_VERSION, TOPICS, WIRE_ALIGNMENT
 from hsv.bags.messages import FRAME, MessageError, StepMessages, Structure, stamp_in, stamp_of
+from hsv.bags.track import Track
+from hsv.bags.typestore import deserialized
 from hsv.base.errors import SignalError
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.tube_law import TubeResult, TubeStatusCode
@@ -172,15 +173,8 @@ def typed(topic: str, signals: Signals, frame: str = FRAME) -> Any:
 def sent(message: Any) -> bytes:
     """Return the bytes of a message of rclpy as DDS sends them: with zeros between the fields, and no surplus."""
     kind = "/".join((*type(message).__module__.split(".")[:2], type(message).__name__))
-    data = serialize_message(message)
-    while True:
-        try:
-            read = STORE.deserialize_cdr(data, kind)
-        except SerdeError:
-            data = data[:-4]  # rmw_fastrtps adds four bytes for some empty sequences
-        else:
-            data = bytes(STORE.serialize_cdr(read, kind))
-            return data + bytes(-len(data) % WIRE_ALIGNMENT)
+    data = bytes(STORE.serialize_cdr(deserialized(STORE, serialize_message(message), kind), kind))
+    return data + bytes(-len(data) % WIRE_ALIGNMENT)
 
 
 NEEDED = {
@@ -231,6 +225,21 @@ def test_unpacked_signals_are_those_that_rclpy_wrote(topic, frame):
         assert messages.step(data) == given.step
         messages.unpack(data, unpacked)
         assert_unpacked(topic, given, unpacked)
+
+
+def test_the_surplus_behind_faults_without_parameters_is_accepted():
+    frozen = [ActiveFault(Fault.of("elevator_deflection", "lock_in_place", {}), since) for since in (7, 8, 9, 10)]
+    surplus = set()
+    for count in range(1, len(frozen) + 1):
+        unpacked, kind = Signals(), TOPICS[description.ACTUATOR]
+        given = signals_of(1, sizes=(2, 2, 7), active=tuple(frozen[:count]))
+        data = serialize_message(typed(description.ACTUATOR, given))
+        surplus.add(len(data) - len(sent(typed(description.ACTUATOR, given))))
+        StepMessages(description.ACTUATOR).unpack(data, unpacked)
+        assert unpacked.active_faults == given.active_faults
+        columns = Track("/hsv/actuator", kind, STORE, [0], [data]).columns()
+        assert columns["since"].tolist() == [[7, 8, 9, 10][:count]]
+    assert max(surplus) > 3, "nothing to accept"
 
 
 def test_an_empty_text_may_lack_its_closing_zero():

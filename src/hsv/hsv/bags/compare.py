@@ -13,6 +13,7 @@ from rosbags.serde import SerdeError
 
 from hsv.bags.columns import Columns
 from hsv.bags.track import Track
+from hsv.bags.typestore import deserialized
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def _apart(expected: Track, actual: Track) -> Difference:
 def _content(track: Track, message: bytes) -> bytes:
     """Return the message serialized anew from its fields, with zero padding."""
     try:
-        return bytes(track.types.serialize_cdr(track.types.deserialize_cdr(message, track.type), track.type))
+        return bytes(track.types.serialize_cdr(deserialized(track.types, message, track.type), track.type))
     except SerdeError:
         return message
 

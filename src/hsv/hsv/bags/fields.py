@@ -53,7 +53,7 @@ def fields_of(types: Typesdict, message_type: str) -> list[Field]:
 
 def as_dict(types: Typesdict, message_type: str, message: object) -> dict[str, Any]:
     """Return a deserialized message as dictionaries, lists and numbers, with times in nanoseconds."""
-    return {field.name: _plain(types, field, getattr(message, field.name)) for field in fields_of(types, message_type)}
+    return {field.name: plain(types, field, getattr(message, field.name)) for field in fields_of(types, message_type)}
 
 
 def blank(store: Typestore, message_type: str) -> Any:
@@ -75,11 +75,6 @@ def blank(store: Typestore, message_type: str) -> Any:
     return store.types[message_type](**values)
 
 
-def nanoseconds(time: Any) -> int:
-    """Return a deserialized Time or Duration in nanoseconds."""
-    return int(time.sec) * 10**9 + int(time.nanosec)
-
-
 def _field(name: str, desc: FieldDesc) -> Field:
     kind: int
     inner: Any
@@ -96,14 +91,15 @@ def _field(name: str, desc: FieldDesc) -> Field:
     return Field(name, field_type, _FORMATS.get(field_type), count, length)
 
 
-def _plain(types: Typesdict, field: Field, value: Any) -> Any:
+def plain(types: Typesdict, field: Field, value: Any) -> Any:
+    """Return the value of a field of a deserialized message as in :func:`as_dict`."""
     if field.count != "one":
         if field.format:
             return value.tolist()
         single = Field(field.name, field.type, None, "one", 0)
-        return [_plain(types, single, element) for element in value]
+        return [plain(types, single, element) for element in value]
     if field.is_time:
-        return nanoseconds(value)
+        return int(value.sec) * 10**9 + int(value.nanosec)
     if field.format or field.is_text:
         return value
     return as_dict(types, field.type, value)

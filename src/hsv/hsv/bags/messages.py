@@ -24,7 +24,7 @@ from rosbags.typesys.store import Typestore
 from hsv.bags.definitions import definition
 from hsv.bags.description import CARRIED, CLOCK, TOPICS, TUBE_STATUS, WIRE_ALIGNMENT
 from hsv.bags.fields import blank, fields_of
-from hsv.bags.typestore import message_types
+from hsv.bags.typestore import deserialized, message_types
 from hsv.base.errors import ParameterError, RunError, SignalError
 from hsv.flight.blocks import LOOP
 from hsv.model import signals as types
@@ -300,7 +300,7 @@ class StepMessages:
         found = message[ENCAPSULATION + self._received.size :]
         if found != self._list or not found:
             try:
-                decoded = self._store.deserialize_cdr(message, self.type)
+                decoded = deserialized(self._store, message, self.type)
             except SerdeError as error:
                 raise MessageError(f"{self.type}: {error}") from None
             self._faults, self._list = active_faults(decoded), found

@@ -10,9 +10,10 @@ from typing import Any
 from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
-from hsv.bags.columns import Columns, columns_at_once, columns_one_by_one
+from hsv.bags.columns import Columns, columns_of, read_at_once, read_one_by_one
 from hsv.bags.description import TOPIC_OF
 from hsv.bags.messages import MessageError
+from hsv.bags.typestore import deserialized
 from hsv.base.errors import RecordingError, SignalError
 
 
@@ -69,10 +70,10 @@ class Track:
         Raises:
             RecordingError: A message does not fit its definition.
         """
-        types, where = self.types.fielddefs, f"{self.source}: topic {self.topic}"
-        if self.data and (columns := columns_at_once(types, self.type, self.data, where)) is not None:
-            return columns
-        return columns_one_by_one(types, self.type, [message for _, message in self.decode()], where)
+        types = self.types.fielddefs
+        read = read_at_once(types, self.type, self.data) if self.data else None
+        read = read or read_one_by_one([message for _, message in self.decode()])
+        return columns_of(types, self.type, read, f"{self.source}: topic {self.topic}")
 
     def decode(self) -> Iterator[tuple[int, Any]]:
         """Yield time (ns) and deserialized message of each message.
@@ -82,6 +83,6 @@ class Track:
         """
         for time, message in zip(self.times, self.data, strict=True):
             try:
-                yield time, self.types.deserialize_cdr(message, self.type)
+                yield time, deserialized(self.types, message, self.type)
             except SerdeError as error:
                 raise RecordingError(f"{self.source}: topic {self.topic}: message at {time} ns: {error}") from None

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from typing import Any
 
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from hsv.bags.fields import TIMES, fields_of
 from hsv.base.errors import RecordingError
+
+MAX_SURPLUS = 64
+"""Maximum number of bytes behind a message, besides three of padding."""
 
 
 def message_types(
@@ -37,6 +42,24 @@ def message_types(
             _check(alone, name, (), source)
             store.register(alone.fielddefs)
     return store
+
+
+def deserialized(types: Typestore, message: bytes, message_type: str) -> Any:
+    """Return a deserialized message.
+
+    rosbags admits three bytes after a message. ``serialize_message`` of rmw_fastrtps leaves more, in steps of four,
+    behind a message with empty sequences of numbers of eight bytes, such as the parameters of a fault without any.
+
+    Raises:
+        SerdeError: The message does not fit its definition.
+    """
+    try:
+        return types.deserialize_cdr(message, message_type)
+    except SerdeError:
+        for surplus in range(4, min(MAX_SURPLUS, len(message)) + 1, 4):
+            with suppress(SerdeError):
+                return types.deserialize_cdr(message[:-surplus], message_type)
+        raise
 
 
 def _register(store: Typestore, name: str, text: str, where: str) -> None:
