@@ -18,7 +18,7 @@ from hsv.bags.reader import Bag
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario
-from hsv.pages.live.columns import columns
+from hsv.pages.panels import LIVE_CURVES
 
 pytestmark = pytest.mark.graph
 
@@ -68,7 +68,7 @@ def test_five_viewers_one_of_whom_never_reads_change_no_bit(processes: Processes
         # At ten times real time nobody promises that a busy machine leaves them time for every message.
         assert_as_recorded(reader, bag)
     # Whoever comes late sees the flight from its start to its end, and how it ended.
-    times = late.times(len(columns()))
+    times = late.times(len(LIVE_CURVES))
     assert times[0] < 10.0 and times[-1] == pytest.approx(20.0) and np.all(np.diff(times) > 0)
     assert late.status["ending"] == {"how": "finished", "time": 20.0}
     assert late.status["bag"] == str(tmp_path / "bag")
@@ -175,7 +175,7 @@ def test_beside_a_running_graph_it_shows_what_is_left_of_the_flight(processes: P
     page = PageClient(addresses(log.read_text())[0])
     while len(page.data) < 5_000:
         assert page.read()
-    assert page.times(len(columns()))[0] > 0.5
+    assert page.times(len(LIVE_CURVES))[0] > 0.5
     assert page.status["settings"]["real_time_factor"] == 2.0
     flight.send_signal(signal.SIGINT)
     while page.status["ending"] is None:

@@ -6,6 +6,7 @@ import pytest
 from hsv.bags.description import TUBE_STATUS
 from hsv.pages.flights import flight_curves
 from hsv.pages.live import hub as hub_module
+from hsv.pages.panels import LIVE_CURVES
 
 STEPS = 201
 A_STEP = 9
@@ -26,8 +27,8 @@ def test_rows_are_the_curves_of_the_report(hub, messages, bag):
     drawn = flight_curves(bag)
     np.testing.assert_allclose(rows[:, 0], drawn.time, rtol=1e-6)
     assert len(rows) == STEPS
-    for index, column in enumerate(hub.columns, 1):
-        [y] = [curve.y for curve in drawn.curves[column.panel.name] if curve.label == column.label]
+    for index, (panel, column) in enumerate(LIVE_CURVES, 1):
+        [y] = [curve.y for curve in drawn.curves[panel.name] if curve.label == column.label]
         np.testing.assert_allclose(rows[:, index], np.broadcast_to(y if len(y) > 2 else y[0], STEPS), rtol=3e-7)
 
 
@@ -38,7 +39,7 @@ def test_only_whole_steps_are_sampled_whenever_it_is_looked(hub, messages, every
     rows = hub.history(0, 0).rows
     assert 1 < len(rows) <= STEPS
     assert np.all(np.diff(rows[:, 0]) > 0)
-    labels = [(column.panel.name, column.label) for column in hub.columns]
+    labels = [(panel.name, curve.label) for panel, curve in LIVE_CURVES]
     command = rows[:, 1 + labels.index(("elevator_deflection", "command"))]
     np.testing.assert_allclose(command, whole.command[np.rint(rows[:, 0] / 0.02).astype(int)], rtol=1e-6)
 
@@ -62,7 +63,7 @@ class Exact:
 def test_a_controller_without_a_tube_is_shown_without(hub, messages):
     offer(hub, [message for message in messages if message[0] != TUBE_STATUS], A_STEP - 1)
     rows = hub.history(0, 0).rows
-    tube = np.array([False, *(column.topic == TUBE_STATUS for column in hub.columns)])
+    tube = np.array([False, *(curve.topic == TUBE_STATUS for _, curve in LIVE_CURVES)])
     assert len(rows) == STEPS and np.isnan(rows[:, tube]).all() and np.isfinite(rows[:, ~tube]).all()
     assert hub.status()["tau"] is None
 

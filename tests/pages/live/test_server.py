@@ -10,6 +10,7 @@ from waiting import wait_until
 from websocket import WebSocketBadStatusException
 
 from hsv.pages.live.commands import Clear
+from hsv.pages.panels import LIVE_CURVES
 
 A_STEP = 9
 
@@ -34,11 +35,11 @@ def fly(hub, server, messages):
 
 def rows(client, hub, count):
     """Read until so many rows have come; return them."""
-    width = 4 * (1 + len(hub.columns))
+    width = 4 * (1 + len(LIVE_CURVES))
     while len(client.data) < count * width:
         assert client.read()
     assert len(client.data) == count * width
-    return client.times(len(hub.columns))
+    return client.times(len(LIVE_CURVES))
 
 
 def test_the_page_is_whole_and_may_ask_its_own_server_only(server):
@@ -104,7 +105,7 @@ def test_whoever_comes_late_gets_all_and_then_what_is_new(hub, server, messages)
     first = rows(late, hub, 100)
     fly(hub, server, messages[100 * A_STEP :])
     assert rows(late, hub, 201)[:100].tolist() == first.tolist()
-    assert rows(early, hub, 201).tolist() == late.times(len(hub.columns)).tolist()
+    assert rows(early, hub, 201).tolist() == late.times(len(LIVE_CURVES)).tolist()
     assert late.status["title"] == "a flight" and late.status["run"]["last_step"] == 200
 
 
@@ -114,7 +115,7 @@ def test_a_new_run_is_shown_alone(hub, server, messages):
     rows(client, hub, 201)
     hub.start_run("2e" * 16, 0.02, 200)
     fly(hub, server, messages[: 10 * A_STEP])
-    while client.status["run"]["id"] != "2e" * 16 or len(client.data) > 10 * 4 * (1 + len(hub.columns)):
+    while client.status["run"]["id"] != "2e" * 16 or len(client.data) > 10 * 4 * (1 + len(LIVE_CURVES)):
         assert client.read()
     rows(client, hub, 10)
 

@@ -21,7 +21,7 @@ from hsv.flight.limits import Verdict, verdicts
 from hsv.flight.metrics import flight_metrics
 from hsv.flight.scenario import Scenario, parse_scenario
 from hsv.pages.events import Event, flight_events
-from hsv.pages.panels import AIR_PANELS, INPUTS, MEASUREMENT_ERRORS, PANELS, Curve, Kind, Panel, error_panel
+from hsv.pages.panels import AIR_PANELS, INPUTS, MEASUREMENT_ERRORS, PANELS, Kind, Panel, error_panel
 
 
 @dataclass(frozen=True)
@@ -160,22 +160,19 @@ def flight_curves(bag: Bag) -> FlightCurves:
     columns = joined(bag, list(topics))
     flight = FlightCurves(columns[STATE]["header.stamp"] * 1e-9)
 
-    def values(curve: Curve) -> np.ndarray:
-        parts = [columns[curve.topic][name] for name in curve.fields]
-        return np.sum([part if curve.column is None else part[:, curve.column] for part in parts], axis=0)
-
-    def tube(name: str) -> np.ndarray:
-        """Return a vector of the tube status (n, components), which has no components without an invariant set."""
-        found = columns[TUBE_STATUS][name] if TUBE_STATUS in columns else ()
-        return np.asarray(found, float).reshape(len(flight.time), -1)
-
-    centre, half_width = tube("tube_centre"), tube("tube_half_width")
-    errors = [error_panel(component) for component in range(tube("error").shape[1])]
-    for panel in (*PANELS, *errors):
-        if all(curve.topic in columns for curve in panel.curves):
-            drawn = [DrawnCurve(curve.kind, curve.label, values(curve)) for curve in panel.curves]
-            if np.isfinite(drawn[0].y).any():
-                flight.add(panel, *drawn)
+    # A design without an invariant set has no error.
+    error = columns[TUBE_STATUS]["error"] if TUBE_STATUS in columns else ()
+    components = np.asarray(error, float).reshape(len(flight.time), -1).shape[1]
+    for panel in (*PANELS, *map(error_panel, range(components))):
+        if not all(curve.topic in columns for curve in panel.curves):
+            continue
+        drawn = []
+        for curve in panel.curves:
+            y = np.broadcast_to(curve.value(columns[curve.topic].__getitem__), flight.time.shape)
+            steady = curve.kind is Kind.bound and np.all(y == y[0])
+            drawn.append(DrawnCurve(curve.kind, curve.label, y[[0, -1]] if steady else y))
+        if np.isfinite(drawn[0].y).any():
+            flight.add(panel, *(curve for curve in drawn if np.isfinite(curve.y).any()))
     for name, y in effectors(columns).items():
         flight.curves[name].append(DrawnCurve(Kind.effector, "effector", y))
     for name, y in measurement_errors(columns).items():
@@ -184,8 +181,4 @@ def flight_curves(bag: Bag) -> FlightCurves:
         flight.add(AIR_PANELS[name], DrawnCurve(Kind.actual, "air", y))
     if "level" in flight.curves:
         flight.curves["level"].append(DrawnCurve(Kind.bound, "edge of the set", np.ones(2)))
-    for panel, c, z in zip(errors, centre.T, half_width.T, strict=False):
-        for label, y in (("c − z", c - z), ("c + z", c + z)):
-            ends = y[[0, -1]] if np.all(y == y[0]) else y
-            flight.curves.get(panel.name, []).append(DrawnCurve(Kind.bound, label, ends))
     return flight

@@ -11,7 +11,6 @@ from hsv.bags.description import (
     ACTUATOR,
     COMMAND,
     DIAGNOSTICS,
-    FILTERED_STATE,
     FORCES,
     MARKERS,
     NOMINAL,
@@ -23,7 +22,8 @@ from hsv.bags.description import (
 from hsv.bags.overview import FAULTS, OVERVIEW_TOPIC
 from hsv.model.airframe.pose import LEVEL, Sample, transforms
 from hsv.model.airframe.scene import SCENE_TOPIC
-from hsv.model.signals import INPUT_NAMES, N_RIGID, STATE_NAMES, STATE_UNITS
+from hsv.model.signals import N_RIGID
+from hsv.pages.panels import ERRORS, GROUPS, PANELS, Panel, error_panel
 
 NameOf = Callable[[str], str]
 """Returns the name that the topic of a role has in the graph that is shown."""
@@ -47,55 +47,55 @@ class Chart(NamedTuple):
     lines: tuple[Line, ...]
 
 
-def _title(name: str, more: str = "") -> str:
-    return f"{name.replace('_', ' ').capitalize()}{more} [{STATE_UNITS[STATE_NAMES.index(name)]}]"
+def _titled(title: str, unit: str) -> str:
+    return f"{title} [{'-' if unit == '1' else unit}]"
 
 
-def _state(name: str) -> Chart:
-    return Chart(_title(name), (Line("vehicle", STATE, name), Line("reference", NOMINAL, f"reference.{name}")))
+def _chart(panel: Panel) -> Chart:
+    """Return the curves of a panel that are single fields, because viewers do not add fields."""
+    lines = []
+    for curve in panel.curves:
+        fields = curve.fields if curve.column is None else [f"{field}[{curve.column}]" for field in curve.fields]
+        if len(fields) == 1:
+            lines.append(Line(curve.label, curve.topic, fields[0]))
+    return Chart(_titled(panel.title, panel.unit), tuple(lines))
 
 
-def _deviation(name: str) -> Chart:
-    return Chart(_title(name, ", deviation of the nominal"), (Line("nominal", NOMINAL, f"deviation.{name}"),))
+def _tube_chart(component: int) -> Chart:
+    """Return the chart of an error with the centre and the half-width of the tube."""
+    title, lines = _chart(error_panel(component))
+    tube = {"c": "tube_centre", "z": "tube_half_width"}
+    return Chart(title, (*lines, *(Line(label, TUBE_STATUS, f"{field}[{component}]") for label, field in tube.items())))
 
 
-def _input(name: str, title: str) -> Chart:
-    reference = Line("reference", NOMINAL, f"reference_input.{name}")
-    return Chart(title, (Line("command", COMMAND, name), Line("actuator", ACTUATOR, name), reference))
-
-
-def _error(component: int) -> Chart:
-    fields = {"e": "error", "c": "tube_centre", "z": "tube_half_width"}
-    lines = tuple(Line(label, TUBE_STATUS, f"{field}[{component}]") for label, field in fields.items())
-    return Chart("Error of " + _title(STATE_NAMES[component]).lower(), lines)
+def _charts(group: str) -> list[Chart]:
+    found = []
+    for panel in PANELS:
+        if panel.group == group:
+            found.append(_chart(panel))
+            if group == "trajectory":
+                title = _titled(f"{panel.title}, deviation of the nominal", panel.unit)
+                found.append(Chart(title, (Line("nominal", NOMINAL, f"deviation.{panel.name}"),)))
+    return found + ([_tube_chart(component) for component in range(len(ERRORS))] if group == "tube" else [])
 
 
 def _forces(title: str, *fields: str) -> Chart:
     return Chart(title, tuple(Line(field.replace("_", " "), FORCES, field) for field in fields))
 
 
-_PITCH_RATE = Chart(
-    _title("pitch_rate"),
-    (
-        Line("vehicle", STATE, "pitch_rate"),
-        Line("after the notch filter", FILTERED_STATE, "filtered_pitch_rate"),
-    ),
-)
-_LEVEL = Chart("Level of the error in the invariant set [-]", (Line("level", TUBE_STATUS, "level"),))
-_FUEL, _ELEVATOR = INPUT_NAMES
-
-TABS: dict[str, list[list[Chart]]] = {
-    "Trajectory": [[_state(name), _deviation(name)] for name in ("altitude", "velocity")],
-    "Attitude": [[_state("angle_of_attack")], [_state("pitch_angle")], [_PITCH_RATE]],
-    "Elastic modes": [[_state(f"elastic_{kind}_{mode}") for mode in (1, 2)] for kind in ("coordinate", "rate")],
-    "Inputs": [[_input(_FUEL, "Fuel equivalence ratio [-]")], [_input(_ELEVATOR, "Elevator deflection [rad]")]],
-    "Tube": [[_LEVEL, _error(0)], [_error(1), _error(2)], [_error(3), _error(4)]],
+TABS: dict[str, list[Chart]] = {GROUPS[group]: _charts(group) for group in dict.fromkeys(p.group for p in PANELS)} | {
     "Forces": [
-        [_forces("Lift, drag, thrust [N]", "lift", "drag", "thrust")],
-        [_forces("Pitching moment [N m]", "pitching_moment"), _forces("Dynamic pressure [Pa]", "dynamic_pressure")],
+        _forces("Lift, drag, thrust [N]", "lift", "drag", "thrust"),
+        _forces("Pitching moment [N m]", "pitching_moment"),
+        _forces("Dynamic pressure [Pa]", "dynamic_pressure"),
     ],
 }
-"""Tabs that both viewers have: rows of plots."""
+"""Tabs that both viewers have: up to three plots in a column, or more in rows of two."""
+
+
+def _rows(charts: Sequence[Chart]) -> list[Sequence[Chart]]:
+    across = 1 if len(charts) <= 3 else 2
+    return [charts[start : start + across] for start in range(0, len(charts), across)]
 
 
 def foxglove_layout(name_of: NameOf) -> str:
@@ -119,14 +119,15 @@ def foxglove_layout(name_of: NameOf) -> str:
         lines = zip(chart.lines, COLOURS, strict=False)
         return plot(chart.title, [_path(line.label, name_of(line.role), line.field, colour) for line, colour in lines])
 
-    def rigid(name: str) -> str:
+    def rigid(panel: Panel) -> str:
         """Return the plot of a state of the rigid body in its tube."""
+        name = panel.name
         paths = [
             _path("vehicle", name_of(STATE), name, COLOURS[0]),
             _path("nominal", OVERVIEW_TOPIC, f"nominal.{name}", COLOURS[1]),
             *(_path("tube", OVERVIEW_TOPIC, f"{edge}.{name}", TUBE_COLOUR, 0.8) for edge in ("lower", "upper")),
         ]
-        return plot(_title(name, " and tube"), paths)
+        return plot(_titled(f"{panel.title} and tube", panel.unit), paths)
 
     faults = _path("active faults", OVERVIEW_TOPIC, FAULTS) | {"timestampMethod": "receiveTime"}
     changing = [
@@ -137,7 +138,7 @@ def foxglove_layout(name_of: NameOf) -> str:
     ]
     states = placed("StateTransitions", {"isSynced": True, "showPoints": False, "paths": changing})
     flight = _split(
-        "row", [placed("3D", _airframe()), _split("column", list(map(rigid, STATE_NAMES[:N_RIGID])))], first=62.0
+        "row", [placed("3D", _airframe()), _split("column", list(map(rigid, PANELS[:N_RIGID])))], first=62.0
     )
     log = placed("RosOut", {"topicToRender": ROSOUT, "searchTerms": [], "minLogLevel": 1})
     diagnostics = {"topicToRender": name_of(DIAGNOSTICS), "minLevel": 0, "pinnedIds": [], "hardwareIdFilter": ""}
@@ -148,8 +149,8 @@ def foxglove_layout(name_of: NameOf) -> str:
     tabs = {
         "Flight": _split("column", [flight, states], first=80.0),
         **{
-            title: _split("column", [_split("row", list(map(chart, row))) for row in rows])
-            for title, rows in TABS.items()
+            title: _split("column", [_split("row", list(map(chart, row))) for row in _rows(charts)])
+            for title, charts in TABS.items()
         },
         "Messages": _split("column", [log, _split("row", below)]),
     }
@@ -218,7 +219,8 @@ def plotjuggler_layout(name_of: NameOf) -> str:
     """Return the layout for PlotJuggler as XML."""
     root = ElementTree.Element("root")
     window = ElementTree.SubElement(root, "tabbed_widget", {"parent": "main_window", "name": "Main Window"})
-    for title, rows in TABS.items():
+    for title, charts in TABS.items():
+        rows = _rows(charts)
         tab = ElementTree.SubElement(window, "Tab", tab_name=title, containers="1")
         column = _splitter(ElementTree.SubElement(tab, "Container"), "-", len(rows))
         for row in rows:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
+
+import numpy as np
 
 from hsv.bags.description import ACTUATOR, COMMAND, FILTERED_STATE, NOMINAL, STATE, TUBE_STATUS
 from hsv.model.signals import STATE_NAMES, STATE_UNITS
@@ -23,13 +27,28 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve: the sum of fields of one topic, or of their columns."""
+    """A curve: the sum of fields of one topic, or of their columns; a field with a leading ``-`` is subtracted."""
 
     kind: Kind
     label: str
     topic: str
     fields: tuple[str, ...]
     column: int | None = None
+
+    def value(self, read: Callable[[str], Any]) -> Any:
+        """Return the value; NaN if a field has too few columns.
+
+        Args:
+            read: Function that returns a field by its path: a number or sequence (m), or those of n messages, (n) or
+                (n, m).
+        """
+        total: Any = 0.0
+        for field in self.fields:
+            part = np.asarray(read(field.removeprefix("-")))
+            if self.column is not None:
+                part = part[..., self.column] if self.column < part.shape[-1] else np.nan
+            total = total - part if field.startswith("-") else total + part
+        return total
 
 
 @dataclass(frozen=True)
@@ -133,5 +152,13 @@ def error_panel(component: int) -> Panel:
     else:
         number = component - len(ERRORS)
         title, unit = f"Error of notch state {number + 1}", ("rad", "rad s")[number % 2]
-    curve = Curve(Kind.actual, "e", TUBE_STATUS, ("error",), component)
-    return Panel(f"error_{component + 1}", title, unit, "tube", (curve,), shading="tube")
+    curves = (
+        Curve(Kind.actual, "e", TUBE_STATUS, ("error",), component),
+        Curve(Kind.bound, "c − z", TUBE_STATUS, ("tube_centre", "-tube_half_width"), component),
+        Curve(Kind.bound, "c + z", TUBE_STATUS, ("tube_centre", "tube_half_width"), component),
+    )
+    return Panel(f"error_{component + 1}", title, unit, "tube", curves, shading="tube")
+
+
+LIVE_CURVES = [(panel, curve) for panel in (*PANELS, *map(error_panel, range(len(ERRORS)))) for curve in panel.curves]
+"""The curves of the live page with their panels, in the order of its columns."""

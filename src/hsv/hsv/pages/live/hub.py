@@ -6,6 +6,8 @@ import threading
 from collections import defaultdict, deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,7 @@ import numpy as np
 from hsv.bags.description import ACTUATOR, NOMINAL, STATE, TUBE_STATUS
 from hsv.bags.messages import fault_in
 from hsv.model.plant import FlightStatus
-from hsv.pages.live.columns import columns, row
+from hsv.pages.panels import LIVE_CURVES
 
 MAX_ROWS = 20_000
 """Maximum number of rows of the history; when it is reached, every second row is dropped."""
@@ -34,7 +36,7 @@ class History:
     generation: int
     first: int
     rows: np.ndarray
-    """Time (s) and columns (n, 1 + columns), single precision."""
+    """Time (s) and the values of :data:`hsv.pages.panels.LIVE_CURVES` (n, 1 + curves), single precision."""
 
 
 class Hub:
@@ -47,8 +49,7 @@ class Hub:
             decode: Function that deserializes a message of a topic.
             about: Further texts of the page: ``title``, and path of the ``bag``; empty if unknown.
         """
-        self.columns = columns()
-        self._topics = tuple(dict.fromkeys(column.topic for column in self.columns))
+        self._topics = tuple(dict.fromkeys(curve.topic for _, curve in LIVE_CURVES))
         self._steady = frozenset(self._topics) - {TUBE_STATUS}
         """Topics of every step; a custom controller does not publish the tube status."""
         self._decode = decode
@@ -105,7 +106,11 @@ class Hub:
         waiting, self._waiting = self._waiting[:limit], self._waiting[limit:]
         for serialized in waiting:
             messages = {topic: self._decode(topic, data) for topic, data in serialized.items()}
-            values = row(self.columns, messages)
+            stamp = messages[STATE].header.stamp
+            values = [stamp.sec + 1e-9 * stamp.nanosec]
+            for _, curve in LIVE_CURVES:
+                message = messages.get(curve.topic)
+                values.append(np.nan if message is None else curve.value(partial(_field, message)))
             with self._lock:
                 if self._count == len(self._rows):
                     self._make_room()
@@ -137,7 +142,7 @@ class Hub:
     def _reset(self) -> None:
         self._generation += 1
         self._latest: dict[str, deque[tuple[int, bytes]]] = defaultdict(lambda: deque(maxlen=_KEPT))
-        self._rows = np.empty((_FIRST_ROWS, 1 + len(self.columns)), np.float32)
+        self._rows = np.empty((_FIRST_ROWS, 1 + len(LIVE_CURVES)), np.float32)
         self._count = 0
         self._sampled = -1
         self._waiting = []
@@ -206,3 +211,7 @@ class Hub:
             for topic, messages in kept.items()
         }
         return (time, step) if all(step.values()) else None
+
+
+def _field(message: Any, path: str) -> Any:
+    return attrgetter(path)(message)

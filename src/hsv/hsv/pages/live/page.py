@@ -10,16 +10,16 @@ from hsv.graph.exclusive import origins
 from hsv.model.faults.table import CHANNELS, FAULT_KINDS
 from hsv.pages.engine import Plot, render
 from hsv.pages.live.hub import Hub
-from hsv.pages.panels import GROUPS
+from hsv.pages.panels import GROUPS, LIVE_CURVES
 from hsv.pages.side_view import geometry
 
 
 def live_page(hub: Hub, port: int) -> str:
     """Return the HTML page for the flight of ``hub``, served on ``port``."""
     plots = []
-    for panel, columns in groupby(enumerate(hub.columns, 1), lambda numbered: numbered[1].panel):
-        # The script keeps the rows of the flight as arrays: the time is array 0, the columns follow.
-        curves = [{"kind": c.kind, "label": c.label, "run": 0, "x": 0, "y": number} for number, c in columns]
+    for panel, numbered in groupby(enumerate(LIVE_CURVES, 1), lambda numbered: numbered[1][0]):
+        # The script keeps the rows of the flight as arrays: the time is array 0, the curves follow.
+        curves = [{"kind": c.kind, "label": c.label, "run": 0, "x": 0, "y": number} for number, (_, c) in numbered]
         plots.append(Plot(panel.name, panel.title, panel.unit, panel.group, curves))
     groups = {key: heading for key, heading in GROUPS.items() if any(plot.group == key for plot in plots)}
     return render(
