@@ -25,7 +25,7 @@ _EMPTY_SEQUENCE_TAIL = 4
 """Additional padding per empty sequence, bytes: serialize_message of rmw_fastrtps reserves space as if empty sequences
 were aligned like full ones. Messages received over DDS do not have it."""
 
-Read = Callable[[str], Sequence[Any]]
+Read = Callable[[str], Sequence[Any] | NDArray[Any]]
 """Function that returns the values of all messages at a field path."""
 
 
@@ -104,7 +104,7 @@ def columns_of(types: Typesdict, message_type: str, read: Read, source: str = ""
     return columns
 
 
-def _numbers(field: Field, values: Sequence[Any]) -> NDArray[Any]:
+def _numbers(field: Field, values: Sequence[Any] | NDArray[Any]) -> NDArray[Any]:
     if field.count == "one":
         return np.array(values, field.format)
     if len({len(value) for value in values}) > 1:
@@ -112,5 +112,5 @@ def _numbers(field: Field, values: Sequence[Any]) -> NDArray[Any]:
     return np.array(values, field.format).reshape(len(values), len(values[0]) if len(values) else field.length)
 
 
-def _objects(values: Sequence[Any]) -> NDArray[Any]:
+def _objects(values: Sequence[Any] | NDArray[Any]) -> NDArray[Any]:
     return np.fromiter(values, dtype=object, count=len(values))

@@ -329,13 +329,12 @@ class Bag:
                 del channels[channel.id]  # its definition is lost or damaged
         read = orphans = 0
         for message in messages:
-            channel = channels.get(message.channel_id)
-            if channel is None:  # it is lost
+            if message.channel_id not in channels:  # it is lost
                 orphans += 1
             elif (data := unpacker.message(message.data)) is not None:
                 read += 1
                 message.data = data
-                self._messages[channel.topic].append(message)
+                self._messages[channels[message.channel_id].topic].append(message)
         return read, orphans, attachments, rosbag2
 
     def _declare(self, channel: Channel, schema: Schema | None) -> None:

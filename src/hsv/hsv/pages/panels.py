@@ -44,7 +44,7 @@ class Curve:
         """
         total: Any = 0.0
         for field in self.fields:
-            part = np.asarray(read(field.removeprefix("-")))
+            part: Any = np.asarray(read(field.removeprefix("-")))
             if self.column is not None:
                 part = part[..., self.column] if self.column < part.shape[-1] else np.nan
             total = total - part if field.startswith("-") else total + part
