@@ -9,7 +9,7 @@ setup(
     name="hsv_paper",
     version=manifest.findtext("version"),
     packages=find_packages(include=["hsv_paper", "hsv_paper.*"]),
-    package_data={"hsv_paper": ["**/*.toml"]},
+    package_data={"hsv_paper": ["**/*.yaml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/hsv_paper"]),
         ("share/hsv_paper", ["package.xml"]),

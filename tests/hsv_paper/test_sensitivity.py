@@ -1,4 +1,3 @@
-import re
 from functools import partial
 from pathlib import Path
 
@@ -12,7 +11,8 @@ from hsv_paper.designs import design
 from hsv_paper.linear_loop import COUPLING_SCALES, TARGET, stability_limit
 from hsv_paper.sensitivity import STUDIES, hardware
 from hsv_paper.sensitivity.factor import FINE, growth, is_certified
-from hsv_paper.sensitivity.notch import Limits
+from hsv_paper.sensitivity.flown import coupling_limits
+from hsv_paper.sensitivity.notch import SETS, stable_range
 from hsv_paper.sensitivity.sweep import (
     ALL,
     RMPC,
@@ -21,13 +21,12 @@ from hsv_paper.sensitivity.sweep import (
     WIDER_NOTCH,
     WITH_NOTCH,
     WITHOUT_NOTCH,
-    CouplingLimits,
     columns_of,
     feedback,
     lost_where,
 )
 from hsv_paper.sensitivity.weights import BOUNDS, ELEVATOR, WEIGHTS, varied
-from hsv_paper.study import Scope, in_words
+from hsv_paper.study import Scope, in_words, markdown, rounded
 
 FINEST = Scope(1.0, Path("unused"))
 
@@ -59,12 +58,19 @@ def test_a_grid_keeps_its_ends_however_coarse():
 def test_where_flights_are_lost_is_put_between_points():
     values = np.array([1.0, 2.0, 3.0])
     columns = {"without_limits": [1.0, 0.5, 0.5], "finished": [1.0, 1.0, 0.9], "nominal_finished": [1.0, 1.0, 1.0]}
-    text = lost_where(values, columns, "x = {}")
-    assert "saturation begins between x = 1.00 and 2.00, losses begin between x = 2.00 and 3.00, and" in text
-    assert text.endswith("the nominal vehicle is not lost")
-    assert "saturation begins already at x = 3.0" in lost_where(values, columns, "x = {}", digits=1, rising=False)
+    assert lost_where(values, columns) == {
+        "saturation begins": "1.00 to 2.00",
+        "losses begin": "2.00 to 3.00",
+        "nominal vehicle lost": "–",
+    }
+    assert lost_where(values, columns, 1, rising=False)["saturation begins"] == "at 3.0"
     again = columns | {"finished": [0.9, 1.0, 0.8]}
-    assert "losses begin already at x = 1.00 and again between x = 2.00 and 3.00" in lost_where(values, again, "x = {}")
+    assert lost_where(values, again)["losses begin"] == "at 1.00, 2.00 to 3.00"
+
+
+def test_cells_of_a_table_are_rounded_and_none_is_a_dash():
+    rows = [{"case": "a", "x": rounded(0.45678, 3)}, {"case": "b", "x": rounded(np.nan, 3)}]
+    assert markdown(rows) == "| case | x |\n| --- | ---: |\n| a | 0.457 |\n| b | – |"
 
 
 def test_a_sweep_leaves_out_what_a_lost_flight_shows():
@@ -99,38 +105,30 @@ def test_labels_say_what_flies():
 @pytest.mark.parametrize(("controller", "near"), [(WITHOUT_NOTCH, 0.25), (RMPC, 0.68), (WITH_NOTCH, 1.10)])
 def test_coupling_limits_bracket_the_change_of_sign(controller, near):
     over = Scope(8.0, Path("unused")).over
-    limits = CouplingLimits.of(feedback(controller), over)
-    assert limits.nominal == pytest.approx(near, abs=0.01)
-    assert limits.worst < limits.nominal
-    for limit, vehicles in ((limits.nominal, over[:1]), (limits.worst, over)):
-
-        def worst(kappa, vehicles=vehicles):
-            return feedback(controller).growth(load_vehicle().coupled(kappa), vehicles)
-
-        assert worst(limit - 1e-3) < 0.0 < worst(limit + 1e-3)
-    assert f"κ = {limits.nominal:.2f} (nominal vehicle) and κ = {limits.worst:.2f} (worst of" in limits.in_words()
+    loop = feedback(controller)
+    nominal, worst = loop.critical_coupling(), loop.critical_coupling(over)
+    assert nominal == pytest.approx(near, abs=0.01)
+    assert worst < nominal
+    for limit, vehicles in ((nominal, over[:1]), (worst, over)):
+        below, above = (loop.growth(load_vehicle().coupled(limit + step), vehicles) for step in (-1e-3, 1e-3))
+        assert below < 0.0 < above
+    assert list(coupling_limits(loop, over).values()) == [f"{nominal:.2f}", f"{worst:.2f}"]
 
 
 def test_robust_mpc_is_lost_without_a_notch_and_would_not_be_with_one():
     derived = load_vehicle().coupled("derived")
     assert feedback(RMPC).growth(derived) > 0.1
     assert feedback(RMPC_WITH_NOTCH).growth(derived) < 0.0
-    limits = CouplingLimits.of(feedback(RMPC_WITH_NOTCH), Scope(16.0, Path("unused")).over)
-    assert limits.nominal is limits.worst is None
-    assert f"is stable up to at least κ = {COUPLING_SCALES[-1]} (nominal vehicle)" in limits.in_words()
+    limits = coupling_limits(feedback(RMPC_WITH_NOTCH), Scope(16.0, Path("unused")).over)
+    assert set(limits.values()) == {f"≥ {COUPLING_SCALES[-1]}"}
 
 
-def test_limits_of_the_notch_in_words():
-    centres = np.array([8.0, 26.0])
-    said = Limits(None, None, None).in_words(centres)
-    assert said.startswith(
-        "stable with every centre from 8 to 26 rad/s; with the centre at 15 rad/s, it is stable at every"
-    )
-    said = Limits(12.041, None, 0.063).in_words(centres)
-    assert said.startswith("stable with the centre from 12.04 to 26 rad/s; ")
-    assert said.endswith("with the centre at 15 rad/s, it is stable up to a zero damping of 0.063")
-    assert "at 15 rad/s, it is unstable at a zero damping of 0.02" in Limits(12.0, 14.9, np.nan).in_words(centres)
-    assert "stable with no centre at a zero damping of 0.02" in Limits(np.nan, np.nan, np.nan).in_words(centres)
+def test_limits_of_the_notch_of_the_nominal_vehicle():
+    """As docs/study/notch.md prints them."""
+    centres, depths = np.array([8.0, 15.0, 26.0]), np.geomspace(0.005, 0.5, 17)
+    paper_like, derived = (list(stable_range(coupled, [{}], centres, depths).values()) for coupled in SETS)
+    assert paper_like == ["≤ 8", "≥ 26", "≥ 0.5"]
+    assert derived == ["11.91", "15.82", "0.062"]
 
 
 def test_each_group_of_weights_varies_its_own():
@@ -155,31 +153,23 @@ def test_a_coarse_study_has_a_page_with_its_findings(tmp_path):
     study = STUDIES["coupling"]
     outcome = study.run(Scope(25.0, tmp_path))
     assert outcome.figure.axes
-    assert outcome.numbers["kappa"] == [0.0, 1.25]
     text = study.page(outcome)
     assert "coupling.png" in text
-    assert all(f"{finding[1:]}." in text for finding in outcome.findings)
-    assert "the worst of 1 of the 1024 corners" in outcome.shows
-    for controller, found in zip(ALL, outcome.findings, strict=False):
-        limit = outcome.numbers["unstable_from"][controller.label]["nominal"]
-        assert found.startswith(controller.label)
-        said = re.search(r"stable up to (?:at least )?κ = (\S+) \(nominal", found)
-        assert float(said[1]) == pytest.approx(COUPLING_SCALES[-1] if limit is None else limit, abs=0.005)
+    assert "the worst of 1 of the 1024 corners" in text
+    [rows] = outcome.tables
+    assert [row["controller"] for row in rows] == [controller.label for controller in ALL]
+    assert rows[2]["stable up to κ, nominal"] == "0.25"
+    assert markdown(rows) in text
 
 
 def test_hardware_limits_of_the_baseline_and_of_the_loop_without_notch():
     """Where stability changes the loop is on the edge; without the notch elevators of a middle range destabilise it."""
     with_notch, without = hardware.CASES[:2]
     for case in (with_notch, without):
-        limits = hardware.Limits.of(case, [{}])
-        for bandwidth in limits.bandwidths[0]:
-            assert abs(case.growth(hardware.elevator(bandwidth))) < 1e-3
-        borne = limits.delays["one of 50 rad/s"][0]
+        borne = case.tolerated_delay(hardware.ELEVATORS["50 rad/s"])
         assert case.growth(hardware.elevator(50.0, borne - 1e-3)) < 0.0
         assert case.growth(hardware.elevator(50.0, borne + 1e-3)) > 0.0
-    assert len(limits.bandwidths[0]) == 3
-    assert limits.bandwidths[0][1] < 150.0 < limits.bandwidths[0][2]
-    assert "stable from 7.25 to 83.5 rad/s and from 628 rad/s on (nominal vehicle)" in limits.in_words("no corner")
+    assert hardware.stability(without, [{}])["stable with, rad/s, nominal"] == "7.25 to 83.5, from 628 on"
 
 
 @pytest.mark.long

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hsv.base.errors import QuantityError
-from hsv.base.units import UnitSystem
 from hsv.cli.entry import Command
 from hsv.cli.main import run
-from hsv.cli.options import JsonOption, UnitsOption
-from hsv.cli.output import check_folder, check_target, console, errors, new_table, print_json, stages
+from hsv.cli.options import JsonOption
+from hsv.cli.output import check_folder, check_target, console, errors, print_json, stages
 
 if TYPE_CHECKING:
     from hsv_paper.claims.page import Ranks
@@ -27,11 +26,6 @@ CoarsenessOption = Annotated[float, typer.Option(help="1: as in the docs; 4: a q
 StudyOption = Annotated[Path, typer.Option("--out", help="Folder for a PDF, a PNG and a page on the study.")]
 
 _FLIGHTS = Path("bags/study")
-
-_COLOURS = {"holds": "green", "holds under conditions": "yellow", "does not hold": "red"}
-
-_NAME, _LOCATION = 43, 11
-"""Widths of the columns of names and locations; with the longest verdict a line has 80 characters."""
 
 
 def main() -> None:
@@ -82,14 +76,12 @@ def figures(
 def claims(
     out: Annotated[Path | None, typer.Option(help="Also write a page on all claims to this file, in Markdown.")] = None,
     flights: FlightsOption = _FLIGHTS,
-    verbose: Annotated[bool, typer.Option("--verbose", help="Print quotes, readings and reasons, too.")] = False,
-    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Measure and judge every checkable claim of the paper, for the nominal vehicle and all corners of the parameters.
 
     The first run takes several minutes: more than a dozen scenarios are flown with 1025 vehicles each. The flights are
-    stored and reused.
+    stored and reused. The page has quotes, readings and reasons.
 
     Example: hsv-paper claims --out docs/claims.md
     """
@@ -112,7 +104,7 @@ def claims(
         entries = [claim_json(group, entry) for group, entries in judged.items() for entry in entries]
         print_json({"claims": entries, "ranking": ranked})
     else:
-        print_claims(judged, ranks, verbose, units)
+        print_claims(judged, ranks)
 
 
 def claim_json(group: str, entry: Judged) -> dict[str, Any]:
@@ -128,32 +120,20 @@ def claim_json(group: str, entry: Judged) -> dict[str, Any]:
     }
 
 
-def print_claims(judged: dict[str, list[Judged]], ranks: Ranks, verbose: bool, units: UnitSystem) -> None:
-    """Print a line for each claim, or all that its page says, and the ranking."""
+def print_claims(judged: dict[str, list[Judged]], ranks: Ranks) -> None:
+    """Print a line of at most 80 characters for each claim, and the ranking."""
     from rich.markdown import Markdown
-    from rich.text import Text
 
-    from hsv_paper.claims.page import details, ranking_table, tally
+    from hsv_paper.claims.page import ranking_table, tally
 
     for group, entries in judged.items():
         console.print(group, style="bold")
-        if verbose:
-            for entry in entries:
-                console.print(Markdown(details(entry, units)))
-            continue
-        table = new_table("claim", "location", "verdict", head=False)
-        for column, width in zip(table.columns, (_NAME, _LOCATION, None), strict=True):
-            column.width, column.no_wrap = width, True
         for entry in entries:
-            where = entry.claim.location.rpartition(", ")[2]
-            where = where.replace("Figures", "Fig.").replace("Figure", "Fig.").replace(" and ", ", ")
-            verdict = str(entry.finding.verdict)
-            table.add_row(entry.claim.name, where, Text(verdict, _COLOURS[verdict]))
-        console.print(table)
-    if verbose:
-        console.print("In bold: the statement itself; the other readings repeat it under other conditions.")
+            where = entry.claim.location.rpartition(", ")[2].replace("Figures", "Fig.").replace("Figure", "Fig.")
+            name, verdict = entry.claim.name, entry.finding.verdict
+            console.print(f"{name:43} {where.replace(' and ', ', '):12} {verdict}", highlight=False)
     console.print(f"{tally(judged)}\n", style="bold")
-    console.print(Markdown(ranking_table(ranks, units)))
+    console.print(Markdown(ranking_table(ranks)))
 
 
 def sensitivity(
@@ -189,7 +169,7 @@ def make(study: Study, out: Path, flights: Path, coarseness: float, beside: list
     import matplotlib
 
     from hsv_paper.plots import RC, save
-    from hsv_paper.study import Scope
+    from hsv_paper.study import Scope, markdown
 
     if not 1.0 <= coarseness <= 100.0:
         raise QuantityError(f"coarseness = {coarseness}: expected 1 to 100")
@@ -204,10 +184,10 @@ def make(study: Study, out: Path, flights: Path, coarseness: float, beside: list
     target = out / f"{study.name}.md"
     target.write_text(study.page(outcome), encoding="utf-8")
     if json:
-        print_json({"study": study.name, "findings": list(outcome.findings), "numbers": outcome.numbers})
+        print_json({"study": study.name, "tables": outcome.tables})
         return
-    for finding in outcome.findings:
-        console.print(f"- {finding}", soft_wrap=True)
+    for table in outcome.tables:
+        console.print(markdown(table), soft_wrap=True, highlight=False)
     console.print(f"written {', '.join(map(str, (*written, target)))}", soft_wrap=True)
 
 

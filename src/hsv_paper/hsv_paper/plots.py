@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MultipleLocator, NullFormatter
 
+from hsv.base.units import to_paper
 from hsv.model.lpv.linearisation import bode
 
 RC: Any = {
@@ -35,6 +36,9 @@ RC: Any = {
 """Matplotlib settings of all figures."""
 
 BLUE, RED, GREEN, ORANGE, GREY, PURPLE = "#0b4f9e", "#c0392b", "#1f7a3d", "#c77700", "#777777", "#7d3c98"
+
+FEET, DEGREES = to_paper(1.0, "m")[0], to_paper(1.0, "rad")[0]
+"""Factors from SI to the units of the paper's axes."""
 
 WIDTH = 7.0
 """Inches: the text width of the journal's page."""

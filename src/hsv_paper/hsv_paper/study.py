@@ -1,9 +1,9 @@
-"""Definition, scope and page of a study: a sensitivity, or a physical limit."""
+"""The runner of all studies, sensitivities and physical limits alike: a study makes a figure, text and tables."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -16,20 +16,21 @@ from hsv.flight.corners import Corner, screening_corners
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.flights import Flights
 
+Rows = Sequence[Mapping[str, Any]]
+"""A table: its rows, each with a cell (text, rounded number or ``None``) by column."""
+
 _PAGE = """# {kind}: {title}
 Made by `hsv-paper {command} --out docs/study`, including all numbers.
 
 ![{title}]({name}.png)
 
-{shows}
-
-{findings}
+{parts}
 """
 
 
 @dataclass(frozen=True)
 class Scope:
-    """How fine a study is (coarseness 1: as in the docs), where its flights are kept, and whom to tell of progress.
+    """How fine a study is (coarseness 1: as in the docs), the folder of its flights, and where it reports progress.
 
     ``additional``: scenarios whose controllers are flown, too.
     """
@@ -69,12 +70,15 @@ class Scope:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Results of a study: its figure, a description of the figure, the findings, and the numbers behind them (SI)."""
+    """Results of a study: its figure, and the parts of its page, text and tables, in their order."""
 
     figure: Figure
-    shows: str
-    findings: Sequence[str]
-    numbers: dict[str, Any] = field(default_factory=dict)
+    parts: Sequence[str | Rows]
+
+    @property
+    def tables(self) -> list[Rows]:
+        """The tables among the parts."""
+        return [part for part in self.parts if not isinstance(part, str)]
 
 
 @dataclass(frozen=True)
@@ -89,21 +93,28 @@ class Study:
     run: Callable[[Scope], Outcome]
     minutes: float
     kind: str = "Sensitivity"
-    command: str = "sensitivity"
     flies_others: bool = False
 
     def page(self, outcome: Outcome) -> str:
         """Return the page in Markdown."""
-        command = self.command if self.command == self.name else f"{self.command} {self.name}"
-        findings = "\n".join(f"- {finding[0].upper()}{finding[1:]}." for finding in outcome.findings)
-        return _PAGE.format(
-            kind=self.kind,
-            title=self.title,
-            command=command,
-            name=self.name,
-            shows=outcome.shows,
-            findings=findings,
-        )
+        command = self.name if self.name == "limits" else f"sensitivity {self.name}"
+        parts = "\n\n".join(part if isinstance(part, str) else markdown(part) for part in outcome.parts)
+        return _PAGE.format(kind=self.kind, title=self.title, command=command, name=self.name, parts=parts)
+
+
+def markdown(rows: Rows) -> str:
+    """Return a table in Markdown, its first column aligned left; "–" stands for ``None``."""
+    lines = [list(rows[0]), ["---", *["---:"] * (len(rows[0]) - 1)]]
+    lines += [
+        ["–" if cell is None else cell if isinstance(cell, str) else f"{cell:g}" for cell in row.values()]
+        for row in rows
+    ]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def rounded(value: float | None, digits: int = 0) -> float | None:
+    """Return a number as a cell; ``None`` where there is none or it is not finite."""
+    return None if value is None or not np.isfinite(value) else round(float(value), digits)
 
 
 def in_words(over: Sequence[Corner]) -> str:

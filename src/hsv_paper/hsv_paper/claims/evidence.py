@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hsv.base.processes import Progress
-from hsv.base.units import UnitSystem, in_system
+from hsv.base.units import to_paper
 from hsv.control.design import find_design, read_parameters
 from hsv.control.notch_filter import NotchSection
 from hsv.flight.assembly import flight_parameters
@@ -132,11 +132,11 @@ def certified(entry: str) -> np.ndarray:
     return np.array(found)
 
 
-def shown(value: float, unit: str, units: UnitSystem = UnitSystem.paper, digits: int = 4) -> str:
-    """Return a number (SI) with its unit, by default the paper's; an infinite time is beyond the end of the flight."""
+def shown(value: float, unit: str, digits: int = 4) -> str:
+    """Return a number (SI) with the paper's unit; an infinite time is beyond the end of the flight."""
     if not math.isfinite(value):
         return "not defined" if math.isnan(value) else "not by the end" if unit == "s" else "unbounded"
-    number, name = in_system(value, unit, units)
+    number, name = to_paper(value, unit)
     return f"{number:.{digits}g}" + ("" if name == "1" else f" {name}")
 
 

@@ -1,6 +1,6 @@
 """Computations for claims that neither certificates nor flights provide, in the order of the paper.
 
-A claim names its function in ``claims.toml``. Each returns numbers (SI) and words by name; an array has an element for
+A claim names its function in ``claims.yaml``. Each returns numbers (SI) and words by name; an array has an element for
 each vehicle, the nominal one first.
 """
 

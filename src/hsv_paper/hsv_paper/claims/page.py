@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.base.units import UnitSystem
 from hsv.flight.corners import screening_corners
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.claims.evidence import ELEVATORS, FUEL, Evidence, nominal, shown, worst
@@ -145,7 +144,7 @@ def summary(judged: dict[str, list[Judged]]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def details(entry: Judged, units: UnitSystem = UnitSystem.paper) -> str:
+def details(entry: Judged) -> str:
     """Return a claim with its quote, its verdict with the reason, and its readings."""
     claim, finding = entry.claim, entry.finding
     named = any(reading.actuators for reading in finding.readings)
@@ -156,7 +155,7 @@ def details(entry: Judged, units: UnitSystem = UnitSystem.paper) -> str:
         what = r.what.replace("|", "\\|")
         what = f"**{what}**" if number < finding.leading else what
         behind = f"{_elevator(r.actuators)} | " if named else ""
-        rows.append(f"| {what} | {behind}{r.measured(units)} | {r.threshold(units)} | {'yes' if r.holds else 'no'} |")
+        rows.append(f"| {what} | {behind}{r.measured()} | {r.threshold()} | {'yes' if r.holds else 'no'} |")
     table = "\n".join(rows)
     return (
         f"### {claim.name[0].upper()}{claim.name[1:]}\n> {claim.quote}\n\n{claim.location}. "
@@ -164,14 +163,14 @@ def details(entry: Judged, units: UnitSystem = UnitSystem.paper) -> str:
     )
 
 
-def ranking_table(ranks: Ranks, units: UnitSystem = UnitSystem.paper) -> str:
+def ranking_table(ranks: Ranks) -> str:
     """Return the ranking with its description."""
     controllers = list(next(iter(ranks.values())))
     rows = [_RANKING, f"| | {' | '.join(controllers)} |", f"| --- |{' --- |' * len(controllers)}"]
     for metric, row in ranks.items():
         what, unit = METRICS[metric]
         cells = [
-            f"{shown(r.nominal, unit, units)} ({r.nominal_place}) / {shown(r.worst, unit, units)} ({r.worst_place})"
+            f"{shown(r.nominal, unit)} ({r.nominal_place}) / {shown(r.worst, unit)} ({r.worst_place})"
             for r in row.values()
         ]
         rows.append(f"| {what} | {' | '.join(cells)} |")

@@ -1,8 +1,7 @@
-"""The table of the paper's statements, ``claims.toml``, and how each is measured and judged."""
+"""The table of the paper's statements, ``claims.yaml``, and how each is measured and judged."""
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -12,8 +11,9 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel
 
+from hsv.base.files import parse_yaml
 from hsv.base.processes import Progress
-from hsv.base.units import UnitSystem, parse_quantity
+from hsv.base.units import parse_quantity
 from hsv.model.actuators import IDEAL
 from hsv_paper.claims import numbers
 from hsv_paper.claims.evidence import Evidence, certified, shown
@@ -26,7 +26,7 @@ _AS_PAPER = ("", "none", IDEAL)
 
 _VEHICLES = {"uncertain": "uncertain parameters", "nominal": "nominal vehicle", "worst": "worst corner"}
 
-_TABLE = tomllib.loads(files(__package__).joinpath("claims.toml").read_text(encoding="utf-8"))
+_TABLE = parse_yaml(files(__package__).joinpath("claims.yaml").read_text(encoding="utf-8"))
 
 THRESHOLDS = {
     name: parse_quantity(value, unit, name) if unit else float(value)
@@ -55,22 +55,15 @@ class Reading:
     actuators: str = ""
     """Name of the actuators between command and vehicle; empty for the paper's, if the claim names none."""
 
-    def measured(self, units: UnitSystem = UnitSystem.paper) -> str:
+    def measured(self) -> str:
         """Return the number with its unit, and with enough digits that rounding does not hide a violated threshold."""
-        written = (shown(self.value, self.unit, units, digits) for digits in range(4, 18))
-        limit = shown(self._limit, self.unit, units)
-        return next(text for text in written if self.holds or text != limit)
+        written = (shown(self.value, self.unit, digits) for digits in range(4, 18))
+        return next(text for text in written if self.holds or not self.threshold().endswith(f" {text}"))
 
-    def threshold(self, units: UnitSystem = UnitSystem.paper) -> str:
+    def threshold(self) -> str:
         """Return the threshold in words."""
-        word = "least" if self.at_most is None else "most"
-        return f"at {word} {shown(self._limit, self.unit, units)}"
-
-    @property
-    def _limit(self) -> float:
-        limit = self.at_least if self.at_most is None else self.at_most
-        assert limit is not None
-        return limit
+        word, limit = ("least", self.at_least) if self.at_most is None else ("most", self.at_most)
+        return f"at {word} {shown(np.nan if limit is None else limit, self.unit)}"
 
     @property
     def holds(self) -> bool:
@@ -102,7 +95,7 @@ class Finding:
 
 
 class Row(BaseModel, frozen=True, extra="forbid"):
-    """Quantity of a reading, its vehicles and its threshold; ``claims.toml`` explains the fields."""
+    """Quantity of a reading, its vehicles and its threshold; ``claims.yaml`` explains the fields."""
 
     what: str = ""
     flight: str = ""
@@ -122,7 +115,7 @@ class Row(BaseModel, frozen=True, extra="forbid"):
 
 
 class Claim(BaseModel, frozen=True, extra="forbid"):
-    """A claim of ``claims.toml``: quote, location in the paper, and how it is measured."""
+    """A claim of ``claims.yaml``: quote, location in the paper, and how it is measured."""
 
     name: str
     quote: str

@@ -12,6 +12,7 @@ from hsv.control.notch_filter import notch_response
 from hsv.model.lpv.linearisation import bode, bode_difference, frequency_response, linearise, zero_order_hold
 from hsv.model.signals import PITCH_RATE
 from hsv.model.vehicle import load_vehicle
+from hsv_paper import plots
 from hsv_paper.designs import (
     BETWEEN,
     CODESIGN_FREQUENCIES,
@@ -25,26 +26,13 @@ from hsv_paper.figures.figure import Drawing
 from hsv_paper.flights import Flights
 from hsv_paper.linear_loop import ELEVATOR
 from hsv_paper.modes import PeakFall, elastic_modes, linearised, open_loop_modes, peak_falls, pitch_rate_response
-from hsv_paper.plots import (
-    BLUE,
-    DOTTED_GREY,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    bode_lines,
-    bode_panels,
-    label_bode,
-    letter,
-    new_figure,
-)
 
 POLE_FREQUENCIES = (10.0, 15.0, 20.0)
 POLE_DAMPINGS = (0.2, 0.5, 0.8)
 """Poles of the notch filters in Figure 3."""
 
 _BETWEEN = f"{BETWEEN[0] / FOOT:.0f} ft and {BETWEEN[1] / FOOT:.0f} ft/s"
-_POLYTOPIC = {"color": BLUE, "linestyle": ":", "linewidth": 2.0}
+_POLYTOPIC = {"color": plots.BLUE, "linestyle": ":", "linewidth": 2.0}
 
 
 def figure_02(flights: Flights) -> Drawing:
@@ -52,15 +40,15 @@ def figure_02(flights: Flights) -> Drawing:
     flown, model = design("baseline"), certificate("baseline")["model"]
     frequencies = np.logspace(-2.0, 2.0, 600)
     exact = zero_order_hold(*linearise(load_vehicle().decoupled, *BETWEEN), flown.period)
-    figure, magnitude, phase = bode_panels()
+    figure, magnitude, phase = plots.bode_panels()
     for system, label, style in (
-        (exact, "DM", {"color": RED}),
+        (exact, "DM", {"color": plots.RED}),
         (flown.polytope.at(*BETWEEN), "Polytopic LPV", _POLYTOPIC),
     ):
         response = frequency_response(*system, frequencies, flown.period)[:, PITCH_RATE, ELEVATOR]
-        bode_lines(magnitude, phase, frequencies, response, label, **style)
-    label_bode(magnitude, phase, frequencies)
-    letter((magnitude, phase))
+        plots.bode_lines(magnitude, phase, frequencies, response, label, **style)
+    plots.label_bode(magnitude, phase, frequencies)
+    plots.letter((magnitude, phase))
     magnitude.legend(loc="upper right")
     accuracy, (rows, columns) = model["accuracy"], model["vertices"]
     return Drawing(
@@ -81,23 +69,23 @@ def figure_03(flights: Flights) -> Drawing:
     """Draw elevator to filtered pitch rate of the coupled model, one parameter of the poles changed at a time."""
     section, frequencies = design("baseline").notch[0], np.logspace(0.0, 2.0, 1500)
     plain = pitch_rate_response("paper_like", frequencies)
-    figure = new_figure(5.2)
+    figure = plots.new_figure(5.2)
     grid = figure.subplots(2, 2, sharex=True, sharey="row")
     families = (
         [(f"$\\omega_p$ = {w:g} rad/s", replace(section, pole_frequency=w)) for w in POLE_FREQUENCIES],
         [(f"$\\varepsilon_p$ = {e:g}", replace(section, pole_damping=e)) for e in POLE_DAMPINGS],
     )
     for (magnitude, phase), family in zip(grid.T, families, strict=True):
-        bode_lines(magnitude, phase, frequencies, plain, "without notch", color=RED, linestyle="--")
-        for (label, changed), color in zip(family, (GREEN, BLUE, ORANGE), strict=True):
-            bode_lines(
+        plots.bode_lines(magnitude, phase, frequencies, plain, "without notch", color=plots.RED, linestyle="--")
+        for (label, changed), color in zip(family, (plots.GREEN, plots.BLUE, plots.ORANGE), strict=True):
+            plots.bode_lines(
                 magnitude, phase, frequencies, plain * notch_response([changed], frequencies), label, color=color
             )
-        label_bode(magnitude, phase, frequencies)
+        plots.label_bode(magnitude, phase, frequencies)
         magnitude.legend(loc="lower left")
     for axis in grid[:, 1]:
         axis.set_ylabel("")
-    letter(grid[0])
+    plots.letter(grid[0])
     grid[0, 0].set_title(f"  effect of $\\omega_p$, $\\varepsilon_p$ = {section.pole_damping:g}", loc="right")
     grid[0, 1].set_title(f"  effect of $\\varepsilon_p$, $\\omega_p$ = {section.pole_frequency:g} rad/s", loc="right")
     lag = float(np.degrees(np.angle(notch_response([section], np.array([5.0]))[0])))
@@ -116,11 +104,11 @@ def figure_03(flights: Flights) -> Drawing:
 
 def figure_04(flights: Flights) -> Drawing:
     """Draw all poles of the coupled model, and those near the origin enlarged, for both sets of coupling."""
-    figure = new_figure(4.2)
+    figure = plots.new_figure(4.2)
     whole, near = figure.subplots(1, 2, width_ratios=(1.5, 1))
     for name, color, marker, offset, side in (
-        ("paper_like", BLUE, "x", (12, -10), "left"),
-        ("derived", RED, "+", (-9, -3), "right"),
+        ("paper_like", plots.BLUE, "x", (12, -10), "left"),
+        ("derived", plots.RED, "+", (-9, -3), "right"),
     ):
         poles, style = _poles(name), {"color": color, "markersize": 7, "markeredgewidth": 1.4}
         for axis in (whole, near):
@@ -132,8 +120,8 @@ def figure_04(flights: Flights) -> Drawing:
     structural = load_vehicle().decoupled
     frequencies = (structural.natural_frequency_1, structural.natural_frequency_2)
     for omega in frequencies:
-        whole.axhline(omega, color=GREY, linewidth=0.5, linestyle=":")
-        whole.text(2.55, omega + 0.3, f"structural {omega:g} rad/s", color=GREY, fontsize=7, ha="right")
+        whole.axhline(omega, color=plots.GREY, linewidth=0.5, linestyle=":")
+        whole.text(2.55, omega + 0.3, f"structural {omega:g} rad/s", color=plots.GREY, fontsize=7, ha="right")
     whole.set_xlim(-2.4, 2.6)
     near.set_xlim(-0.02, 0.02)
     near.set_ylim(-0.1, 0.1)
@@ -152,7 +140,7 @@ def figure_04(flights: Flights) -> Drawing:
         axis.set_xlabel("Real part (1/s)")
     whole.set_ylabel("Imaginary part (rad/s)")
     whole.legend(loc="center left", bbox_to_anchor=(0.0, 0.38))
-    letter((whole, near))
+    plots.letter((whole, near))
     near.set_title("near the origin", loc="right")
     like, derived = (
         [f"{mode.natural_frequency:.2f}" for mode in elastic_modes(name).values()] for name in ("paper_like", "derived")
@@ -176,15 +164,17 @@ def figure_05(flights: Flights) -> Drawing:
     """Draw elevator to pitch rate about both modes, with and without the design's filter, and its gain alone."""
     section, frequencies = design("baseline").notch, np.logspace(0.7, 1.7, 3000)
     plain, filter_ = pitch_rate_response("paper_like", frequencies), notch_response(section, frequencies)
-    figure, magnitude, phase = bode_panels()
-    bode_lines(magnitude, phase, frequencies, plain, "without notch", color=RED, linestyle="--")
-    bode_lines(magnitude, phase, frequencies, plain * filter_, "with notch", color=BLUE)
-    magnitude.semilogx(frequencies, bode(filter_)[0], color=GREY, linewidth=0.7, label="gain of the notch filter alone")
-    label_bode(magnitude, phase, frequencies)
+    figure, magnitude, phase = plots.bode_panels()
+    plots.bode_lines(magnitude, phase, frequencies, plain, "without notch", color=plots.RED, linestyle="--")
+    plots.bode_lines(magnitude, phase, frequencies, plain * filter_, "with notch", color=plots.BLUE)
+    magnitude.semilogx(
+        frequencies, bode(filter_)[0], color=plots.GREY, linewidth=0.7, label="gain of the notch filter alone"
+    )
+    plots.label_bode(magnitude, phase, frequencies)
     modes = {name: mode.natural_frequency for name, mode in elastic_modes("paper_like").items()}
     for (name, frequency), side in zip(modes.items(), ("right", "left"), strict=True):
         for axis in (magnitude, phase):
-            axis.axvline(frequency, **DOTTED_GREY | {"linewidth": 0.5})
+            axis.axvline(frequency, **plots.DOTTED_GREY | {"linewidth": 0.5})
         place: Any = {"xycoords": ("data", "axes fraction"), "va": "bottom", "ha": side}
         magnitude.annotate(f"{name} mode, {frequency:.2f} rad/s", (frequency, 1.01), fontsize=8, **place)
     magnitude.legend(loc="lower left")
@@ -207,20 +197,20 @@ def figure_05(flights: Flights) -> Drawing:
 def figure_08(flights: Flights) -> Drawing:
     """Draw elevator to filtered pitch rate of the co-designed model and of the ECM without and with its coupling."""
     inputs, model, frequencies = inputs_of("adjustable"), certificate("adjustable")["model"], CODESIGN_FREQUENCIES
-    figure, magnitude, phase = bode_panels()
+    figure, magnitude, phase = plots.bode_panels()
     drawn = []
     for system, label, style in (
-        (extended_model(inputs, "paper_like"), "ECM with its coupling", {"color": GREY, "linewidth": 0.8}),
-        (extended_model(inputs, 0.0), "ECM, coupling ignored", {"color": RED}),
+        (extended_model(inputs, "paper_like"), "ECM with its coupling", {"color": plots.GREY, "linewidth": 0.8}),
+        (extended_model(inputs, 0.0), "ECM, coupling ignored", {"color": plots.RED}),
         (codesigned_model(inputs), "Codesigned polytopic LPV", _POLYTOPIC),
     ):
         drawn.append(frequency_response(*system, frequencies, inputs.model.period)[:, PITCH_RATE, ELEVATOR])
-        bode_lines(magnitude, phase, frequencies, drawn[-1], label, **style)
+        plots.bode_lines(magnitude, phase, frequencies, drawn[-1], label, **style)
     decibel, degree = bode_difference(drawn[-1], drawn[0])
     loud, late = np.argmax(decibel), np.argmax(degree)
     elastic = [f"{mode.natural_frequency:.1f}" for mode in elastic_modes("paper_like").values()]
-    label_bode(magnitude, phase, frequencies)
-    letter((magnitude, phase))
+    plots.label_bode(magnitude, phase, frequencies)
+    plots.letter((magnitude, phase))
     magnitude.legend(loc="upper right")
     accuracy, (rows, columns) = model["accuracy"], model["vertices"]
     return Drawing(

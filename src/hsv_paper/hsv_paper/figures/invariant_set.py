@@ -9,14 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
 
-from hsv.base.units import to_paper
 from hsv.control.design import TubeSet
 from hsv.flight.metrics import FlightData
 from hsv.model.signals import N_RIGID
 from hsv_paper.designs import design
 from hsv_paper.figures.figure import Drawing
 from hsv_paper.flights import Flights
-from hsv_paper.plots import BLUE, GREEN, GREY, letter, new_figure
+from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, GREY, letter, new_figure
 
 WITH, WITHOUT = "case1_uncertain", "case1_uncertain_no_notch"
 
@@ -25,8 +24,6 @@ INSTANTS = (0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 
 SIZE = 120.0
 """Points: about the side of a panel."""
-
-FEET, DEGREES = to_paper(1.0, "m")[0], to_paper(1.0, "rad")[0]
 
 
 class Plane(NamedTuple):

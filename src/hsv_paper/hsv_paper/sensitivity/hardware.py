@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsv.base.units import FOOT, to_paper
+from hsv.base.units import FOOT
 from hsv.flight.assembly import assemble
 from hsv.flight.closed_loop import fly
 from hsv.flight.tables import breakpoints
@@ -35,23 +35,23 @@ from hsv_paper.linear_loop import (
     crossings,
     stability_limit,
 )
-from hsv_paper.plots import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, ZERO, letter, new_figure
+from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, GREY, ORANGE, PURPLE, RED, ZERO, letter, new_figure
 from hsv_paper.sensitivity.sweep import RMPC_GAIN, WIDER_NOTCH, WITH_NOTCH, WITHOUT_NOTCH, Controller, feedback
-from hsv_paper.study import Outcome, Scope, in_words
+from hsv_paper.study import Outcome, Scope, in_words, rounded
 
 REALISTIC = Controller("tube that knows its actuators", "case1", GREEN, "realistic")
 RMPC = Controller("RMPC without notch", "case1_rmpc_fourth_k", RED)
 
 FUEL, SURFACE = ACTUATOR_SETS["fuel_10"], ACTUATOR_SETS["elevator_50"]
 
-ELEVATORS: dict[str, Hardware] = {
-    "ideal actuators": Hardware(),
-    "an elevator of 150 rad/s": Hardware((FUEL, ACTUATOR_SETS["elevator_150"])),
-    "one of 50 rad/s": Hardware((FUEL, SURFACE)),
-    "one of 20 rad/s, first order": Hardware((FUEL, ACTUATOR_SETS["elevator_first_order_20"])),
-    "one of 20 rad/s": Hardware((FUEL, ACTUATOR_SETS["elevator_20"])),
+ELEVATORS = {
+    "ideal": Hardware(),
+    "150 rad/s": Hardware((FUEL, ACTUATOR_SETS["elevator_150"])),
+    "50 rad/s": Hardware((FUEL, SURFACE)),
+    "20 rad/s, first order": Hardware((FUEL, ACTUATOR_SETS["elevator_first_order_20"])),
+    "20 rad/s": Hardware((FUEL, ACTUATOR_SETS["elevator_20"])),
 }
-"""Published elevators by their names in the results, each with the fuel delivery of 10 rad/s."""
+"""Published elevators, each but the ideal one with the fuel delivery of 10 rad/s."""
 
 BANDWIDTHS = tuple(np.geomspace(3.0, 2000.0, 61).tolist())
 """rad/s, of elevators of the second order."""
@@ -66,7 +66,6 @@ HALF_DEGREE = float(np.radians(0.5))
 """rad: the paper's largest allowable error of the attitude angles (5.1)."""
 
 _SHOWN_DELAY = 0.16
-_ONE_DEGREE = np.pi / 180.0
 _GUST, _END = 30.0, 50.0
 """s: when the gust begins and the flight ends."""
 
@@ -133,11 +132,6 @@ class Gust:
 
     length: float
     stays: bool
-
-    @property
-    def key(self) -> str:
-        """Name in the results of the study."""
-        return f"1 - cos over {self.length / FOOT:g} ft that {'stays' if self.stays else 'falls as it rose'}"
 
     def __str__(self) -> str:
         after = "persists" if self.stays else "decays in the same way"
@@ -214,139 +208,69 @@ def gust_limits(case: Case, gust: Gust) -> dict[str, float | None]:
     return {name: stability_limit(partial(excess, name), velocities, 1e-3) for name in Response._fields}
 
 
-def gust_limits_in_words(limits: dict[str, float | None]) -> str:
-    """Return the limits in gusts in words."""
+def stability(case: Case, over: Corners) -> dict[str, Any]:
+    """Return cells with the bandwidths at which a loop is stable, and its growth with each of :data:`ELEVATORS`."""
+    sparse = BANDWIDTHS[:: max(1, len(BANDWIDTHS) // 30)]
+    cells: dict[str, Any] = {"case": case.label}
+    for which, vehicles, along in (("nominal", NOMINAL, BANDWIDTHS), ("worst", over, sparse)):
+        growth = partial(_growth_at, case, vehicles)
+        cells[f"stable with, rad/s, {which}"] = _spans(crossings(growth, along), growth(BANDWIDTHS[0]) < 0.0)
+    return cells | {name: rounded(case.growth(hardware), 3) for name, hardware in ELEVATORS.items()}
 
-    def velocity(value: float) -> str:
-        number, unit = to_paper(value, "m/s")
-        return f"{number:.0f} {unit}"
 
-    words = {
-        "attitude": ("the attitude changes by half a degree", "the attitude changes by less than half a degree"),
-        "elevator": ("the elevator reaches its stop", "the elevator does not reach its stop"),
-        "lost": ("the flight is lost", "the flight is not lost"),
+def tolerances(case: Case, over: Corners) -> dict[str, Any]:
+    """Return cells with the delays that a loop tolerates, and with its response to sensor noise at 50 rad/s."""
+    cells: dict[str, Any] = {"case": case.label}
+    for name in ("ideal", "50 rad/s"):
+        for which, vehicles in (("nominal", NOMINAL), ("worst", over)):
+            delay = case.tolerated_delay(ELEVATORS[name], vehicles)
+            longest = f"≥ {1e3 * DELAYS[-1]:g}"
+            cells[f"delay, ms, {name}, {which}"] = longest if delay is None else rounded(1e3 * delay)
+    noise = {name: DEGREES * case.elevator_noise(ELEVATORS["50 rad/s"], name) for name in ("fine", "ghv")}
+    cells |= {f"elevator rms, deg, {name} sensors": rounded(value, 2) for name, value in noise.items()}
+    return cells | {"1 deg with noise of fine times": rounded(1.0 / noise["fine"], 1)}
+
+
+def in_gusts(case: Case) -> dict[str, Any]:
+    """Return cells with the velocities of both gusts (ft/s) from which a controller exceeds its limits."""
+    heads = {"attitude": "half a degree of attitude", "elevator": "elevator at its stop", "lost": "lost"}
+    return {"case": case.label} | {
+        f"{heads[name]}, {gust.length / FOOT:g} ft": None if velocity is None else rounded(FEET * velocity)
+        for gust in GUSTS
+        for name, velocity in gust_limits(case, gust).items()
     }
-    if all(value is None for value in limits.values()):
-        return f"no limit is reached up to {velocity(VELOCITIES[-1])}"
-    parts = [f"{words[name][0]} from {velocity(value)} on" for name, value in limits.items() if value is not None]
-    parts += [f"{words[name][1]} up to {velocity(VELOCITIES[-1])}" for name, value in limits.items() if value is None]
-    return f"{', '.join(parts[:-1])}, and {parts[-1]}"
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Limits that a linear loop tolerates, each of the nominal vehicle and of the worst corner where there are two.
-
-    ``growths`` (1/s) with each of :data:`ELEVATORS`; ``bandwidths`` (rad/s) at which stability changes; ``ends``:
-    whether the loop is stable at the lowest; ``delays`` (s) with ideal and realistic actuators; ``noise`` (rad) of the
-    elevator by sensor set, realistic actuators.
-    """
-
-    growths: dict[str, float]
-    bandwidths: tuple[list[float], list[float]]
-    ends: tuple[bool, bool]
-    delays: dict[str, tuple[float | None, float | None]]
-    noise: dict[str, float]
-
-    @classmethod
-    def of(cls, case: Case, over: Corners) -> Limits:
-        """Return the limits of ``case`` over the nominal vehicle and the corners ``over``."""
-        chosen = {name: ELEVATORS[name] for name in ("ideal actuators", "one of 50 rad/s")}
-        sparse = BANDWIDTHS[:: max(1, len(BANDWIDTHS) // 30)]
-        return cls(
-            {name: case.growth(hardware) for name, hardware in ELEVATORS.items()},
-            (
-                crossings(lambda w: case.growth(elevator(w)), BANDWIDTHS),
-                crossings(lambda w: case.growth(elevator(w), over), sparse),
-            ),
-            (case.growth(elevator(BANDWIDTHS[0])) < 0.0, case.growth(elevator(BANDWIDTHS[0]), over) < 0.0),
-            {name: (case.tolerated_delay(h), case.tolerated_delay(h, over)) for name, h in chosen.items()},
-            {name: case.elevator_noise(ELEVATORS["one of 50 rad/s"], name) for name in ("fine", "ghv")},
-        )
-
-    def in_words(self, corners: str) -> str:
-        """Return the limits in words."""
-        vehicles = ("nominal vehicle", f"worst of {corners}")
-        spans = " and ".join(
-            f"{_stable(changes, first)} ({vehicle})"
-            for changes, first, vehicle in zip(self.bandwidths, self.ends, vehicles, strict=True)
-        )
-        growths = ", ".join(f"{value:+.3f} with {_elevator_in_words(name)}" for name, value in self.growths.items())
-        delays = "; ".join(
-            f"with {_elevator_in_words(name)}, the tolerated delay is {_milliseconds(nominal)} (nominal vehicle) and "
-            f"{_milliseconds(worst)} (worst corner)"
-            for name, (nominal, worst) in self.delays.items()
-        )
-        noise = "the response to sensor noise is undefined: the loop is unstable with an elevator of 50 rad/s"
-        if not any(np.isnan(value) for value in self.noise.values()):
-            rms = " and ".join(
-                f"{to_paper(value, 'rad')[0]:.2f} deg ({name} set)" for name, value in self.noise.items()
-            )
-            noise = (
-                f"sensor noise causes an rms elevator command of {rms}; it is 1 deg with "
-                f"{_ONE_DEGREE / self.noise['fine']:.1f} times the noise of the fine set"
-            )
-        return (
-            f"over the bandwidth of the elevator, the loop is {spans}; the largest real part of the poles (1/s) is "
-            f"{growths}; {delays}; {noise}"
-        )
-
-    def report(self) -> dict[str, Any]:
-        """Return the limits for JSON."""
-        return {
-            "growth_with_published_elevators_per_s": self.growths,
-            "stability_changes_at_rad_per_s": {"nominal": self.bandwidths[0], "worst": self.bandwidths[1]},
-            "stable_when_slowest": {"nominal": self.ends[0], "worst": self.ends[1]},
-            "delay_borne_s_of": {name: {"nominal": n, "worst": w} for name, (n, w) in self.delays.items()},
-            "elevator_rms_rad": self.noise,
-        }
 
 
 def run(scope: Scope) -> Outcome:
     """Linearise every controller with elevators of all bandwidths and with delays, and fly it through gusts."""
     bandwidths = np.geomspace(5.0, 500.0, scope.count(31, 4)).tolist()
     delays = np.linspace(0.0, _SHOWN_DELAY, scope.count(33, 3)).tolist()
-    velocities, degrees = VELOCITIES[:: scope.every], to_paper(1.0, "rad")[0]
+    velocities = VELOCITIES[:: scope.every]
     figure = new_figure(9.0)
     panels = figure.subplots(3, 2).ravel()
-    findings, numbers = [], {}
+    tables: tuple[list[dict[str, Any]], ...] = ([], [], [])
     for done, case in enumerate(CASES):
         scope.progress("linear loops", done, len(CASES))
-        growths = [case.growth(elevator(w)) for w in bandwidths]
-        late = [case.growth(elevator(SURFACE.natural_frequency, delay)) for delay in delays]
         borne = [case.tolerated_delay(elevator(w)) for w in bandwidths]
-        noise = [case.elevator_noise(elevator(w), "fine") for w in bandwidths]
-        in_gusts = [worse(case, GUSTS[-1], velocity) for velocity in velocities]
+        gusts = [worse(case, GUSTS[-1], velocity) for velocity in velocities]
         style: Any = {"linestyle": "-" if case.coupling == "paper_like" else "--", "color": case.color}
-        panels[0].semilogx(bandwidths, growths, label=case.label, **style)
+        panels[0].semilogx(bandwidths, [case.growth(elevator(w)) for w in bandwidths], label=case.label, **style)
+        late = [case.growth(elevator(SURFACE.natural_frequency, delay)) for delay in delays]
         panels[1].plot(1e3 * np.array(delays), late, **style)
         panels[2].semilogx(bandwidths, [np.nan if d is None else 1e3 * d for d in borne], **style)
-        panels[3].semilogx(bandwidths, degrees * np.array(noise), **style)
-        feet = [to_paper(v, "m/s")[0] for v in velocities]
-        panels[4].plot(feet, [degrees * one.attitude for one in in_gusts], **style)
-        panels[5].plot(feet, [degrees * one.elevator for one in in_gusts], **style)
-        limits = Limits.of(case, scope.over)
-        gusts = {gust: gust_limits(case, gust) for gust in GUSTS}
-        words = "; ".join(f"in a {gust}, {gust_limits_in_words(found)}" for gust, found in gusts.items())
-        findings.append(f"{case.label}: {limits.in_words(in_words(scope.over))}; {words}")
-        numbers[case.label] = {
-            **limits.report(),
-            "gust_limits_m_per_s": {gust.key: found for gust, found in gusts.items()},
-            "in_gusts": [one._asdict() for one in in_gusts],
-            "growth_per_s": growths,
-            "growth_behind_delay_per_s": late,
-            "delay_borne_s": borne,
-            "elevator_noise_rad": noise,
-        }
+        noise = [DEGREES * case.elevator_noise(elevator(w), "fine") for w in bandwidths]
+        panels[3].semilogx(bandwidths, noise, **style)
+        panels[4].plot(FEET * np.array(velocities), [DEGREES * one.attitude for one in gusts], **style)
+        panels[5].plot(FEET * np.array(velocities), [DEGREES * one.elevator for one in gusts], **style)
+        for table, row in zip(
+            tables, (stability(case, scope.over), tolerances(case, scope.over), in_gusts(case)), strict=True
+        ):
+            table.append(row)
     scope.progress("linear loops", len(CASES), len(CASES))
-    bandwidth, delay = (
-        "bandwidth of the elevator (rad/s)",
-        f"delay (ms), elevator of {SURFACE.natural_frequency:g} rad/s",
-    )
-    gust = "velocity of the gust (ft/s)"
-    for panel, x, y, shown in zip(
+    bandwidth, gust = "bandwidth of the elevator (rad/s)", "velocity of the gust (ft/s)"
+    for panel, x, y, shown, limit in zip(
         panels,
-        (bandwidth, delay, bandwidth, bandwidth, gust, gust),
+        (bandwidth, f"delay (ms), elevator of {SURFACE.natural_frequency:g} rad/s", bandwidth, bandwidth, gust, gust),
         (
             "largest real part (1/s)",
             "largest real part (1/s)",
@@ -356,52 +280,52 @@ def run(scope: Scope) -> Outcome:
             "largest elevator command (deg)",
         ),
         ((-0.6, 1.0), (-0.6, 1.0), (0.0, None), (0.0, 1.0), (0.0, 5.0), (10.0, 30.0)),
+        (0.0, 0.0, None, None, HALF_DEGREE, SURFACE.stop),
         strict=True,
     ):
         panel.set(xlabel=x, ylabel=y, ylim=shown)
-    for panel, limit in ((panels[0], 0.0), (panels[1], 0.0), (panels[4], HALF_DEGREE), (panels[5], SURFACE.stop)):
-        panel.axhline(degrees * limit, **ZERO)
+        if limit is not None:
+            panel.axhline(DEGREES * limit, **ZERO)
     letter(panels)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return Outcome(
         figure,
-        "Linear sampled loop of Case 1 around the coupled nominal vehicle, with a second-order elevator (damping "
-        f"{SURFACE.damping_ratio:g}) and the fuel delivery of {FUEL.natural_frequency:g} rad/s; each value is the "
-        "worst over both ends of the step, before and after the fault. (a) Largest real part of the poles over the "
-        "bandwidth of the elevator. (b) The same over a delay of the command. (c) Delay at which the loop becomes "
-        "unstable, by root finding. (d) Rms elevator command due to the noise of the fine sensor set, without a fault; "
-        "there is no line where the loop is unstable. The limits of the actuators are not included in (a) to (d). "
-        f"(e), (f) Flight through a {GUSTS[-1]}, from below or from above, whichever is worse, at the end of "
-        f"the step and after the fault, with an elevator of {SURFACE.natural_frequency:g} rad/s and its limits: (e) "
-        "largest change of an attitude angle, with a line at half a degree, and (f) largest elevator command, with a "
-        "line at the stop. The gust velocity at which an attitude angle changes by half a degree, the elevator command "
-        f"exceeds its stop, or the flight is lost is found by root finding over such flights. {RMPC_GAIN}.",
-        findings,
-        {
-            "bandwidth_rad_per_s": bandwidths,
-            "delay_s": delays,
-            "gust_m_per_s": list(velocities),
-            "cases": numbers,
-        },
+        (
+            "Linear sampled loop of Case 1 around the coupled nominal vehicle, with a second-order elevator (damping "
+            f"{SURFACE.damping_ratio:g}) and the fuel delivery of {FUEL.natural_frequency:g} rad/s; each value is the "
+            "worst over both ends of the step, before and after the fault. (a) Largest real part of the poles over the "
+            "bandwidth of the elevator. (b) The same over a delay of the command. (c) Delay at which the loop becomes "
+            "unstable, by root finding. (d) Rms elevator command due to the noise of the fine sensor set, without a "
+            "fault; there is no line where the loop is unstable. The limits of the actuators are not included in (a) "
+            f"to (d). (e), (f) Flight through a {GUSTS[-1]}, from below or from above, whichever is worse, at the end "
+            f"of the step and after the fault, with an elevator of {SURFACE.natural_frequency:g} rad/s and its limits: "
+            "(e) largest change of an attitude angle, with a line at half a degree, and (f) largest elevator command, "
+            "with a line at the stop. The gust velocity at which an attitude angle changes by half a degree, the "
+            "elevator command exceeds its stop, or the flight is lost is found by root finding over such flights. "
+            f"{RMPC_GAIN}. *Worst* is the worst of {in_words(scope.over)}.",
+            "Bandwidths of the elevator at which the loop is stable, and largest real part of the poles (1/s) with "
+            "published elevators:",
+            tables[0],
+            "Tolerated delays with an ideal elevator and one of 50 rad/s, and the rms elevator command due to sensor "
+            "noise with the latter (–: the loop is unstable):",
+            tables[1],
+            f"Velocities (ft/s) from which on a limit is reached, in a {GUSTS[0]}, and in a {GUSTS[1]} "
+            f"(–: not up to {FEET * VELOCITIES[-1]:.0f} ft/s):",
+            tables[2],
+        ),
     )
 
 
-def _elevator_in_words(name: str) -> str:
-    return name.replace("one of", "an elevator of")
+def _growth_at(case: Case, over: Corners, bandwidth: float) -> float:
+    return case.growth(elevator(bandwidth), over)
 
 
-def _stable(changes: Sequence[float], first: bool) -> str:
-    """Return in words where a loop is stable: stability changes at ``changes``; ``first``: stable at the lowest."""
+def _spans(changes: Sequence[float], first: bool) -> str:
+    """Return the ranges in which a loop is stable: it changes at ``changes``; ``first``: stable at the lowest."""
     edges = [BANDWIDTHS[0], *changes, BANDWIDTHS[-1]]
     spans = [
-        f"from {low:.3g} to {high:.3g} rad/s" if high < BANDWIDTHS[-1] else f"from {low:.3g} rad/s on"
+        f"{low:.3g} to {high:.3g}" if high < BANDWIDTHS[-1] else f"from {low:.3g} on"
         for index, (low, high) in enumerate(pairwise(edges))
         if (index % 2 == 0) == first
     ]
-    return f"stable {' and '.join(spans)}" if spans else "stable at no bandwidth"
-
-
-def _milliseconds(delay: float | None) -> str:
-    if delay is None:
-        return f"at least {1e3 * DELAYS[-1]:g} ms"
-    return f"{1e3 * delay:.0f} ms" if delay > 0.0 else "none"
+    return ", ".join(spans) or "–"

@@ -1,11 +1,10 @@
-"""The controllers that the studies compare, the runner of all sweeps of flights, and the plots and findings of one."""
+"""The controllers that the studies compare, the runner of all sweeps of flights, and the plots and cells of one."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -16,13 +15,13 @@ from matplotlib.lines import Line2D
 from hsv.base.units import to_paper
 from hsv.control.design import ControlDesign, find_design, read_parameters
 from hsv.control.notch_filter import flown_sections
-from hsv.flight.assembly import assemble_flight, scenario_parameters
+from hsv.flight.assembly import scenario_parameters
 from hsv.flight.metrics import METRICS
 from hsv.flight.scenario import load_scenario
 from hsv_paper.flights import Point, Table
-from hsv_paper.linear_loop import COUPLING_SCALES, Corners, Feedback
+from hsv_paper.linear_loop import Feedback
 from hsv_paper.plots import BLUE, GREEN, ORANGE, PURPLE, RED, letter, plain_log
-from hsv_paper.study import Scope, in_words
+from hsv_paper.study import Scope
 
 Columns = dict[str, list[float]]
 """Numbers of one controller over the points of a sweep, by name."""
@@ -36,7 +35,6 @@ SWEPT = (
     "elastic_decay_time",
     "altitude_settling_time",
     "velocity_settling_time",
-    "fuel_equivalence_ratio_maximum",
 )
 """Metrics that a sweep keeps, of the nominal vehicle and of the worst."""
 
@@ -89,22 +87,6 @@ ALL = (WITH_NOTCH, WIDER_NOTCH, WITHOUT_NOTCH, RMPC, RMPC_WITH_NOTCH)
 RMPC_GAIN = "RMPC flies the fourth gain of the nominal family"
 """Description of the RMPC gain for the pages."""
 
-_OTHER_COLORS = ("#008b8b", "#8c564b", "#c71585", "#556b2f")
-
-
-def of_scenarios(names: Sequence[str]) -> list[Controller]:
-    """Return the controllers of scenarios, labelled with their titles.
-
-    Raises:
-        ScenarioError: There is no such scenario, or it is invalid.
-    """
-    found = []
-    for name, color in zip(names, cycle(_OTHER_COLORS), strict=False):
-        scenario = load_scenario(name)
-        assemble_flight(scenario)
-        found.append(Controller(scenario.title, name, color, scenario.design, kept=False))
-    return found
-
 
 @cache
 def feedback(controller: Controller) -> Feedback:
@@ -143,38 +125,6 @@ def columns_of(tables: Sequence[Table]) -> Columns:
             columns.setdefault(f"{name}_nominal", []).append(float(values[0]))
             columns.setdefault(f"{name}_worst", []).append(float(values.max()))
     return columns
-
-
-def labelled(results: Mapping[Controller, Columns]) -> dict[str, Columns]:
-    """Return results by the controllers' labels, for JSON."""
-    return {controller.label: columns for controller, columns in results.items()}
-
-
-@dataclass(frozen=True)
-class CouplingLimits:
-    """kappa at which a linear loop becomes unstable, for the nominal vehicle and for the worst of ``over``."""
-
-    nominal: float | None
-    worst: float | None
-    over: Corners
-
-    @classmethod
-    def of(cls, loop: Feedback, over: Corners) -> CouplingLimits:
-        """Return the limits of a loop; the nominal vehicle is the first of ``over``."""
-        return cls(loop.critical_coupling(), loop.critical_coupling(over), over)
-
-    def in_words(self) -> str:
-        """Return both limits in words."""
-        nominal, worst = (
-            f"at least κ = {COUPLING_SCALES[-1]:g}" if limit is None else f"κ = {limit:.2f}"
-            for limit in (self.nominal, self.worst)
-        )
-        corners = in_words(self.over)
-        return f"the linear loop is stable up to {nominal} (nominal vehicle) and {worst} (worst of {corners})"
-
-    def report(self) -> dict[str, float | None]:
-        """Return the limits for JSON."""
-        return {"nominal": self.nominal, "worst": self.worst}
 
 
 def widths(count: int) -> np.ndarray:
@@ -226,35 +176,23 @@ def legend(figure: Figure, *, shares: bool) -> None:
     figure.legend(handles=[*controllers, *keys], loc="outside upper center", ncols=3, frameon=False)
 
 
-def lost_where(
-    x: np.ndarray, columns: Columns, words: str, *, digits: int = 2, rising: bool = True, nominal: bool = True
-) -> str:
-    """Return in words between which points flights begin to saturate and to be lost, along ``x``.
+def lost_where(x: np.ndarray, columns: Columns, digits: int = 2, *, rising: bool = True) -> dict[str, str]:
+    """Return cells with the points between which flights begin to saturate and to be lost.
 
     Args:
         x: Values along the sweep, increasing.
         columns: Columns of the sweep.
-        words: Text around a value, with ``{}`` in its place.
         digits: Decimals of a value.
         rising: Begin at the smallest value, otherwise at the largest.
-        nominal: Whether the sweep also changes the flight of the nominal vehicle.
     """
     order = slice(None) if rising else slice(None, None, -1)
-    along = [f"{value:.{digits}f}" for value in x[order]]
-
-    def first(name: str, begin: str, none: str) -> str:
+    along, cells = [f"{value:.{digits}f}" for value in x[order]], {}
+    for what, name in (
+        ("saturation begins", "without_limits"),
+        ("losses begin", "finished"),
+        ("nominal vehicle lost", "nominal_finished"),
+    ):
         lost = np.array(columns[name])[order] < 1.0
         begins = np.flatnonzero(lost & ~np.concatenate(([False], lost[:-1])))
-        where = (
-            f"between {words.format(f'{along[i - 1]} and {along[i]}')}" if i else f"already at {words.format(along[0])}"
-            for i in begins
-        )
-        return f"{begin} {' and again '.join(where)}" if len(begins) else none
-
-    parts = [
-        first("without_limits", "saturation begins", "no flight is saturated"),
-        first("finished", "losses begin", "no flight is lost"),
-    ]
-    if nominal and min(columns["finished"]) < 1.0:
-        parts.append(first("nominal_finished", "the nominal vehicle is first lost", "the nominal vehicle is not lost"))
-    return f"{', '.join(parts[:-1])}, and {parts[-1]}"
+        cells[what] = ", ".join(f"{along[i - 1]} to {along[i]}" if i else f"at {along[0]}" for i in begins) or "–"
+    return cells
