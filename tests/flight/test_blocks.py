@@ -1,6 +1,5 @@
 """The loop as a table of blocks in the order of a step."""
 
-
 from hsv.bags.description import CARRIED, CLOCK, TOPICS, graph
 from hsv.control.controller import CONTROLLER_INPUTS, ControllerInput
 from hsv.flight.blocks import LOOP, Signals

@@ -20,8 +20,8 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            "controller = hsv_ctrl.controller:main",
-            "notch_filter = hsv_ctrl.notch_filter:main",
+            "controller = hsv_ctrl.blocks:controller",
+            "notch_filter = hsv_ctrl.blocks:notch_filter",
             "nominal_trajectory = hsv_ctrl.nominal_trajectory:main",
             "robust_mpc = hsv_ctrl.tube_mpc:robust_main",
             "tube_mpc = hsv_ctrl.tube_mpc:main",

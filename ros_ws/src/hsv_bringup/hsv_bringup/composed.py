@@ -8,9 +8,8 @@ from functools import partial
 from hsv.bags.description import controller_node
 from hsv_bringup.flow_executor import FlowExecutor
 from hsv_bringup.recorder import RecorderNode
-from hsv_ctrl.controller import ControllerNode
+from hsv_ctrl.blocks import ControllerNode, NotchFilterNode
 from hsv_ctrl.nominal_trajectory import NominalTrajectoryNode
-from hsv_ctrl.notch_filter import NotchFilterNode
 from hsv_ctrl.tube_mpc import RobustMpcNode, TubeMpcNode
 from hsv_node.main import run_nodes
 from hsv_node.process import ProcessNode

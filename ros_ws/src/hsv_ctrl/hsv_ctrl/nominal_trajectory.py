@@ -16,11 +16,10 @@ from hsv.control.nominal_law import NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.flight.blocks import Signals
-from hsv_ctrl.design import declare_design
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
 from hsv_node.middleware import LATCHED
-from hsv_node.parameters import declare_vehicle
+from hsv_node.parameters import declare_design, declare_vehicle
 
 _SOLVER_FAILED = int(NominalStatus.SOLVER_FAILED)
 
@@ -48,7 +47,7 @@ class NominalTrajectoryNode(BlockNode):
         self._first, self._words = 0, ""
         """The first step that the plan changes, and the command in words."""
         self._references = self.create_publisher(Reference, REFERENCE, LATCHED)
-        self.create_service(SetCommand, SET_COMMAND, self._command)
+        self.serve(SetCommand, SET_COMMAND, self._command)
 
     def start_run(self, run: Run) -> None:
         """Start a new nominal trajectory."""
@@ -86,21 +85,16 @@ class NominalTrajectoryNode(BlockNode):
         """Look more often for a plan that is being computed."""
         return _PLAN_LOOK if self._plan is not None else super().wait_timeout()
 
-    def _command(self, request: SetCommand.Request, response: SetCommand.Response) -> SetCommand.Response:
-        try:
-            if self._plan is not None:
-                raise GovernorError("the command before is still being planned: expected one at a time")
-            governor = CommandGovernor.from_parameters(self._values, self._design, self._trajectory)
-            self._first, plan = governor.command(request.altitude, request.velocity, request.duration, request.blend)
-        except HsvError as error:
-            response.success, response.message = False, str(error)
-            return response
+    def _command(self, request: SetCommand.Request) -> tuple[int, str]:
+        if self._plan is not None:
+            raise GovernorError("the command before is still being planned: expected one at a time")
+        governor = CommandGovernor.from_parameters(self._values, self._design, self._trajectory)
+        self._first, plan = governor.command(request.altitude, request.velocity, request.duration, request.blend)
         self._plan = self._planner.submit(plan)
         self._words = f"to {request.altitude:.6g} m and {request.velocity:.6g} m/s from step {self._first} on"
-        response.success, response.message, response.step = True, self._words, self._first
         self.get_logger().info(f"plans {self._words}")
         self._publish_reference(self._first, Reference.PLANNING)
-        return response
+        return self._first, self._words
 
     def _take(self, plan: Future[ReferenceTrajectory]) -> None:
         try:

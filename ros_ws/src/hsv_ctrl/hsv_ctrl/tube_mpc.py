@@ -17,10 +17,9 @@ from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS, RobustMpc
 from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw, TubeResult, TubeStatusCode
 from hsv.control.verification import preflight
 from hsv.flight.blocks import Signals
-from hsv_ctrl.design import declare_design
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
-from hsv_node.parameters import declare, declare_vehicle, given
+from hsv_node.parameters import declare, declare_design, declare_vehicle, given
 
 
 class TubeNode(BlockNode):
@@ -88,7 +87,7 @@ class TubeMpcNode(TubeNode):
         if design is None:
             raise DesignError("parameter design.name = 'none': expected a design with a tube")
         if values[EFFECTIVENESS_ENABLED.name]:
-            # Of what only the estimator needs, a node without one has none.
+            # Only the estimator needs the parameters of the vehicle.
             declare_vehicle(self)
             values |= declare(self, WATCHED_PARAMETERS)
         if warning := preflight(design, values["design.certificate"]):

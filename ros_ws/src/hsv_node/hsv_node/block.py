@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from array import array
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -12,7 +12,7 @@ from hsv_msgs.msg import Run
 
 from hsv.bags.description import TOPIC_OF, NodeDescription
 from hsv.bags.messages import StepMessages
-from hsv.base.errors import RunError, SignalError
+from hsv.base.errors import HsvError, RunError, SignalError
 from hsv.flight.blocks import Signals
 from hsv.flight.flight import step_statistics
 from hsv_node.lockstep import PeerNode
@@ -47,7 +47,28 @@ class BlockNode(PeerNode):
         self.component.reset()
 
     def stepped(self, signals: Signals) -> None:
-        """Called after each step; overridden to report on it."""
+        """Publish the diagnostics once per simulated second; overridden by nodes that report more."""
+        if self.diagnosis_due(signals):
+            self.diagnose(signals)
+
+    def serve(self, kind: Any, name: str, change: Callable[[Any], tuple[int, str]]) -> None:
+        """Offer a service that changes the flight.
+
+        Args:
+            kind: Type of the service, whose responses have ``success``, ``message`` and ``step``.
+            name: Name of the service.
+            change: Executes a request and returns the first changed step and the message; an error rejects it.
+        """
+
+        def respond(request: Any, response: Any) -> Any:
+            try:
+                response.step, response.message = change(request)
+                response.success = True
+            except HsvError as error:
+                response.message = str(error)
+            return response
+
+        self.create_service(kind, name, respond)
 
     def holds(self, step: int) -> bool:
         """Return whether ``step`` has to wait although its messages are there; overridden by a node that plans."""

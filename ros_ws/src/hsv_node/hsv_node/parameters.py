@@ -6,7 +6,8 @@ import difflib
 import math
 import sys
 from collections.abc import Iterable, Mapping
-from typing import Any
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
@@ -15,9 +16,17 @@ from rclpy.parameter import Parameter as RosParameter
 
 from hsv.bags.description import CONTROLLER, CONTROLLERS
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
-from hsv.base.errors import ParameterError
+from hsv.base.errors import DesignError, ParameterError
 from hsv.base.parameters import Parameter
 from hsv.model.vehicle import VEHICLE_PARAMETERS, named_parameters
+
+if TYPE_CHECKING:
+    from hsv.control.design import ControlDesign
+
+DEFAULT_DESIGN = "baseline"
+
+_LARGEST = 2**63 - 1
+"""Largest integer parameter of ROS."""
 
 
 def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -78,6 +87,29 @@ def declare_vehicle(node: Node) -> None:
         return
     name = {name: node._parameter_overrides[name].value for name in ("vehicle.name",) if given(node, name)}
     declare(node, VEHICLE_PARAMETERS, named_parameters(name))
+
+
+def declare_design(node: Node, extra: tuple[Parameter, ...] = ()) -> tuple[dict[str, Any], ControlDesign | None]:
+    """Declare ``extra`` and the parameters of a design on ``node``; return all values and the design in them.
+
+    Without parameters of a design the shipped one is used; ``design.name`` none flies without one. A warning says that
+    a design was modified since it was designed.
+
+    Raises:
+        ParameterError, DesignError: A wrong value, named.
+    """
+    from hsv.control.design import DESIGN_PARAMETERS, design_of, find_design, read_parameters
+
+    # A complete design is known by its digest; the shipped one then need not be parsed.
+    whole = given(node, "design.hash") or given(node, "design.name")
+    shipped = {}
+    with suppress(DesignError):  # an installation without designs
+        shipped = {} if whole else read_parameters(find_design(DEFAULT_DESIGN))
+    values = declare(node, (*extra, *DESIGN_PARAMETERS), shipped)
+    design = design_of(values)
+    if design and design.modified:
+        node.get_logger().warning(f"design {design.name!r}: modified since design")
+    return values, design
 
 
 def given(node: Node, name: str) -> bool:
@@ -145,21 +177,11 @@ def _descriptor(parameter: Parameter, kind: RosParameter.Type | None = None) -> 
     if kind is not None:
         descriptor.type = kind.value
     # ROS has ranges for single numbers only, with two ends; the constraint in words covers lists.
-    if math.isfinite(parameter.minimum) or math.isfinite(parameter.maximum):
-        if parameter.kind == "double":
-            largest = sys.float_info.max
-            descriptor.floating_point_range = [
-                FloatingPointRange(
-                    from_value=max(parameter.minimum, -largest), to_value=min(parameter.maximum, largest), step=0.0
-                )
-            ]
-        elif parameter.kind == "integer":
-            largest_integer = 2**63 - 1
-            descriptor.integer_range = [
-                IntegerRange(
-                    from_value=int(max(parameter.minimum, -largest_integer)),
-                    to_value=int(min(parameter.maximum, largest_integer)),
-                    step=1,
-                )
-            ]
+    limits = parameter.minimum, parameter.maximum
+    if parameter.kind == "double" and any(map(math.isfinite, limits)):
+        low, high = (min(max(limit, -sys.float_info.max), sys.float_info.max) for limit in limits)
+        descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high, step=0.0)]
+    elif parameter.kind == "integer" and any(map(math.isfinite, limits)):
+        low, high = (int(min(max(limit, -_LARGEST), _LARGEST)) for limit in limits)
+        descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=1)]
     return descriptor

@@ -9,7 +9,6 @@ from hsv_msgs.srv import ClearFault, InjectFault
 
 from hsv.bags.description import CLEAR_FAULT, COMMAND, FAULT_INJECTOR, INJECT_FAULT, controller_node
 from hsv.bags.messages import fault_in, stamp_in, stamp_of
-from hsv.base.errors import ParameterError
 from hsv.flight.blocks import Signals
 from hsv.model.faults.injector import DURATION, FAULT_PARAMETERS, LINK_PARAMETERS, FaultInjector
 from hsv.model.links import command_link
@@ -26,7 +25,7 @@ class FaultInjectorNode(BlockNode):
         super().__init__(FAULT_INJECTOR, "faults")
         values = declare(self, (*FAULT_PARAMETERS, *LINK_PARAMETERS))
         if not command_link(values, values["period"]).ideal:
-            # Of what only a link needs, an injector without one has none.
+            # Only a link needs the parameters of the vehicle.
             declare_vehicle(self)
             values = declare(self, FaultInjector.PARAMETERS)
         self._period = values["period"]
@@ -34,8 +33,8 @@ class FaultInjectorNode(BlockNode):
         self._due_step = 0
         """Next step for which a command is expected."""
         self.component = self._injector = FaultInjector.from_parameters(values)
-        self.create_service(InjectFault, INJECT_FAULT, self._inject)
-        self.create_service(ClearFault, CLEAR_FAULT, self._clear)
+        self.serve(InjectFault, INJECT_FAULT, self._inject)
+        self.serve(ClearFault, CLEAR_FAULT, self._clear)
 
     def start_run(self, run: Run) -> None:
         """Reset to step 0 and the scheduled faults."""
@@ -83,32 +82,22 @@ class FaultInjectorNode(BlockNode):
         if self.diagnosis_due(signals):
             self.diagnose(signals, "faults act" if signals.active_faults else "no fault")
 
-    def _inject(self, request: InjectFault.Request, response: InjectFault.Response) -> InjectFault.Response:
-        try:
-            fault = fault_in(request.fault)
-            DURATION.check(request.duration)
-            steps = first_step(request.duration, self._period) if request.duration else NEVER
-            response.step = self._injector.inject(fault, steps)
-        except ParameterError as error:
-            response.success, response.message = False, str(error)
-            return response
-        response.success = True
-        until = f" to step {response.step + steps - 1}" if request.duration else " on"
-        response.message = f"{fault} from step {response.step}{until}"
-        self.get_logger().info(response.message)
-        return response
+    def _inject(self, request: InjectFault.Request) -> tuple[int, str]:
+        fault = fault_in(request.fault)
+        DURATION.check(request.duration)
+        steps = first_step(request.duration, self._period) if request.duration else NEVER
+        step = self._injector.inject(fault, steps)
+        until = f" to step {step + steps - 1}" if request.duration else " on"
+        return self._logged(step, f"{fault} from step {step}{until}")
 
-    def _clear(self, request: ClearFault.Request, response: ClearFault.Response) -> ClearFault.Response:
-        try:
-            response.step = self._injector.clear(request.channel, request.type)
-        except ParameterError as error:
-            response.success, response.message = False, str(error)
-            return response
-        response.success = True
+    def _clear(self, request: ClearFault.Request) -> tuple[int, str]:
+        step = self._injector.clear(request.channel, request.type)
         what = f"no {request.type or 'fault'} of {request.channel or 'any channel'}"
-        response.message = f"{what} from step {response.step} on"
-        self.get_logger().info(response.message)
-        return response
+        return self._logged(step, f"{what} from step {step} on")
+
+    def _logged(self, step: int, words: str) -> tuple[int, str]:
+        self.get_logger().info(words)
+        return step, words
 
 
 main = partial(run_node, FaultInjectorNode, "fault_injector")

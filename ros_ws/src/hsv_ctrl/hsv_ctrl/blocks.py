@@ -1,28 +1,41 @@
-"""The node of custom controllers, registered or named by their class."""
+"""Nodes that only step their block: the notch filter, and custom controllers."""
 
 from __future__ import annotations
 
 from functools import partial
 
-from hsv.bags.description import CONTROLLER, CONTROLLERS
+from hsv.bags.description import CONTROLLER, CONTROLLERS, NOTCH_FILTER
 from hsv.base.errors import ParameterError
 from hsv.control.controllers import NODE, build_controller, controller_class
+from hsv.control.estimator import ESTIMATOR_ENABLED
+from hsv.control.notch_filter import NOTCH_PARAMETERS, NotchFilter
 from hsv.flight.blocks import Signals
-from hsv.graph.node_parameters import NODE_PARAMETERS
-from hsv_ctrl.design import declare_design
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
-from hsv_node.parameters import given
+from hsv_node.parameters import declare, declare_design, declare_vehicle, given
+
+
+class NotchFilterNode(BlockNode):
+    """A node that publishes the filtered state for each measurement."""
+
+    def __init__(self) -> None:
+        super().__init__(NOTCH_FILTER, "filter")
+        if self.estimator:
+            declare_vehicle(self)
+        table = NotchFilter.PARAMETERS if self.estimator else NOTCH_PARAMETERS
+        self.component = NotchFilter.from_parameters(declare(self, (*table, ESTIMATOR_ENABLED)))
 
 
 class ControllerNode(BlockNode):
     """A node that steps the controller named by the parameter ``controller``: a registered one, or a class.
 
     Raises:
-        ParameterError: It names none, or one with a node of its own; or a parameter is wrong, named.
+        ParameterError: The name is unknown or that of a controller with its own node; or a parameter is wrong, named.
     """
 
     def __init__(self) -> None:
+        from hsv.graph.node_parameters import NODE_PARAMETERS  # imports the components of all nodes
+
         super().__init__(CONTROLLER, "controller")
         name = self.controller
         if name in CONTROLLERS or name.startswith(NODE):
@@ -30,16 +43,17 @@ class ControllerNode(BlockNode):
             raise ParameterError(
                 f"parameter controller = {name!r}: expected one that is not a separate node, the {node} flies it"
             )
-        # It may look at whatever else is known of the flight: as far as this node is told, it has it, too.
+        # A custom controller may use every parameter of the flight that this node is given.
         flight = {p.name: p for table in NODE_PARAMETERS.values() for p in table if given(self, p.name)}
         own = {p.name: p for p in controller_class(name).PARAMETERS}
         values, design = declare_design(self, tuple((flight | own).values()))
         self.component = build_controller(values | {"controller": name}, design)
 
     def stepped(self, signals: Signals) -> None:
-        """Report whether its command is limited."""
+        """Report whether the command is limited."""
         if self.diagnosis_due(signals):
             self.diagnose(signals, saturated=bool(signals.saturated.any()))
 
 
-main = partial(run_node, ControllerNode, CONTROLLER.name)
+notch_filter = partial(run_node, NotchFilterNode, NOTCH_FILTER.name)
+controller = partial(run_node, ControllerNode, CONTROLLER.name)
