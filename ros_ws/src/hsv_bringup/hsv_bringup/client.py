@@ -57,11 +57,7 @@ class GraphClient(Node):
         super().__init__(f"hsv_{name}", enable_rosout=False, start_parameter_services=False)
 
     def find_run(self) -> Run:
-        """Return the current run of the plant.
-
-        Raises:
-            RunError: There is no run.
-        """
+        """Return the current run of the plant."""
         runs: list[Run] = []
         name = self._name_of(PLANT, roles.published, Run)
         if name:
@@ -71,11 +67,7 @@ class GraphClient(Node):
         return runs[-1]
 
     def topic_of(self, role: NodeDescription, kind: type) -> str:
-        """Return the full name of the topic of message type ``kind`` published by the node in ``role``.
-
-        Raises:
-            RunError: There is no such node.
-        """
+        """Return the full name of the topic of message type ``kind`` published by the node in ``role``."""
         return self._name_of(role, roles.published, kind) or self._refuse_absent(role)
 
     @property
@@ -85,11 +77,7 @@ class GraphClient(Node):
         return f"ROS_DOMAIN_ID={self.context.get_domain_id()}{f', namespace {namespace}' if namespace != '/' else ''}"
 
     def call(self, role: NodeDescription, kind: Any, request: Any) -> Any:
-        """Call the service of type ``kind`` of the node in ``role`` and return the reply.
-
-        Raises:
-            RunError: There is no such node, or it does not answer.
-        """
+        """Call the service of type ``kind`` of the node in ``role`` and return the reply."""
         service = self._name_of(role, roles.services, kind) or self._refuse_absent(role)
         client = self.create_client(kind, service)
         if self.wait_for(client.service_is_ready, service):
@@ -237,11 +225,7 @@ def answer(text: str, values: Mapping[str, Any], as_json: bool) -> None:
 
 
 def acting_from(run: Run, step: int) -> tuple[str, dict[str, Any]]:
-    """Return the time at which a change at ``step`` takes effect, as text and as numbers.
-
-    Raises:
-        RunError: The run ends before this step.
-    """
+    """Return the time at which a change at ``step`` takes effect, as text and as numbers."""
     if step > run.last_step:
         raise RunError(f"the run ends with step {run.last_step}: what begins at step {step} does not act any more")
     time = step * run.period

@@ -35,11 +35,7 @@ class Decoder:
     """Conversion of the messages of a type to columns with units, by the installed definition."""
 
     def __init__(self, topic: str, kind: str) -> None:
-        """Read the definition.
-
-        Raises:
-            RecordingError: It is not installed.
-        """
+        """Read the definition."""
         self._topic, self._kind = topic, kind
         text = definition(kind)
         self._types = message_types([(kind, text)], topic)
@@ -77,11 +73,7 @@ def _print_topics(client: GraphClient, options: argparse.Namespace) -> None:
 
 
 def _topics(client: GraphClient, name: str = "") -> dict[str, list[str]]:
-    """Return the topics of the domain with their types, when all are known or ``name`` is published.
-
-    Raises:
-        RunError: No node of a graph is there.
-    """
+    """Return the topics of the domain with their types, when all are known or ``name`` is published."""
 
     def enough() -> bool:
         return bool(name and client.count_publishers(name))
@@ -131,11 +123,7 @@ def _print_messages(client: GraphClient, options: argparse.Namespace) -> None:
 
 
 def _resolved(client: GraphClient, name: str) -> str:
-    """Return the full name that a topic has for this node.
-
-    Raises:
-        ParameterError: It is none by the rules of ROS 2.
-    """
+    """Return the full name that a topic has for this node."""
     try:
         return str(client.resolve_topic_name(name))
     except rclpy_implementation.RCLError as error:
@@ -145,11 +133,7 @@ def _resolved(client: GraphClient, name: str) -> str:
 
 
 def _messages(client: GraphClient, name: str, received: list[bytes]) -> Iterator[bytes]:
-    """Yield the messages of a topic as they arrive, as long as it has a publisher.
-
-    Raises:
-        RunError: None has come.
-    """
+    """Yield the messages of a topic as they arrive, as long as it has a publisher."""
     came = False
     while client.wait_for(lambda: received or not client.count_publishers(name), f"a message on {name}", for_ever=True):
         if not received:

@@ -37,9 +37,6 @@ def check_names(words: Sequence[str], several: bool) -> None:
     Args:
         words: The arguments.
         several: Whether the process has several nodes, which one name would make indistinguishable.
-
-    Raises:
-        ParameterError: A namespace or node name that is none by the rules of ROS 2.
     """
     for flag, rule in pairwise(_ros_arguments(words)):
         if flag not in ("-r", "--remap"):

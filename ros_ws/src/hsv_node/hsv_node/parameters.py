@@ -77,9 +77,6 @@ def declare_vehicle(node: Node) -> None:
     """Declare the vehicle's parameters on ``node``.
 
     A parameter that is not given has the value of the vehicle named by ``vehicle.name``.
-
-    Raises:
-        ParameterError, VehicleError: A wrong value, named, or no vehicle of that name.
     """
     # Skip the look-up for a vehicle that is given completely, because importing the units takes time.
     if all(given(node, parameter.name) for parameter in VEHICLE_PARAMETERS):
@@ -94,9 +91,6 @@ def declare_design(node: Node, extra: tuple[Parameter, ...] = ()) -> tuple[dict[
 
     Without parameters of a design the shipped one is used; ``design.name`` none flies without one. A warning says that
     a design was modified since it was designed.
-
-    Raises:
-        ParameterError, DesignError: A wrong value, named.
     """
     from hsv.control.design import DESIGN_PARAMETERS, design_of, find_design, read_parameters
 
@@ -118,11 +112,7 @@ def given(node: Node, name: str) -> bool:
 
 
 def refuse_sim_time(node: Node) -> None:
-    """Refuse ``use_sim_time`` for a node that publishes the clock.
-
-    Raises:
-        ParameterError: It was given ``use_sim_time``.
-    """
+    """Refuse ``use_sim_time`` for a node that publishes the clock."""
     refusal = f"parameter use_sim_time = True: expected false for {node.get_name()}, which makes the clock itself"
     if node.get_parameter("use_sim_time").value:
         raise ParameterError(refusal)
@@ -141,9 +131,6 @@ def refuse_unknown(node: Node, role: str, of_others: frozenset[str]) -> None:
         node: A new node, with no more than what ROS has declared.
         role: Its role, whose parameters it will declare; empty for none.
         of_others: Names that may be there for other nodes of the graph: the files of a run address all of them.
-
-    Raises:
-        ParameterError: A parameter that the node does not have, named with the nearest one.
     """
     if not node._parameter_overrides:
         return

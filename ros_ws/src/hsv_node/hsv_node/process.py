@@ -38,20 +38,12 @@ class ProcessNode(Node):
         self._claims: list[socket.socket] = []
 
     def claim_name(self, expected: str) -> None:
-        """Reserve the full name of this node, because two nodes of one name cannot be distinguished.
-
-        Raises:
-            RunError: Another node of this machine has it; ``expected`` says what is due.
-        """
+        """Reserve the full name of this node, because two nodes of one name cannot be distinguished."""
         name = self.get_fully_qualified_name()
         self._keep("node", name, f"another node is called {name}", expected)
 
     def claim(self, topic: str, expected: str) -> None:
-        """Reserve a topic for this node before it publishes.
-
-        Raises:
-            RunError: Another node of this machine has it; ``expected`` says what is due.
-        """
+        """Reserve a topic for this node before it publishes."""
         name = self.resolve_topic_name(topic)
         self._keep("topic", name, f"another node publishes {name}", expected)
 

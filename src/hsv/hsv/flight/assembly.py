@@ -37,20 +37,12 @@ _FIELDS = {
 
 
 def scenario_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the flat parameters of ``scenario`` with those of a custom controller, which is loaded.
-
-    Raises:
-        ParameterError, QuantityError: Names the value that the controller does not admit.
-    """
+    """Return the flat parameters of ``scenario`` with those of a custom controller, which is loaded."""
     return scenario.parameters() | own_parameters(scenario)
 
 
 def own_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the flat parameters of a custom controller, which is loaded; a shipped one or a node has none.
-
-    Raises:
-        ParameterError, QuantityError: Names the value that the controller does not admit.
-    """
+    """Return the flat parameters of a custom controller, which is loaded; a shipped one or a node has none."""
     if scenario.controller in SHIPPED_CONTROLLERS:
         return {}
     if scenario.controller.startswith(NODE):
@@ -61,20 +53,12 @@ def own_parameters(scenario: Scenario) -> dict[str, Any]:
 
 
 def design_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the parameters in the file of the scenario's design; empty if it has none.
-
-    Raises:
-        DesignError: There is no such design, or its file cannot be read.
-    """
+    """Return the parameters in the file of the scenario's design; empty if it has none."""
     return read_parameters(find_design(scenario.design)) if scenario.design else {}
 
 
 def flight_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the design's parameters, overridden by those of ``scenario``; :func:`assemble` checks them.
-
-    Raises:
-        DesignError, ParameterError, QuantityError: As above.
-    """
+    """Return the design's parameters, overridden by those of ``scenario``; :func:`assemble` checks them."""
     return {**design_parameters(scenario), **scenario_parameters(scenario)}
 
 
@@ -82,9 +66,6 @@ def assemble(values: Mapping[str, Any], design: ControlDesign | None = None) -> 
     """Return the five components that these parameters describe; each checks its own parameters.
 
     ``design``: the one in ``values``, if the caller has read it.
-
-    Raises:
-        ParameterError, DesignError, TrimError: Names the parameter that is wrong.
     """
     design = design or design_of(values)
     return Components(**{block.name: block.build(values, design) for block in LOOP})

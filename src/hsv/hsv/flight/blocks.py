@@ -113,9 +113,6 @@ class Block:
         Args:
             values: Flat parameters.
             design: The design in ``values``, if it is known already.
-
-        Raises:
-            ParameterError, DesignError, TrimError: A wrong value, named.
         """
         module, _, path = self.built_by.partition(":")
         build = attrgetter(path)(import_module(module))
@@ -219,11 +216,7 @@ LOOP = (VEHICLE, NOTCH_FILTER, NOMINAL_TRAJECTORY, CONTROLLER, FAULT_INJECTOR)
 
 
 def steps(components: Components) -> Iterator[Signals]:
-    """Simulate ``components`` from the start and yield the signals of every step; the object is the same each time.
-
-    Raises:
-        RunError: A custom controller failed.
-    """
+    """Simulate ``components`` from the start and yield the signals of every step; the object is the same each time."""
     signals = Signals()
     for block in LOOP:
         getattr(components, block.name).reset()

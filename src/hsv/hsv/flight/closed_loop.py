@@ -106,9 +106,6 @@ def fly_into(history: History, components: Components) -> tuple[int, dict[str, S
 
     Returns:
         The number of steps, and :attr:`hsv.flight.flight.Flight.law_times`.
-
-    Raises:
-        ControllerError, ParameterError: As for :func:`fly`.
     """
     law, controller = components.nominal_trajectory.law, components.controller
     callbacks = {}

@@ -56,11 +56,7 @@ class LoadedLibrary:
         return getattr(self, name)(*arguments, **(kept or {}))
 
     def describe(self, symbol: str) -> CBlock:
-        """Load the library on first use and return its block ``symbol``.
-
-        Raises:
-            ParameterError: The library or the block cannot be loaded.
-        """
+        """Load the library on first use and return its block ``symbol``."""
         return self._load(self._path, symbol)
 
     def fly(self, rows: int, **parts: Any) -> int:
@@ -69,9 +65,6 @@ class LoadedLibrary:
         Args:
             rows: Maximum number of steps.
             parts: Fields of :class:`hsv.flight.closed_loop.Components`.
-
-        Raises:
-            ControllerError: The library's function returned an error.
         """
         components = Components(**parts)
         assert isinstance(components.controller, LibraryController)
@@ -81,11 +74,7 @@ class LoadedLibrary:
     def step(
         self, symbol: str, k: int, inputs: np.ndarray, state: np.ndarray, parameters: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Call the step function of the library; return the unsaturated input (2) and the state after the step.
-
-        Raises:
-            RunError: The function returned an error.
-        """
+        """Call the step function of the library; return the unsaturated input (2) and the state after the step."""
         u_unsaturated = call_step_function(self.describe(symbol).address, k, inputs, state, parameters)
         return u_unsaturated, state
 

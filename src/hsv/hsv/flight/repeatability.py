@@ -42,11 +42,7 @@ class Finding:
 
 
 def scenario_of(name: str) -> Scenario:
-    """Return the scenario with this name or path, or the default one with the controller of this name.
-
-    Raises:
-        ScenarioError: Names what is wrong with it.
-    """
+    """Return the scenario with this name or path, or the default one with the controller of this name."""
     if name in scenario_names() or name.endswith(".toml"):
         return load_scenario(name)
     return load_scenario(FLOWN_BY_DEFAULT, {"controller": name})

@@ -223,11 +223,7 @@ def _own_text(name: str) -> str:
 
 
 def scenario_table(text: str, name: str) -> dict[str, Any]:
-    """Return the table of a scenario's ``text``; a vehicle given by its name becomes a table.
-
-    Raises:
-        ScenarioError: The text is not TOML, or vehicle or controller have a wrong type.
-    """
+    """Return the table of a scenario's ``text``; a vehicle given by its name becomes a table."""
     try:
         table = parse_toml(text)
     except DocumentError as error:
@@ -277,11 +273,7 @@ def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Sce
 
 
 def set_field(table: dict[str, Any], field: str, value: object, name: str) -> None:
-    """Set a ``field`` of the scenario in ``table`` to a value as written in a file.
-
-    Raises:
-        ScenarioError: The scenario, which is called ``name``, has no such field.
-    """
+    """Set a ``field`` of the scenario in ``table`` to a value as written in a file."""
     *path, key = (int(part) if part.isdecimal() else part for part in re.findall(r"[^.\[\]]+", field) or [""])
     place: Any = table
     for part in path:
@@ -297,11 +289,7 @@ def set_field(table: dict[str, Any], field: str, value: object, name: str) -> No
 
 
 def with_controller(text: str, controller: str, name: str) -> str:
-    """Return a scenario's ``text`` with another controller, without the tables of the former one.
-
-    Raises:
-        ScenarioError: The text of the scenario called ``name`` is not TOML.
-    """
+    """Return a scenario's ``text`` with another controller, without the tables of the former one."""
     table = scenario_table(text, name)
     kept = {key: value for key, value in table.items() if key not in (*_CONTROLLER_TABLES, *_custom_tables(table))}
     return tomli_w.dumps(kept | {"controller": controller})
@@ -317,11 +305,7 @@ def parse_scenario(text: str, name: str) -> Scenario:
 
 
 def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[str, Distribution]]:
-    """Return the scenario in ``table`` with the mean of each distribution, and the distributions by field.
-
-    Raises:
-        ScenarioError: As :func:`load_scenario`; or the vehicle is in another file, which is not read.
-    """
+    """Return the scenario in ``table`` with the mean of each distribution, and the distributions by field."""
     complete = table
     vehicle = table.get("vehicle", {})
     if is_path(vehicle.get("name", "")) and "definition" not in vehicle:

@@ -116,9 +116,6 @@ def fly_perturbed(
         perturbations: Relative changes of the vehicle's parameters, of one flight each.
         job: Takes a perturbation and its flight.
         progress: Called with the number of flights done.
-
-    Raises:
-        ControllerError, ParameterError: As :func:`hsv.flight.closed_loop.fly`.
     """
     width = lanes()
 

@@ -38,20 +38,12 @@ class Reading:
     """Distributions, by the identity of the table in which they are written"""
 
     def distribution(self, table: dict[str, Any], unit: str, name: str, *, whole: bool = False) -> Distribution:
-        """Return the distribution in ``table``, and record it.
-
-        Raises:
-            QuantityError: The table is no distribution of a quantity in ``unit``; the message begins with ``name``.
-        """
+        """Return the distribution in ``table``, and record it."""
         found = self.drawn[id(table)] = read_distribution(table, unit, name, whole=whole)
         return found
 
     def number(self, parameter: Parameter, value: object, name: str) -> float:
-        """Return a number in a file, or the mean of a distribution in its place.
-
-        Raises:
-            ScenarioError, ParameterError, QuantityError: The ``parameter`` does not admit it.
-        """
+        """Return a number in a file, or the mean of a distribution in its place."""
         if not isinstance(value, dict):
             return read_number(parameter, value, name)
         drawn = self.distribution(value, parameter.unit or "1", name, whole=parameter.whole)
@@ -75,11 +67,7 @@ class Reading:
         return written(drawn.middle, drawn.unit)
 
     def fault(self, name: str, row: dict[str, Any]) -> dict[str, Any]:
-        """Return a fault of a file in the form of :class:`FaultTable`, with its parameters in a nested table.
-
-        Raises:
-            ScenarioError, QuantityError: Names the field that is wrong.
-        """
+        """Return a fault of a file in the form of :class:`FaultTable`, with its parameters in a nested table."""
         common = {key: row[key] for key in FaultTable.model_fields if key in row and key != "parameters"}
         channel, kind = (row.get(key) for key in ("channel", "type"))
         if not (isinstance(channel, str) and isinstance(kind, str)):
@@ -295,11 +283,7 @@ def breakpoints(altitude: float, velocity: float, commands: Sequence[CommandTabl
 
 
 def check_envelope(reference: Breakpoints, commands: Sequence[CommandTable], vehicle: Vehicle) -> None:
-    """Refuse commands that lead out of the flight envelope of ``vehicle``.
-
-    Raises:
-        ScenarioError: Names the command.
-    """
+    """Refuse commands that lead out of the flight envelope of ``vehicle``."""
     ranges = vehicle.altitude_range, vehicle.velocity_range
     axes = zip(("altitude", "velocity"), reference[1:], ranges, ("m", "m/s"), strict=True)
     for axis, goals, limits, unit in axes:

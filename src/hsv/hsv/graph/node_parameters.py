@@ -34,11 +34,7 @@ def _designed(own: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
 
 
 def own_parameters(controller: str) -> tuple[Parameter, ...]:
-    """Return the parameters of the node that flies a controller, whose class is loaded.
-
-    Raises:
-        ParameterError: There is no such controller, or it cannot be loaded.
-    """
+    """Return the parameters of the node that flies a controller, whose class is loaded."""
     return _designed(tuple(controller_class(controller).PARAMETERS))
 
 
@@ -69,11 +65,7 @@ _TRUTH = {"true": True, "false": False}
 
 
 def find(name: str) -> tuple[NodeDescription, Parameter]:
-    """Return the node and the parameter that a full name, or the last word of one, means.
-
-    Raises:
-        ParameterError: None that may change in flight.
-    """
+    """Return the node and the parameter that a full name, or the last word of one, means."""
     found = [entry for full, entry in SETTABLE.items() if name in (full, full.rpartition(".")[2])]
     if len(found) != 1:
         raise ParameterError(f"name = {name!r}: expected a parameter that may change in flight, {', '.join(SETTABLE)}")
@@ -81,11 +73,7 @@ def find(name: str) -> tuple[NodeDescription, Parameter]:
 
 
 def parse(text: str, parameter: Parameter) -> bool | float | list[float]:
-    """Return the value in ``text``: numbers with their units between commas, in brackets or not; true or false.
-
-    Raises:
-        QuantityError, ParameterError: It is none that the parameter takes.
-    """
+    """Return the value in ``text``: numbers with their units between commas, in brackets or not; true or false."""
     if parameter.kind == "bool":
         return bool(parameter.check(_TRUTH.get(text.strip().lower(), text)))
     words = text.strip().removeprefix("[").removesuffix("]").split(",")

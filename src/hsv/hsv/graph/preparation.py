@@ -74,11 +74,7 @@ class RunOptions:
     """Whether the flight starts paused."""
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            QuantityError: ``real_time_factor`` or ``step_timeout`` is out of range.
-        """
+        """Check the numbers."""
         if self.real_time_factor is not None and not 0.0 <= self.real_time_factor <= 1000.0:
             raise QuantityError(f"real-time-factor = {self.real_time_factor}: expected 0 (as fast as possible) to 1000")
         if self.step_timeout is not None and not 0.1 <= self.step_timeout <= 1e6:
@@ -188,11 +184,7 @@ def prepare(
 
 
 def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:
-    """Return the nodes to start for a flight with ``controller``; the last one ends the run.
-
-    Raises:
-        ParameterError: The controller is a node that cannot be found.
-    """
+    """Return the nodes to start for a flight with ``controller``; the last one ends the run."""
     node = controller_node(controller)
     if node.executable and node.foreign:
         try:

@@ -48,12 +48,7 @@ def replay_all(
 
 
 def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progress) -> Iterator[ProcessComparison]:
-    """Repeat the run of the whole graph and compare every step topic.
-
-    Raises:
-        RecordingError: A topic is missing; no process has been started.
-        RunError: A process failed; its last words are in the message.
-    """
+    """Repeat the run of the whole graph and compare every step topic."""
     require(bag, step_topics(controller))
     with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
         repeated = Path(folder, "rerun")

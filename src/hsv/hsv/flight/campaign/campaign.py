@@ -97,15 +97,11 @@ class Campaign:
         return names if all(factor.is_perturbation for factor in self.factors) else ()
 
     def flown(self, flight: int, sample: Sequence[float]) -> Scenario:
-        """Return the scenario of a flight with its sample (one value a factor).
-
-        Raises:
-            ScenarioError: The scenario does not admit these values together.
-        """
+        """Return the scenario of a flight with its sample (one value a factor)."""
         return scenario_at_means(self._flown_table(flight, sample), self.scenario_name)[0]
 
     def file(self, flight: int, sample: Sequence[float], **replaced: str) -> str:
-        """Return the scenario of a flight with its sample as a file, with errors as above.
+        """Return the scenario of a flight with its sample as a file.
 
         Args:
             flight: Number of the flight.
@@ -292,9 +288,6 @@ def _factors(scenario: Scenario, drawn: Mapping[str, Distribution], scale: float
         scenario: The scenario without any change.
         drawn: Its distributions by field, which replace the bounds of a parameter.
         scale: As for :func:`plan`.
-
-    Raises:
-        CampaignError: Nothing varies, or ``scale`` is not admissible.
     """
     if not 0.0 <= scale <= 10.0:
         raise CampaignError(f"scale = {scale}: expected 0 to 10")

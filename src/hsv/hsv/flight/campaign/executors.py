@@ -107,11 +107,7 @@ class _PoolExecutor(Executor, ABC):
                 future.cancel()
 
     def _alone(self, job: Job, text: str, batch: int, label: Callable[[int], str]) -> bytes:
-        """Return the result of a batch that is flown with no other batch in flight.
-
-        Raises:
-            RunError: The batch ends its process; its name is in the message.
-        """
+        """Return the result of a batch that is flown with no other batch in flight."""
         for _ in range(2):  # the first time, it may have been a process that had nothing to do
             future = self._submit(job, text, batch)
             try:
@@ -155,11 +151,7 @@ class ProcessExecutor(_PoolExecutor):
     """
 
     def __init__(self, workers: int, notice: Notice = lambda words: None) -> None:
-        """Start the processes.
-
-        Raises:
-            RunError: They cannot be started.
-        """
+        """Start the processes."""
         super().__init__(notice)
         self.cores = workers
         self._folder = TemporaryDirectory(prefix="hsv_results_")
@@ -388,11 +380,7 @@ def program() -> str:
 
 
 def _check_workers(client: Any, address: str) -> None:
-    """Refuse the scheduler at ``address`` if one of its workers has another program, or none.
-
-    Raises:
-        CampaignError: Names the worker, and what it has.
-    """
+    """Refuse the scheduler at ``address`` if one of its workers has another program, or none."""
 
     def worker_program() -> str:
         # A local function travels by value: the worker may not have the library.

@@ -186,11 +186,7 @@ def locked(path: Path, complaint: str) -> Iterator[None]:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file atomically.
-
-    Raises:
-        CampaignError: It cannot be written.
-    """
+    """Write a file atomically."""
     temporary = path.with_name(path.name + ".unfinished")
     with writing(path, temporary):
         temporary.write_bytes(content)

@@ -140,9 +140,6 @@ class SampleRunner:
         """Fly ``flights`` with their ``samples`` (flights, factors), side by side if possible.
 
         Each reading is valid until the next one. A controller that fails yields its error in place of the reading.
-
-        Raises:
-            ScenarioError: As :meth:`fly`.
         """
         width = lanes()
         for start in range(0, len(flights), width):
@@ -159,11 +156,7 @@ class SampleRunner:
         return fly(self._variants.unchanged)
 
     def flight_time(self) -> float:
-        """Return about how long (s) a flight takes, measured with the scenario itself.
-
-        Raises:
-            ControllerError: A custom controller failed.
-        """
+        """Return about how long (s) a flight takes, measured with the scenario itself."""
         self._time(1)  # builds what the flights share
         seconds = self._time(min(_FIRST_STEPS, self.steps))
         return seconds if seconds > _LONG else self._time(self.steps)
@@ -186,11 +179,7 @@ class SampleRunner:
         }
 
     def fly_batch(self, batch: int) -> bytes:
-        """Fly a batch; return its rows and envelope as a Parquet file.
-
-        Raises:
-            ScenarioError: As :meth:`fly`.
-        """
+        """Fly a batch; return its rows and envelope as a Parquet file."""
         flights, envelope, rows = self.campaign.flights(batch), Envelope.empty(), []
         samples, seeds = self.campaign.draw(flights)
         for flight, sample, seed, flown in zip(flights, samples, seeds, self.fly_all(flights, samples), strict=True):

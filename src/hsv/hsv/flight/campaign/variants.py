@@ -35,9 +35,6 @@ class FlightVariants:
         Args:
             scenario: Scenario of the flight that is varied.
             design: Flat parameters of the controller's design.
-
-        Raises:
-            ScenarioError: The scenario is not acceptable; the message names the field.
         """
         self._parameters = dict(design)
         self._design = design_of(design)
@@ -48,11 +45,7 @@ class FlightVariants:
         self._vehicle, _ = initial_trim(self._nominal)
 
     def components(self, scenario: Scenario) -> Components:
-        """Return the components of the flight of another ``scenario`` with the same design.
-
-        Raises:
-            ParameterError, DesignError, TrimError: Names the parameter that is wrong.
-        """
+        """Return the components of the flight of another ``scenario`` with the same design."""
         values = {**self._parameters, **scenario_parameters(scenario)}
         names = values.keys() | self._nominal.keys()
         changed = [name for name in names if values.get(name) != self._nominal.get(name)]

@@ -84,16 +84,12 @@ class SubjectRunner:
         self._without: dict[int, FlightData] = {}
 
     def fly(self, vehicle: int, fault: TriedFault | None = None, value: float = 0.0) -> Flight:
-        """Fly with a fault, or without.
-
-        Raises:
-            ControllerError: The controller failed.
-        """
+        """Fly with a fault, or without."""
         text = self._subject.file(self._moment, vehicle, fault, value)
         return fly(self._variants.components(parse_scenario(text, self._subject.name)))
 
     def without(self, vehicle: int) -> FlightData:
-        """Return the flight without a fault for comparison; errors as for :meth:`fly`."""
+        """Return the flight without a fault for comparison."""
         if vehicle not in self._without:
             self._without[vehicle] = self.fly(vehicle).data()
         return self._without[vehicle]
