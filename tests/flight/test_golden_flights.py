@@ -20,7 +20,7 @@ from hsv.flight.blocks import steps
 from hsv.flight.closed_loop import fly
 from hsv.flight.fingerprint import fingerprint
 from hsv.flight.scenario import parse_scenario
-from hsv.flight.side_by_side import FlightGroup, fly_group
+from hsv.flight.side_by_side import FlightGroup
 
 LINES = (Path(__file__).parents[1] / "golden" / "scenarios.jsonl").read_text().splitlines()
 PARTS = 20
@@ -71,7 +71,7 @@ def compare_three_ways(indices):
         if lanes() > 1:
             group = variants(parts)
             assert FlightGroup.takes(group)
-            *others, same = fly_group(FlightGroup(parts.plant.steps + 1), group)
+            *others, same = (flight for flight, _ in FlightGroup().fly(group))
             check(same, expected)
             assert [each.fingerprint for each in others] == [fly(each).fingerprint for each in group[:-1]], index
 

@@ -12,7 +12,7 @@ from hsv.flight.campaign.campaign import plan
 from hsv.flight.campaign.sample_runner import SampleRunner
 from hsv.flight.closed_loop import fly
 from hsv.flight.metrics import flight_metrics
-from hsv.flight.side_by_side import FlightGroup, fly_group
+from hsv.flight.side_by_side import FlightGroup, TubeLevels
 
 WIDTH = lanes()
 SHORT = 112.0
@@ -20,11 +20,16 @@ SHORT = 112.0
 pytestmark = pytest.mark.skipif(WIDTH == 1, reason="this processor flies one at a time")
 
 
-def check(flights):
+def check(flights, group=None):
     """Check that these flights are the same side by side and alone; return them alone."""
     assert FlightGroup.takes(flights)
     alone = [fly(own) for own in flights]
-    for together, own in zip(fly_group(FlightGroup(flights[0].plant.steps + 1), flights), alone, strict=True):
+    group, levels = FlightGroup() if group is None else group, TubeLevels(flights[0])
+    for (together, level), own in zip(group.fly(flights, levels.set), alone, strict=True):
+        if levels.set:
+            assert level == pytest.approx(levels.worst(own.data()), rel=0, abs=0, nan_ok=True)
+        for name in ("curves", "saturated"):
+            assert np.array_equal(getattr(together.curves, name), getattr(own.data(), name), equal_nan=True), name
         assert together.fingerprint == own.fingerprint
         assert together.status == own.status and len(together.time) == len(own.time)
         for name, column in own.history.columns().items():
@@ -52,6 +57,15 @@ def test_a_flight_that_diverges_ends_alone_and_disturbs_no_other():
     lengths = [len(own.time) for own in flown]
     assert lengths[1] == lengths[-1] < lengths[0] == 1001
     assert all(length == 1001 for i, length in enumerate(lengths) if i not in (1, WIDTH - 1))
+
+
+def test_a_group_forgets_its_last_flights():
+    parts, group = components("case1", duration=20.0), FlightGroup()
+    ended = check([parts.perturbed({"moment_elevator": -0.85})] * WIDTH, group)
+    assert max(len(own.time) for own in ended) < 1001
+    assert {len(own.time) for own in check([parts.perturbed({"mass": 0.01 * i}) for i in range(3)], group)} == {1001}
+    parts.plant.steps = 0
+    assert len(check([parts.perturbed({"mass": 0.01 * i}) for i in range(WIDTH)], group)[0].time) == 1
 
 
 COMMAND_FAULTS = (

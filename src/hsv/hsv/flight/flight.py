@@ -12,7 +12,7 @@ import numpy as np
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.flight.fingerprint import fingerprint
 from hsv.flight.history import History
-from hsv.flight.metrics import FlightData, flight_metrics
+from hsv.flight.metrics import FlightCurves, FlightData, flight_metrics, read_curves
 from hsv.model.dynamics import in_model_range
 from hsv.model.plant import FlightStatus
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES, NEVER, STATE_NAMES, STATE_UNITS
@@ -77,7 +77,14 @@ class Flight:
     @cached_property
     def metrics(self) -> dict[str, float]:
         """The metrics that the flight defines, SI, by the names in :data:`hsv.flight.metrics.METRICS`."""
-        return flight_metrics(self.data())
+        return flight_metrics(self.curves)
+
+    @property
+    def curves(self) -> FlightCurves:
+        """The curves from which metrics are computed."""
+        history = self.history
+        curves = read_curves(history.signals, history.auxiliary, self.reference)
+        return FlightCurves(self.time, *curves, self.fault_start)
 
     def __repr__(self) -> str:
         steps = len(self.history.signals) - 1

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hsv.core import doubles, ffi, lib
 from hsv.flight.history import ACTUATOR, AUXILIARY_COLUMNS, Q_F, SIGNAL_COLUMNS, U_N, U_UNSATURATED, X_N, U, X
+from hsv.model.signals import N_INPUTS
 
 SETTLING_BAND = 0.02
 """Largest error of a settled response, as a share of the step."""
@@ -168,30 +169,22 @@ class FlightData:
         signals, auxiliary = np.zeros((rows, SIGNAL_COLUMNS)), np.zeros((rows, AUXILIARY_COLUMNS))
         signals[:, X:Q_F], signals[:, X_N:U_N], signals[:, U:ACTUATOR] = self.state, self.deviation, self.command
         auxiliary[:, U_UNSATURATED:] = self.unlimited
-        curves, saturated = np.empty((CURVES, rows)), np.empty(self.command.shape, bool)
-        read_curves(signals, auxiliary, np.ascontiguousarray(self.reference, float), curves, saturated)
-        return FlightCurves(self.time, curves, saturated, self.fault_start)
+        return FlightCurves(self.time, *read_curves(signals, auxiliary, self.reference), self.fault_start)
 
 
-def read_curves(
-    signals: np.ndarray, auxiliary: np.ndarray, reference: np.ndarray, curves: np.ndarray, saturated: np.ndarray
-) -> None:
-    """Compute the curves of a history with ``core/metrics.h``.
+def read_curves(signals: np.ndarray, auxiliary: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the curves (10, n) of a history and the mask (n, 2) of the limited commands.
 
     Args:
         signals: (n, 25) see :class:`hsv.flight.history.History`.
         auxiliary: (n, 3) see there.
         reference: (n, 9) x_r.
-        curves: (10, n) output; may be columns of a longer array.
-        saturated: (n, 2) output, mask of the limited commands.
     """
-    stride = curves.strides[0] // curves.itemsize
-    inputs = map(doubles, (signals, auxiliary, reference))
-    lib.hsv_curves(len(signals), stride, *inputs, _start(curves, "double *"), _start(saturated, "uint8_t *"))
-
-
-def _start(array: np.ndarray, kind: str) -> Any:
-    return ffi.cast(kind, array.__array_interface__["data"][0])
+    rows = len(signals)
+    curves, saturated = np.empty((CURVES, rows)), np.empty((rows, N_INPUTS), np.uint8)
+    inputs = map(doubles, (signals, auxiliary, np.ascontiguousarray(reference, float)))
+    lib.hsv_curves(rows, rows, *inputs, doubles(curves), ffi.from_buffer("uint8_t *", saturated))
+    return curves, saturated.view(bool)
 
 
 def flight_metrics(flight: FlightData | FlightCurves) -> dict[str, float]:

@@ -23,14 +23,12 @@ Result = TypeVar("Result")
 
 
 class FlightGroup:
-    """A group of up to :func:`hsv.core.lanes` simultaneous flights, simulated in pieces, with their memory."""
+    """Up to :func:`hsv.core.lanes` simultaneous flights, and the memory for them."""
 
-    def __init__(self, rows: int) -> None:
-        """Allocate memory for pieces of at most ``rows`` steps."""
+    def __init__(self) -> None:
         self.lanes = lanes()
-        self.history = History.over(np.empty((self.lanes, rows * History.numbers())), rows)
         self._memory = core.loop_memory(self.lanes)
-        self._flights: list[Struct] = []
+        self._numbers = np.empty((self.lanes, 0))
 
     @staticmethod
     def takes(components: Sequence[Components]) -> bool:
@@ -44,34 +42,22 @@ class FlightGroup:
         first, *others = map(_shared, components)
         return all(_same(first, other) for other in others)
 
-    def begin(self, components: Sequence[Components], rows: int, tube_set: Struct | None = None) -> None:
-        """Prepare the flights of ``components`` with ``rows`` steps; spare lanes repeat the last flight.
+    def fly(self, components: Sequence[Components], tube_set: Struct | None = None) -> list[tuple[Flight, float]]:
+        """Return the flights of ``components``, which are valid until the next call, and their largest levels.
 
-        ``tube_set``: the invariant set whose level is computed, if any.
+        Args:
+            components: Flights that :meth:`takes`; spare lanes repeat the last one.
+            tube_set: The invariant set whose level is computed; without one the levels are -inf.
         """
+        rows, estimated = components[0].plant.steps + 1, not is_ideal(components[0])
+        if self._numbers.shape[1] != rows * History.numbers():
+            self._numbers = np.empty((self.lanes, rows * History.numbers()))
+        histories = [History.over(lane, rows, estimated=estimated) for lane in self._numbers]
         full = [*components, *[components[-1]] * (self.lanes - len(components))]
-        estimated = not is_ideal(full[0])
-        self._flights = [
-            flight_struct(own, self.lane(i, estimated=estimated), ended=rows, set=tube_set)
-            for i, own in enumerate(full)
-        ]
-
-    def lane(self, i: int, *, estimated: bool = True) -> History:
-        """Return the history of the last piece in a lane."""
-        signals, auxiliary, estimate = self.history
-        return History(signals[i], auxiliary[i], estimate[i] if estimated and estimate is not None else None)
-
-    def fly(self, start: int, stop: int) -> int:
-        """Fly the steps ``start`` ... ``stop`` - 1; return the one after the last that any flight has flown."""
-        return core.fly(self._flights, self._memory, start, stop)
-
-    def ended(self, i: int) -> int:
-        """Return the steps that the flight in a lane has flown, or is to fly."""
-        return int(self._flights[i].pointer.ended)
-
-    def worst(self, i: int) -> float:
-        """Return the largest level so far of the flight in a lane."""
-        return float(self._flights[i].pointer.worst)
+        structs = [flight_struct(own, history, set=tube_set) for own, history in zip(full, histories, strict=True)]
+        core.fly(structs, self._memory, 0, rows)
+        flown = zip(components, histories, (struct.pointer for struct in structs), strict=False)
+        return [(flight_of(own, history.cut(int(end.ended))), float(end.worst)) for own, history, end in flown]
 
 
 class TubeLevels:
@@ -94,15 +80,6 @@ class TubeLevels:
         return float(lib.hsv_worst_level(self.set.pointer, len(flight.state), *given))
 
 
-def fly_group(group: FlightGroup, components: Sequence[Components]) -> list[Flight]:
-    """Return the flights of ``components``, which are valid until the group flies the next ones."""
-    rows = components[0].plant.steps + 1
-    group.begin(components, rows)
-    group.fly(0, rows)
-    ideal = is_ideal(components[0])
-    return [flight_of(own, group.lane(i, estimated=not ideal).cut(group.ended(i))) for i, own in enumerate(components)]
-
-
 def fly_perturbed(
     components: Components,
     perturbations: Sequence[Mapping[str, float]],
@@ -122,7 +99,7 @@ def fly_perturbed(
     def of_some(some: Sequence[Mapping[str, float]]) -> list[Result]:
         varied = [components.perturbed(perturbation) for perturbation in some]
         together = FlightGroup.takes(varied)
-        flown = fly_group(FlightGroup(components.plant.steps + 1), varied) if together else map(fly, varied)
+        flown = [flight for flight, _ in FlightGroup().fly(varied)] if together else map(fly, varied)
         return [job(perturbation, flight) for perturbation, flight in zip(some, flown, strict=True)]
 
     groups = [perturbations[start : start + width] for start in range(0, len(perturbations), width)]

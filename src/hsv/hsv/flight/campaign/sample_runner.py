@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -23,16 +22,10 @@ from hsv.flight.campaign.executors import Job
 from hsv.flight.campaign.table import encode
 from hsv.flight.campaign.variants import FlightVariants
 from hsv.flight.closed_loop import Components, fly, watched
-from hsv.flight.fingerprint import digested, written
-from hsv.flight.flight import Flight, fault_start, times
-from hsv.flight.history import Q_F, X
-from hsv.flight.metrics import CURVES, FlightCurves, FlightData, flight_metrics, read_curves
+from hsv.flight.flight import Flight
+from hsv.flight.metrics import FlightCurves, FlightData, flight_metrics
 from hsv.flight.side_by_side import FlightGroup, TubeLevels
 from hsv.model.dynamics import in_model_range
-from hsv.model.signals import N_STATES
-
-PIECE = 500
-"""Steps that the flights of a group fly before they are read: 8 flights then fit into a second-level cache of 1 MB."""
 
 _LONG = 10.0
 """Seconds from which on a flight is timed by its first steps only."""
@@ -59,44 +52,6 @@ class FlightReading(NamedTuple):
         return cls(data.flight_curves, data.state[-1], level, fingerprint)
 
 
-class FlightReader:
-    """Flies groups of flights of one campaign side by side, and reads them piece by piece."""
-
-    def __init__(self, steps: int, levels: TubeLevels) -> None:
-        """Allocate memory for flights of ``steps`` control periods."""
-        self._rows, self._levels = steps + 1, levels
-        self._group = FlightGroup(min(PIECE, self._rows))
-        self._curves = np.empty((self._group.lanes, CURVES, self._rows))
-        self._saturated = np.empty((self._group.lanes, self._rows, 2), bool)
-
-    def read(self, components: Sequence[Components]) -> list[FlightReading]:
-        """Fly ``components``, which :meth:`FlightGroup.takes`; the readings are valid until the next call."""
-        group, rows, count = self._group, self._rows, len(components)
-        references = [own.nominal_trajectory.reference.along(rows).state for own in components]
-        digests = [hashlib.sha256() for _ in components]
-        last = np.empty((count, N_STATES))
-        group.begin(components, rows, self._levels.set)
-        for start in range(0, rows, PIECE):
-            stop = group.fly(start, min(start + PIECE, rows))
-            for i in range(count):
-                if (end := min(stop, group.ended(i))) > start:
-                    flown, auxiliary, _ = group.lane(i).cut(end - start)
-                    digests[i].update(digested(flown).data)
-                    curves, saturated = self._curves[i, :, start:end], self._saturated[i, start:end]
-                    read_curves(flown, auxiliary, references[i][start:end], curves, saturated)
-                    last[i] = flown[-1, X:Q_F]
-            if stop < min(start + PIECE, rows):
-                break
-        readings = []
-        for i, own in enumerate(components):
-            n = group.ended(i)
-            time, start_of_fault = times(n, own.plant.period), fault_start(own, n)
-            curves_read = FlightCurves(time, self._curves[i, :, :n], self._saturated[i, :n], start_of_fault)
-            level = group.worst(i) if self._levels.set else None
-            readings.append(FlightReading(curves_read, last[i], level, written(digests[i].digest())))
-        return readings
-
-
 class SampleRunner:
     """Flies any flight of one campaign, alone or in any order, always with the same bits."""
 
@@ -111,7 +66,7 @@ class SampleRunner:
         self._variants = FlightVariants(self.scenario, campaign.design)
         parts = self._variants.unchanged
         self._levels = TubeLevels(parts)
-        self._reader: FlightReader | None = None
+        self._group = FlightGroup()
         self.period = parts.plant.period
         """Control period, s"""
         self.steps = parts.plant.steps
@@ -146,8 +101,9 @@ class SampleRunner:
             drawn = zip(flights[start : start + width], samples[start : start + width], strict=True)
             components = [self._components(flight, sample) for flight, sample in drawn]
             if FlightGroup.takes(components):
-                self._reader = self._reader or FlightReader(self.steps, self._levels)
-                yield from self._reader.read(components)
+                for flight, level in self._group.fly(components, self._levels.set):
+                    known = level if self._levels.set else None
+                    yield FlightReading(flight.curves, flight.history.state[-1], known, flight.fingerprint)
             else:
                 yield from map(self._read_alone, components)
 
@@ -196,7 +152,8 @@ class SampleRunner:
         pieces = [replace(parts, plant=plant)] * lanes()
         started = time.perf_counter()
         if FlightGroup.takes(pieces):
-            FlightReader(steps, self._levels).read(pieces)
+            for flight, _ in self._group.fly(pieces, self._levels.set):
+                _ = flight.metrics, flight.fingerprint
             seconds = (time.perf_counter() - started) / len(pieces)
         else:
             fly(pieces[0]).data()
