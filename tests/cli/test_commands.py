@@ -70,7 +70,8 @@ def test_help_and_documentation_have_the_same_exit_codes(hsv):
 
 
 @pytest.mark.parametrize(
-    ("typed", "due"), [("hsv re", {"report", "replay", "recover", "resilience"}), long("hsv trim --un", {"--units"})]
+    ("typed", "due"),
+    [long("hsv re", {"report", "replay", "recover", "resilience"}), long("hsv trim --un", {"--units"})],
 )
 def test_a_shell_is_told_the_words_that_may_come(tmp_path, typed, due):
     asked = {"_HSV_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}

@@ -1,4 +1,3 @@
-import json
 import re
 
 import pytest
@@ -60,10 +59,6 @@ def test_bad_settings_end_with_one_line_and_leave_nothing(campaign, tmp_path, wo
     assert ran.code == 2
     assert expected in ran.error
     assert not list(tmp_path.rglob("*.parquet*"))
-
-
-def test_what_a_program_reads_is_json_only(campaign):
-    assert json.loads(campaign("--json").out)["scenario"] == "short"
 
 
 DRAWN = """

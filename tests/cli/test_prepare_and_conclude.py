@@ -99,6 +99,7 @@ def test_conclude_gives_metrics_report_and_fingerprint(hsv: Hsv, bag: Path) -> N
     assert ["flown", "10", "s"] in said and ["bag", str(bag)] in said
 
 
+@pytest.mark.long
 def test_conclude_ends_with_1_after_a_lost_flight(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
     record_flight(tmp_path / "diverged", "case1_derived_no_notch", duration=30.0)
     ran = hsv("conclude", str(tmp_path / "diverged"), "--no-report")

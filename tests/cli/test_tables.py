@@ -24,12 +24,15 @@ COMMANDS = [
     ("trim",),
     ("linearise", "--model", "ECM", "--coupling", "derived"),
     ("simulate", "case1"),
-    ("verify", str(DESIGNS / "baseline.yaml"), "--quick"),
-    ("export-controller", "baseline", "--out", "controller"),
     ("resilience", "--list"),
 ]
 
 SLOW = [
+    ("list", "vehicles"),
+    ("list", "equipment"),
+    ("list", "controllers"),
+    ("verify", str(DESIGNS / "baseline.yaml"), "--quick"),
+    ("export-controller", "baseline", "--out", "controller"),
     ("certify", str(DESIGNS / "baseline.yaml")),
     ("certify", str(DESIGNS / "realistic.yaml"), "--density", "1 %", "--units", "paper"),
     ("check", "tube_mpc"),

@@ -142,6 +142,7 @@ def test_no_reader_of_bags_loads_what_a_bag_names(hsv, loaded, crafted, tmp_path
     assert loaded()
 
 
+@pytest.mark.long
 def test_a_section_of_one_node_brings_no_code(hsv, loaded, crafted):
     bag = crafted("/tube_mpc")
     for words in ((), ("--rerun",), ("--node", "tube_mpc"), ("--trust",)):

@@ -43,6 +43,7 @@ def settling(states, axis):
     return np.nonzero(np.abs(states[:, axis]) > 0.02 * abs(states[0, axis]))[0][-1] * 0.02
 
 
+@pytest.mark.long
 def test_certified_cost_is_a_bound_close_to_the_solver_s(design, problem, inputs, state, report):
     first = report["nominal"][0]
     # Control study, section 6: 1060 s certified for the five rigid states.
@@ -92,6 +93,7 @@ def test_scales_must_decrease(problem, state, scales):
         nested_gains(problem, state, scales)
 
 
+@pytest.mark.long
 def test_unreachable_bound_is_refused_by_name(problem, state):
     tight = NominalProblem(
         problem.A, problem.B, problem.period, problem.state_scale, problem.input_scale, 1e-3 * problem.input_bound

@@ -13,7 +13,7 @@ from ros_domain import own_environment
 
 PAGES = {
     "first_flight": pytest.mark.long,
-    "own_scenario": (),
+    "own_scenario": pytest.mark.long,
     "own_fault": pytest.mark.long,
     "own_controller": pytest.mark.long,
     "reading_a_bag": pytest.mark.long,

@@ -61,7 +61,7 @@ def test_a_shipped_design_passes_with_its_flights_and_sequences(name):
 @pytest.mark.parametrize(
     ("field", "value", "named"),
     [
-        (("disturbance", "measured", "lower", 0), -0.39, "tube.disturbance.measured.lower[0]"),
+        long(("disturbance", "measured", "lower", 0), -0.39, "tube.disturbance.measured.lower[0]"),
         long(("disturbance", "measured", "upper_flight", 2), 17, "tube.disturbance.measured.upper[2]"),
         long(("flights", "flights"), 1024, "tube.flights.flights"),
         long(("flights", "worst_level"), 0.2, "tube.flights: level"),

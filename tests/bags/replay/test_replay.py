@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flown_bags import flown_bag, parameters, types, write_bag
+from marking import long
 
 from hsv.bags.description import CONTROLLERS, RECORDER, TOPICS, graph
 from hsv.bags.parameter_sections import ParameterSections
@@ -102,14 +103,14 @@ def test_faults_injected_and_cleared_in_flight_are_repeated_at_their_steps(tmp_p
 @pytest.mark.parametrize(
     ("topic", "node", "fields", "words"),
     [
-        ("hsv/filtered_state", "tube_mpc", {"estimate": [0.0]}, "estimate: 1 numbers, expected 9, or none"),
-        (
+        long("hsv/filtered_state", "tube_mpc", {"estimate": [0.0]}, "estimate: 1 numbers, expected 9, or none"),
+        long(
             "hsv/filtered_state",
             "tube_mpc",
             {"filter_state": [0.0] * 4},
             "filter_state: 4 numbers, expected 2 of the notch filter flown, or none",
         ),
-        ("hsv/nominal", "tube_mpc", {"gain": [0.0] * 9}, "gain: 9 numbers, expected 18, or none"),
+        long("hsv/nominal", "tube_mpc", {"gain": [0.0] * 9}, "gain: 9 numbers, expected 18, or none"),
         ("hsv/actuator", "plant", {"since": [1]}, "since: 1 steps, expected 0, one for each fault in active"),
     ],
 )
@@ -154,6 +155,7 @@ def test_swapped_messages_are_a_difference_of_order(bag: Bag, tmp_path: Path) ->
     assert first.expected - first.actual == 20_000_000
 
 
+@pytest.mark.long
 def test_of_a_broken_off_run_the_complete_steps_are_compared(bag: Bag, tmp_path: Path) -> None:
     def kill(tracks: dict[str, Track]) -> None:
         for index, topic in enumerate(TOPICS):
@@ -184,6 +186,7 @@ def test_bags_that_cannot_be_replayed_say_why(bag: Bag, tmp_path: Path) -> None:
         flown_parameters(bare)
 
 
+@pytest.mark.long
 def test_tau_changed_in_flight_is_repeated_from_what_was_recorded(tmp_path: Path) -> None:
     design, scenario = parameters(12.0, 6.0)
     design |= {"feedback.tau_minimum": [0.5]}

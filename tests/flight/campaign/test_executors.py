@@ -18,6 +18,7 @@ from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.store import ResultStore
 
 
+@pytest.mark.long
 def test_a_worker_killed_in_mid_campaign_loses_and_doubles_nothing(planned, results, out):
     campaign, killed = planned(), []
 

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from marking import long
 
 from hsv.base.errors import CampaignError, ScenarioError
 from hsv.flight.campaign.campaign import Campaign, plan
@@ -22,7 +23,7 @@ def test_a_written_scenario_reads_as_the_flight_that_was_flown_in_every_bit(plan
         assert parse_scenario(campaign.file(flight, sample), flown.name) == flown
 
 
-@pytest.mark.parametrize("name", scenario_names())
+@pytest.mark.parametrize("name", [name if i % 6 == 0 else long(name) for i, name in enumerate(scenario_names())])
 def test_every_shipped_scenario_can_be_written(name):
     scenario, campaign = load_scenario(name), plan(name)
     values = scenario.vehicle.perturbation

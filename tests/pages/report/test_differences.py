@@ -25,6 +25,7 @@ def test_a_flight_does_not_differ_from_itself(quiet):
     assert "States and commands are the same, bit for bit" in happened(runs, found)
 
 
+@pytest.mark.long
 def test_differences_far_below_single_precision_are_kept(quiet, nearly):
     runs = reported_runs([quiet, nearly])
     (altitude,) = by_panel(runs)["altitude"]

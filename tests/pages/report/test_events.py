@@ -1,3 +1,4 @@
+import pytest
 from recorded_flight import record_flight
 
 from hsv.bags.info import describe
@@ -42,6 +43,7 @@ def test_events_are_in_the_order_of_time(loud):
     assert starts == sorted(starts) and len(starts) >= 4
 
 
+@pytest.mark.long
 def test_a_lost_flight_is_an_error_event(tmp_path):
     bag = record_flight(tmp_path / "lost", "case1_derived_no_notch", duration=200.0, fault=100.0)
     (event,) = of_kind(bag, "error")

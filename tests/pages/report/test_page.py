@@ -168,6 +168,7 @@ def test_a_design_without_a_set_is_said_to_have_none(bags):
     assert "carries an invariant set" in words(page) and 'id="plot-level"' not in page
 
 
+@pytest.mark.long
 def test_without_attachments_there_is_a_page_but_no_verdict(quiet, tmp_path):
     writer = BagWriter(tmp_path / "bare", quiet.topics.values())
     for topic in quiet.topics:
@@ -194,6 +195,7 @@ def test_a_file_that_cannot_be_written_is_named(quiet, tmp_path):
         write_report([quiet], tmp_path / "nowhere" / "page.html")
 
 
+@pytest.mark.long
 def test_a_full_disk_leaves_no_half_page(quiet, tmp_path):
     problem = r"page\.html: cannot be written \(File too large\)"
     with pytest.raises(RecordingError, match=problem), files_no_larger_than(100_000):
