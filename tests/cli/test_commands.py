@@ -271,6 +271,11 @@ def test_bad_input_is_one_line_with_code_2_and_nothing_written(hsv, tmp_path, wo
         (("linearise", "--model", "ecm"), "ECM"),
         (("bench", "--only", "graf"), "graph"),
         (("replay", str(REFERENCE), "--node", "tube"), "tube_mpc"),
+        (("simulate", "case1_no_notsh"), "case1_no_notch"),
+        (("design", "baselin"), "baseline"),
+        (("verify", "baselin"), "baseline"),
+        (("resilience", "--faults", "elevator_los"), "elevator_loss"),
+        (("certify", "baseline", "--sensors", "fin"), "fine"),
     ],
 )
 def test_a_word_that_is_nearly_right_is_answered_with_the_right_one(hsv, words, hint):

@@ -48,7 +48,7 @@ def imported(folder: Path) -> set[str]:
     """Return the modules outside the standard library that a package imports, without its own."""
     found = set()
     for path in folder.rglob("*.py"):
-        if path.name == "setup.py":
+        if path.name == "setup.py" or path.parent == folder / "test":
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):
@@ -93,6 +93,17 @@ def test_a_package_has_a_changelog_of_its_name(manifest: Path) -> None:
 def test_a_key_stands_for_a_version_that_suffices(module: str, version: str) -> None:
     bounds = re.findall(rf'"({module.replace("yaml", "pyyaml")})([<>=][^"]*)"', (ROOT / "src/hsv/setup.py").read_text())
     assert [name for name, bound in bounds if SpecifierSet(bound).contains(version)]
+
+
+@pytest.mark.long
+def test_colcon_test_runs_the_smoke_test_of_every_package_of_nodes(tmp_path: Path) -> None:
+    tests = [*ROOT.glob("ros_ws/src/*/test/test_package.py")]
+    assert len({path.read_bytes() for path in tests}) == 1
+    colcon = [sys.executable, "-m", "colcon", "--log-base", str(tmp_path / "log")]
+    place = ["--test-result-base", str(tmp_path / "results")]
+    subprocess.run([*colcon, "test", "--return-code-on-test-failure", *place], cwd=ROOT / "ros_ws", check=True)
+    found = subprocess.run([*colcon, "test-result", "--all", *place], capture_output=True, text=True, check=True).stdout
+    assert found.count("pytest.xml") == len(tests) == 4 and ", 0 errors, 0 failures" in found
 
 
 def test_modules_without_a_key_are_named_in_the_documentation() -> None:

@@ -15,6 +15,7 @@ setup(
         ("share/hsv_bringup/config", ["config/lossy_network.xml"]),
         ("share/hsv_bringup/launch", ["launch/sil.launch.py"]),
     ],
+    extras_require={"test": ["pytest"]},
     zip_safe=False,
     maintainer="HSV bench maintainers",
     maintainer_email="maintainers@hsv-bench.invalid",

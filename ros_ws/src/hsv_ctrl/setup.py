@@ -13,6 +13,7 @@ setup(
         ("share/ament_index/resource_index/packages", ["resource/hsv_ctrl"]),
         ("share/hsv_ctrl", ["package.xml"]),
     ],
+    extras_require={"test": ["pytest"]},
     zip_safe=False,
     maintainer="HSV bench maintainers",
     maintainer_email="maintainers@hsv-bench.invalid",

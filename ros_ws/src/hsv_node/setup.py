@@ -14,6 +14,7 @@ setup(
         ("share/ament_index/resource_index/packages", ["resource/hsv_node"]),
         ("share/hsv_node", ["package.xml"]),
     ],
+    extras_require={"test": ["pytest"]},
     zip_safe=False,
     maintainer="HSV bench maintainers",
     maintainer_email="maintainers@hsv-bench.invalid",

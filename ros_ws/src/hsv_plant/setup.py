@@ -13,6 +13,7 @@ setup(
         ("share/ament_index/resource_index/packages", ["resource/hsv_plant"]),
         ("share/hsv_plant", ["package.xml"]),
     ],
+    extras_require={"test": ["pytest"]},
     zip_safe=False,
     maintainer="HSV bench maintainers",
     maintainer_email="maintainers@hsv-bench.invalid",

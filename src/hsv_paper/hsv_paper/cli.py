@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from hsv.base.errors import QuantityError
+from hsv.base.errors import QuantityError, one_of
 from hsv.cli.entry import Command
 from hsv.cli.main import run
 from hsv.cli.options import JsonOption
@@ -156,7 +156,7 @@ def sensitivity(
     from hsv_paper.sensitivity.flown import others_with_elevator_fault
 
     if name not in STUDIES:
-        raise QuantityError(f"sensitivity = {name!r}: expected one of {', '.join(STUDIES)}")
+        raise QuantityError(f"sensitivity = {name!r}: expected {one_of(STUDIES, name)}")
     if beside and not STUDIES[name].flies_others:
         able = ", ".join(n for n, study in STUDIES.items() if study.flies_others)
         raise QuantityError(f"with = {beside[0]!r}: study {name} flies its own controllers, expected study {able}")

@@ -72,6 +72,11 @@ class ParameterError(HsvError, ValueError):
     """A parameter of a node or component with a wrong name, type, size or value."""
 
 
+def one_of(known: Iterable[str], name: str, also: str = "") -> str:
+    """Return the end of a message about an unknown ``name``: ``one of`` all known ones, a remark, and the nearest."""
+    return f"one of {', '.join(known := [*known])}{also}{did_you_mean(name, known)}"
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return a hint for the message about an unknown ``name``: the nearest known one, or an empty text."""
     names = {str(other).lower(): str(other) for other in known}

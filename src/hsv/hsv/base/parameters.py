@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
-from hsv.base.errors import ParameterError, did_you_mean
+from hsv.base.errors import ParameterError, did_you_mean, one_of
 from hsv.base.units import in_unit_of, is_finite, parse_quantity
 
 Value = bool | int | float | str | list[float] | list[str] | list[int]
@@ -220,5 +220,4 @@ def _entries_of(name: str, entry: object, known: Iterable[str]) -> Mapping[str, 
     if inside:
         raise ParameterError(f"{name} = {_shown(entry)}: expected a table of {', '.join(dict.fromkeys(inside))}")
     siblings = [other.split(".")[depth - 1] for other in known if other.startswith(f"{within}." if within else "")]
-    expected = ", ".join(dict.fromkeys(siblings)) or "no table"
-    raise ParameterError(f"{name}: unknown key, expected one of {expected}{did_you_mean(own, siblings)}")
+    raise ParameterError(f"{name}: unknown key, expected {one_of(dict.fromkeys(siblings) or ['no table'], own)}")

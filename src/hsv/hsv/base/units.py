@@ -16,7 +16,7 @@ from fractions import Fraction
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
-from hsv.base.errors import QuantityError
+from hsv.base.errors import QuantityError, one_of
 
 if TYPE_CHECKING:
     import pint
@@ -97,7 +97,7 @@ def unit_system(name: str) -> UnitSystem:
         QuantityError: There are none.
     """
     if name not in [*UnitSystem]:
-        raise QuantityError(f"units = {name!r}: expected one of {', '.join(UnitSystem)}")
+        raise QuantityError(f"units = {name!r}: expected {one_of(UnitSystem, name)}")
     return UnitSystem(name)
 
 

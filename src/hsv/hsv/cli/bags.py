@@ -10,7 +10,7 @@ import typer
 from rich.text import Text
 from typer import Option
 
-from hsv.base.errors import ParameterError, RecordingError, RunError, did_you_mean
+from hsv.base.errors import ParameterError, RecordingError, RunError, one_of
 from hsv.base.units import significant
 from hsv.cli.options import BagArgument, JsonOption, SuppliedDesignOption, SuppliedScenarioOption, TrustOption
 from hsv.cli.output import console, folded, new_table, print_bag_warnings, print_json, print_written, say, stages
@@ -53,7 +53,7 @@ def replay(
     values = values.updated({"controller": controller})
     processes = processes_of(controller, estimated(values))
     if node and node not in processes:
-        raise ParameterError(f"node = {node!r}: expected one of {', '.join(processes)}{did_you_mean(node, processes)}")
+        raise ParameterError(f"node = {node!r}: expected {one_of(processes, node)}")
     if node and rerun:
         raise ParameterError(f"node = {node!r}: a rerun repeats the whole loop, expected one of --node and --rerun")
     if controller_node(controller).foreign and rerun and over_dds:
@@ -247,7 +247,7 @@ def export(
 
     formats = [*tables.Format]
     if form and form not in formats:
-        raise ParameterError(f"format = {form!r}: expected one of {', '.join(formats)}{did_you_mean(form, formats)}")
+        raise ParameterError(f"format = {form!r}: expected {one_of(formats, form)}")
     flags = {"csv": csv, "parquet": parquet, "npz": npz, form: bool(form)}
     chosen = [tables.Format(name) for name, given in flags.items() if given]
     if len(chosen) + scene != 1:

@@ -12,7 +12,7 @@ import typer
 from rich.text import Text
 from typer import Argument, Option
 
-from hsv.base.errors import HsvError, ParameterError, QuantityError, RunError, did_you_mean
+from hsv.base.errors import HsvError, ParameterError, QuantityError, RunError, one_of
 from hsv.base.units import UnitSystem, in_system, significant
 from hsv.cli.options import JsonOption, ListJsonOption, UnitsOption
 from hsv.cli.output import (
@@ -72,9 +72,7 @@ def list_(
 
 def _known(kind: Kind, name: str, names: Mapping[str, Any]) -> None:
     if name and name not in names:
-        raise ParameterError(
-            f"{kind.removesuffix('s')} = {name!r}: expected one of {', '.join(names)}{did_you_mean(name, names)}"
-        )
+        raise ParameterError(f"{kind.removesuffix('s')} = {name!r}: expected {one_of(names, name)}")
 
 
 def _list_scenarios(name: str, json: bool) -> None:
@@ -276,9 +274,7 @@ def bench(
     available = groups(scale)
     for name in only or ():
         if name not in available:
-            raise QuantityError(
-                f"only = {name!r}: expected one of {', '.join(available)}{did_you_mean(name, available)}"
-            )
+            raise QuantityError(f"only = {name!r}: expected {one_of(available, name)}")
     chosen = [name for name in available if not only or name in only]
     measured: dict[str, list[Figure]] = {}
     skipped: dict[str, str] = {}

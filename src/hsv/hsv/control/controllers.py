@@ -16,7 +16,7 @@ import importlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from hsv.base.errors import HsvError, ParameterError, did_you_mean
+from hsv.base.errors import HsvError, ParameterError, one_of
 from hsv.base.parameters import Parameter, validate
 from hsv.control.controller import (
     FOREIGN_FAILURES,
@@ -120,11 +120,8 @@ def class_place(name: str) -> str:
             return entry.value
     if "/" in name or name.endswith(".so"):
         raise ParameterError(f"controller = {name!r}: no symbol, expected path/lib.so:symbol, the path of a library")
-    hint = did_you_mean(name, controller_names())
-    raise ParameterError(
-        f"controller = {name!r}: expected one of {', '.join(controller_names())}, package.module:Class or "
-        f"path/lib.so:symbol{hint}"
-    )
+    choices = one_of(controller_names(), name, ", package.module:Class or path/lib.so:symbol")
+    raise ParameterError(f"controller = {name!r}: expected {choices}")
 
 
 def build_controller(values: Mapping[str, Any], design: ControlDesign | None = None) -> Controller:

@@ -587,9 +587,10 @@ def find_file(name: str, suffix: str) -> Path:
     for candidate in candidates:
         if candidate.is_file():
             return candidate
+    names = {path.stem for candidate in candidates for path in candidate.parent.glob(f"*{suffix}")}
     raise DesignError(
         f"design = {name!r}: no such file, expected the path of a {suffix} file, a name in HSV_DESIGN_PATH or of a "
-        "shipped one"
+        f"shipped one{did_you_mean(Path(name).stem, names)}"
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.base.errors import QuantityError, did_you_mean
+from hsv.base.errors import QuantityError, one_of
 from hsv.base.units import UnitSystem, in_system, unit_in
 from hsv.control.notch_filter import continuous, default_sections, series
 from hsv.model.dynamics import MODELS, jacobian
@@ -131,8 +131,7 @@ def linearise(
     """
     for name, value, known in (("model", model, (*MODELS, EXTENDED)), ("reading", reading or READINGS[0], READINGS)):
         if value not in known:
-            hint = did_you_mean(value, known)
-            raise QuantityError(f"{name} = {value!r}: expected one of {', '.join(known)}{hint}")
+            raise QuantityError(f"{name} = {value!r}: expected {one_of(known, value)}")
     if reading and model != EXTENDED:
         raise QuantityError(f"reading = {reading!r}: expected with model {EXTENDED} only")
     described = load_vehicle(vehicle or DEFAULT_VEHICLE)

@@ -21,7 +21,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from hsv.base.errors import ParameterError
+from hsv.base.errors import ParameterError, one_of
 from hsv.core._core import ffi, lib
 
 __all__ = [
@@ -154,7 +154,7 @@ def instruction_set() -> str:
     usable = [*_LANES][: lib.hsv_widest() + 1]
     chosen = os.environ.get("HSV_CORE") or usable[-1]
     if chosen not in usable:
-        raise ParameterError(f"HSV_CORE = {chosen!r}: expected one of {', '.join(usable)} on this processor")
+        raise ParameterError(f"HSV_CORE = {chosen!r}: expected {one_of(usable, chosen, ' on this processor')}")
     return chosen
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import cholesky, solve_discrete_lyapunov
 
-from hsv.base.errors import DesignError
+from hsv.base.errors import DesignError, one_of
 from hsv.control.optimisation import (
     GAIN_DIGITS,
     SolverReport,
@@ -110,7 +110,7 @@ def feedback_gain(
         DesignError: Unknown method, no solution, or a solution that fails (24) when recomputed.
     """
     if method not in _SEARCHES:
-        raise DesignError(f"feedback.method = {method!r}: expected one of {', '.join(_SEARCHES)}")
+        raise DesignError(f"feedback.method = {method!r}: expected {one_of(_SEARCHES, method)}")
     white = lqr_whitening(A, B, state_scale, input_scale)
     (N_white, M_white, *_), solver = _SEARCHES[method](*white.dynamics(A, B), white, disturbance, state_scale)
     F = white.gain(np.linalg.solve(N_white, M_white.T).T)

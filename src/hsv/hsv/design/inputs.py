@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from hsv.base.errors import DesignError, DocumentError, QuantityError
+from hsv.base.errors import DesignError, DocumentError, QuantityError, one_of
 from hsv.base.files import follow_extends, is_path, parse_toml, read_text
 from hsv.base.units import parse_quantity
 from hsv.control.design import find_file
@@ -273,7 +273,7 @@ class ActuatorInputs(_Table):
     def _known(cls, name: str | None, info: ValidationInfo) -> str | None:
         names = [key for key, actuator in ACTUATOR_SETS.items() if actuator.channel == info.field_name]
         if name is not None and name not in names:
-            raise ValueError(f"{info.field_name} = {name!r}: expected one of {', '.join(names)}")
+            raise ValueError(f"{info.field_name} = {name!r}: expected {one_of(names, name)}")
         return name
 
     def names(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, StrictInt, ValidationError
 
-from hsv.base.errors import DocumentError, HsvError, ParameterError, ScenarioError, did_you_mean
+from hsv.base.errors import DocumentError, HsvError, ParameterError, ScenarioError, one_of
 from hsv.base.files import follow_extends, is_path, parse_toml, read_text
 from hsv.base.parameters import Parameter, read_number, table_values
 from hsv.control.controllers import SHIPPED_CONTROLLERS
@@ -218,7 +218,7 @@ def _own_text(name: str) -> str:
         except DocumentError as error:
             raise ScenarioError(f"scenario {name!r}: {error}, expected a TOML file") from error
     if name not in scenario_names():
-        raise ScenarioError(f"scenario {name!r}: expected a path or one of {', '.join(scenario_names())}")
+        raise ScenarioError(f"scenario {name!r}: expected a path or {one_of(scenario_names(), name)}")
     return _shipped().joinpath(f"{name}.toml").read_text(encoding="utf-8")
 
 
@@ -364,7 +364,7 @@ def _limits(table: object) -> dict[str, float]:
         raise ScenarioError(f"limits = {table!r}: expected a table of metrics")
     for name in table:
         if name not in METRICS:
-            raise ScenarioError(f"limits.{name}: no such metric, expected one of {', '.join(METRICS)}")
+            raise ScenarioError(f"limits.{name}: no such metric, expected {one_of(METRICS, name)}")
     return {
         name: read_number(
             Parameter(name, 0.0, "", METRICS[name].unit, 0.0, whole=METRICS[name].counted), value, f"limits.{name}"
@@ -379,8 +379,8 @@ def _check(scenario: Scenario, tables: Collection[str]) -> None:
         raise ScenarioError(f"design = '': expected one, {scenario.controller} flies with its gains")
     for name, value in scenario.vehicle.perturbation.items():
         if name not in scenario.vehicle.described.uncertainty:
-            expected = ", ".join(scenario.vehicle.described.uncertainty)
-            raise ScenarioError(f"vehicle.perturbation.{name} = {value}: no such parameter, expected one of {expected}")
+            expected = one_of(scenario.vehicle.described.uncertainty, name)
+            raise ScenarioError(f"vehicle.perturbation.{name} = {value}: no such parameter, expected {expected}")
     for table, controller in _CONTROLLER_TABLES.items():
         if table in tables and scenario.controller != controller:
             raise ScenarioError(f"{table}: {scenario.controller} does not read it, expected controller {controller}")
@@ -451,9 +451,7 @@ def _first_problem(error: ValidationError) -> str:
     problem = error.errors()[0]
     field = _dotted(problem["loc"])
     if problem["type"] == "extra_forbidden":
-        known = _siblings(problem["loc"])
-        hint = did_you_mean(str(problem["loc"][-1]), known)
-        return f"{field}: unknown key, expected one of {', '.join(known)}{hint}"
+        return f"{field}: unknown key, expected {one_of(_siblings(problem['loc']), str(problem['loc'][-1]))}"
     if problem["type"] == "missing":
         return f"{field}: missing"
     if problem["type"] == "value_error":

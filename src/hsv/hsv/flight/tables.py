@@ -20,7 +20,7 @@ from pydantic import (
     field_validator,
 )
 
-from hsv.base.errors import ParameterError, QuantityError, ScenarioError, did_you_mean
+from hsv.base.errors import ParameterError, QuantityError, ScenarioError, one_of
 from hsv.base.parameters import Parameter, limits_in_words, read_number
 from hsv.base.units import has_unit, parse_quantity, rounded, si_unit_of, to_paper, written
 from hsv.flight.distribution import Distribution, read_distribution
@@ -82,9 +82,7 @@ class Reading:
                 continue
             if key not in known:
                 expected = (*known, *(each for each in FaultTable.model_fields if each != "parameters"))
-                raise ScenarioError(
-                    f"{name}.{key}: unknown key, expected one of {', '.join(expected)}{did_you_mean(key, expected)}"
-                )
+                raise ScenarioError(f"{name}.{key}: unknown key, expected {one_of(expected, key)}")
             parameters[key] = self.number(known[key], value, f"{name}.{key}")
         return {**common, "parameters": parameters}
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 
-from hsv.base.errors import QuantityError
+from hsv.base.errors import QuantityError, one_of
 from hsv.core import Struct, doubles, ffi, lib, vector
 from hsv.model.signals import N_INPUTS, N_STATES
 
@@ -102,8 +102,8 @@ class VehicleParameters(NamedTuple):
         changes = {}
         for name, change in perturbation.items():
             if name not in COEFFICIENT_UNITS:
-                expected = ", ".join(COEFFICIENT_UNITS)
-                raise QuantityError(f"perturbation.{name} = {change!r}: no such parameter, expected one of {expected}")
+                expected = one_of(COEFFICIENT_UNITS, name)
+                raise QuantityError(f"perturbation.{name} = {change!r}: no such parameter, expected {expected}")
             if not (math.isfinite(change) and change > -1.0):
                 raise QuantityError(f"perturbation.{name} = {change!r}: expected a finite relative change above -1")
             changes[name] = getattr(self, name) * (1.0 + change)

@@ -25,7 +25,7 @@ from typing import Any, Self
 
 import tomli_w
 
-from hsv.base.errors import DocumentError, HsvError, ParameterError, QuantityError, VehicleError, did_you_mean
+from hsv.base.errors import DocumentError, HsvError, ParameterError, QuantityError, VehicleError, one_of
 from hsv.base.files import EXTENDS, Tables, follow_extends, is_path, parse_toml, read_text
 from hsv.base.parameters import Parameter, validate
 from hsv.base.units import UnitSystem, parse_quantity, readable
@@ -166,10 +166,8 @@ class Vehicle:
         except (ValueError, OverflowError):
             scale = math.nan
         if isinstance(coupling, bool) or not 0.0 <= scale <= MAX_COUPLING:
-            raise QuantityError(
-                f"coupling = {coupling!r}: expected one of {', '.join(self.couplings)}, or a multiple of {DERIVED} "
-                f"from 0 to {MAX_COUPLING:g}, such as 0.65"
-            )
+            multiple = f", or a multiple of {DERIVED} from 0 to {MAX_COUPLING:g}, such as 0.65"
+            raise QuantityError(f"coupling = {coupling!r}: expected {one_of(self.couplings, str(coupling), multiple)}")
         return repr(scale)
 
     def coupled(self, coupling: str | float = "") -> VehicleParameters:
@@ -337,10 +335,8 @@ def _path(name: str) -> Path:
         return Path(name)
     place = SHIPPED_VEHICLES.get(name) or _places_elsewhere().get(name, "")
     if not place:
-        hint = did_you_mean(name, vehicle_names())
-        raise VehicleError(
-            f"vehicle {name!r}: expected one of {', '.join(vehicle_names())} or the path of a TOML file{hint}"
-        )
+        choices = one_of(vehicle_names(), name, " or the path of a TOML file")
+        raise VehicleError(f"vehicle {name!r}: expected {choices}")
     package, _, file = place.partition(":")
     spec = find_spec(package)
     folders = list(spec.submodule_search_locations or ()) if spec else []
@@ -450,9 +446,7 @@ def _table(
 def _refuse_unknown(table: Mapping[str, Any], keys: Iterable[str], field: str = "") -> None:
     for key in table:
         if key not in keys:
-            raise QuantityError(
-                f"{f'{field}.' if field else ''}{key}: unknown field, expected one of {', '.join(keys)}"
-            )
+            raise QuantityError(f"{f'{field}.' if field else ''}{key}: unknown field, expected {one_of(keys, key)}")
 
 
 def _quantity(row: Mapping[str, Any], field: str, key: str, unit: str) -> float:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.base.errors import DesignError, QuantityError
+from hsv.base.errors import DesignError, QuantityError, one_of
 from hsv.base.units import parse_quantity
 from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.core.arithmetic import LARGEST
@@ -243,14 +243,14 @@ def described(
         QuantityError: A value that cannot be read or is below zero, or a name that is unknown.
     """
     if sensor_set not in SENSOR_SETS:
-        raise QuantityError(f"sensors = {sensor_set!r}: expected one of {', '.join(SENSOR_SETS)}")
+        raise QuantityError(f"sensors = {sensor_set!r}: expected {one_of(SENSOR_SETS, sensor_set)}")
     if not 0.0 < reach <= LARGEST_REACH:
         raise QuantityError(f"reach = {reach:g}: expected more than 0, up to {LARGEST_REACH}, beyond which no noise is")
     names, biases = STATE_NAMES[:N_RIGID], np.zeros(N_RIGID)
     for text in bias:
         name, _, value = text.partition("=")
         if name.strip() not in names:
-            raise QuantityError(f"bias = {text!r}: expected one of {', '.join(names)}, then = and a quantity")
+            raise QuantityError(f"bias = {text!r}: expected {one_of(names, name, ', then = and a quantity')}")
         index = names.index(name.strip())
         biases[index] = abs(parse_quantity(value.strip(), STATE_UNITS[index], f"bias {names[index]}"))
     up_to = np.array([1.0, 1.0, 0.0])

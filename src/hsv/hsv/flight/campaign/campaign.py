@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 import tomli_w
 
-from hsv.base.errors import CampaignError
+from hsv.base.errors import CampaignError, one_of
 from hsv.base.files import parse_json
 from hsv.base.units import percent, rounded, written
 from hsv.control.library import library_digest
@@ -215,9 +215,11 @@ class Campaign:
         known = (*scenario.vehicle.described.uncertainty, *drawn)
         for factor in self.factors:
             if factor.name not in known:
-                raise CampaignError(f"factor {factor.name!r}: expected one of {', '.join(known)}")
+                raise CampaignError(f"factor {factor.name!r}: expected {one_of(known, factor.name)}")
             if factor.kind not in KINDS:
-                raise CampaignError(f"factor {factor.name!r}: kind {factor.kind!r}, expected one of {', '.join(KINDS)}")
+                raise CampaignError(
+                    f"factor {factor.name!r}: kind {factor.kind!r}, expected {one_of(KINDS, factor.kind)}"
+                )
 
     def difference(self, other: Campaign) -> str:
         """Return the first setting in which ``other`` differs, in words; empty if in none."""
@@ -264,7 +266,7 @@ def plan(
     scenario, drawn = scenario_at_means(table, name)
     found = _factors(scenario, drawn, scale)
     if method not in METHODS:
-        raise CampaignError(f"method = {method!r}: expected one of {', '.join(METHODS)}")
+        raise CampaignError(f"method = {method!r}: expected {one_of(METHODS, method)}")
     if method == "corners":
         samples = 2 ** len(found)
     largest = _MAX_HYPERCUBE if method == "latin_hypercube" else MAX_SAMPLES

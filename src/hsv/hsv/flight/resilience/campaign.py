@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import tomli_w
 
-from hsv.base.errors import CampaignError
+from hsv.base.errors import CampaignError, one_of
 from hsv.base.units import rounded, written
 from hsv.control.library import library_digest
 from hsv.flight.assembly import blamed_on, design_parameters
@@ -157,7 +157,7 @@ def plan(controllers: Sequence[str], faults: Sequence[str]) -> ResilienceCampaig
             raise CampaignError(f"{field}: {twice!r} twice, expected each once")
     for name in faults:
         if name not in TRIED:
-            raise CampaignError(f"faults = {name!r}: expected one of {', '.join(TRIED)}")
+            raise CampaignError(f"faults = {name!r}: expected {one_of(TRIED, name)}")
     subjects = tuple(map(_subject, controllers))
     stems = [subject.name for subject in subjects]
     if twice := next((name for name in stems if stems.count(name) > 1), None):

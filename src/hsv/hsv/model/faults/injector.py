@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from hsv.base.errors import ParameterError
+from hsv.base.errors import ParameterError, one_of
 from hsv.base.parameters import Parameter, validate
 from hsv.core import Struct, doubles, lib
 from hsv.core.arithmetic import SEED_PARAMETER
@@ -172,9 +172,9 @@ class FaultInjector:
             ParameterError: Unknown channel or kind.
         """
         if channel and channel not in CHANNELS:
-            raise ParameterError(f"channel = {channel!r}: expected one of {', '.join(CHANNELS)}, or empty for all")
+            raise ParameterError(f"channel = {channel!r}: expected {one_of(CHANNELS, channel, ', or empty for all')}")
         if kind and kind not in FAULT_KINDS:
-            raise ParameterError(f"type = {kind!r}: expected one of {', '.join(FAULT_KINDS)}, or empty for all")
+            raise ParameterError(f"type = {kind!r}: expected {one_of(FAULT_KINDS, kind, ', or empty for all')}")
         ended = []
         for i, (fault, start, stop) in enumerate(self.known):
             if channel in ("", fault.channel) and kind in ("", fault.type) and start <= self._first(fault) < stop:

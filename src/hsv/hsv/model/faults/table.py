@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
-from hsv.base.errors import ParameterError, did_you_mean
+from hsv.base.errors import ParameterError, one_of
 from hsv.base.parameters import Parameter, read_number
 from hsv.base.units import UnitSystem, parse_quantity, readable
 from hsv.core import lib
@@ -331,14 +331,11 @@ def fault_parameters(channel: str, kind: str) -> tuple[FaultParameter, ...]:
         ParameterError: Unknown kind, or a channel that it does not support.
     """
     if kind not in FAULT_KINDS:
-        hint = did_you_mean(kind, FAULT_KINDS)
-        raise ParameterError(f"fault.type = {kind!r}: expected one of {', '.join(FAULT_KINDS)}{hint}")
+        raise ParameterError(f"fault.type = {kind!r}: expected {one_of(FAULT_KINDS, kind)}")
     described = FAULT_KINDS[kind]
     if channel not in described.channels:
-        hint = did_you_mean(channel, described.channels)
-        raise ParameterError(
-            f"fault.channel = {channel!r}: expected one of {', '.join(described.channels)} for {kind}{hint}"
-        )
+        choices = one_of(described.channels, channel, f" for {kind}")
+        raise ParameterError(f"fault.channel = {channel!r}: expected {choices}")
     return (*described.parameters, *OCCURRENCE_PARAMETERS)
 
 
@@ -388,10 +385,8 @@ class Fault:
         due = [p.name for p in table if p.default is None]
         for name in parameters:
             if name not in optional and name not in due:
-                hint = did_you_mean(name, (*due, *optional))
-                raise ParameterError(
-                    f"fault.{name}: unknown parameter, expected one of {', '.join((*due, *optional))} for {kind}{hint}"
-                )
+                choices = one_of((*due, *optional), name, f" for {kind}")
+                raise ParameterError(f"fault.{name}: unknown parameter, expected {choices}")
         for name in due:
             if name not in parameters:
                 raise ParameterError(f"fault.{name}: missing, expected {' and '.join(due)} for {kind}")
@@ -445,7 +440,6 @@ def read_fault(channel: str, kind: str, parameters: Sequence[str]) -> Fault:
         if not equals and len(due) == 1:
             name, quantity = due[0], text
         if name not in known:
-            hint = did_you_mean(name, known)
-            raise ParameterError(f"fault.{name}: unknown parameter, expected one of {', '.join(known)}{hint}")
+            raise ParameterError(f"fault.{name}: unknown parameter, expected {one_of(known, name)}")
         given[name] = read_number(known[name], quantity, f"fault.{name}")
     return Fault.of(channel, kind, given)

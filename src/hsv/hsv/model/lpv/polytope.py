@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsv.base.errors import DesignError
+from hsv.base.errors import DesignError, one_of
 from hsv.core import Data, lib
 from hsv.core.arithmetic import solve
 
@@ -53,7 +53,7 @@ def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: st
     elif interpolation == "cubic":
         coefficients = _spline(breakpoints, samples)
     else:
-        raise DesignError(f"interpolation = {interpolation!r}: expected one of {', '.join(INTERPOLATIONS)}")
+        raise DesignError(f"interpolation = {interpolation!r}: expected {one_of(INTERPOLATIONS, interpolation)}")
     return AxisWeights(breakpoints, np.ascontiguousarray(coefficients))
 
 

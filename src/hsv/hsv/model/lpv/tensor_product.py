@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
 
-from hsv.base.errors import DesignError
+from hsv.base.errors import DesignError, one_of
 from hsv.model.lpv.polytope import Polytope, axis_weights
 
 FUNCTIONS = ("singular", "polynomial")
@@ -60,7 +60,7 @@ def tensor_product(
         DesignError: Shapes that do not match, unknown functions, too few samples for the rank, or no hull.
     """
     if functions not in FUNCTIONS:
-        raise DesignError(f"tensor_product.functions = {functions!r}: expected one of {', '.join(FUNCTIONS)}")
+        raise DesignError(f"tensor_product.functions = {functions!r}: expected {one_of(FUNCTIONS, functions)}")
     n, m = B.shape[2:]
     shape = (len(altitudes), len(velocities))
     if A.shape != (*shape, n, n) or B.shape != (*shape, n, m):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hsv.bags.description import FAULT_INJECTOR, NodeDescription
-from hsv.base.errors import ParameterError
+from hsv.base.errors import ParameterError, one_of
 from hsv.base.parameters import Parameter, read_number
 from hsv.graph.node_parameters import SETTABLE, parse
 from hsv.model.faults.injector import DURATION
@@ -52,7 +52,7 @@ def read_command(fields: Mapping[str, Any]) -> Command:
     """
     name = _text(fields, "command")
     if name not in _COMMANDS:
-        raise ParameterError(f"command = {name!r}: expected one of {', '.join(_COMMANDS)}")
+        raise ParameterError(f"command = {name!r}: expected {one_of(_COMMANDS, name)}")
     return _COMMANDS[name](fields)
 
 
@@ -96,5 +96,5 @@ def _text(fields: Mapping[str, Any], name: str, default: str | None = None) -> s
 def _choice(fields: Mapping[str, Any], name: str, known: Mapping[str, Any]) -> str:
     value = _text(fields, name)
     if value not in known:
-        raise ParameterError(f"{name} = {value!r}: expected one of {', '.join(known)}")
+        raise ParameterError(f"{name} = {value!r}: expected {one_of(known, value)}")
     return value
