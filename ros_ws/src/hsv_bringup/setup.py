@@ -17,10 +17,6 @@ setup(
     ],
     extras_require={"test": ["pytest"]},
     zip_safe=False,
-    maintainer="HSV bench maintainers",
-    maintainer_email="maintainers@hsv-bench.invalid",
-    description="Launch files, recorder and player of the bench.",
-    license="Apache-2.0",
     entry_points={
         "console_scripts": [
             "airframe = hsv_bringup.airframe:main",

@@ -15,10 +15,6 @@ setup(
     ],
     extras_require={"test": ["pytest"]},
     zip_safe=False,
-    maintainer="HSV bench maintainers",
-    maintainer_email="maintainers@hsv-bench.invalid",
-    description="Notch filter, nominal trajectory and Tube-MPC controller.",
-    license="Apache-2.0",
     entry_points={
         "console_scripts": [
             "controller = hsv_ctrl.blocks:controller",

@@ -16,8 +16,4 @@ setup(
     ],
     extras_require={"test": ["pytest"]},
     zip_safe=False,
-    maintainer="HSV bench maintainers",
-    maintainer_email="maintainers@hsv-bench.invalid",
-    description="What every node of the bench shares: lockstep links, parameters, message conversion, start and stop.",
-    license="Apache-2.0",
 )

@@ -15,10 +15,6 @@ setup(
     ],
     extras_require={"test": ["pytest"]},
     zip_safe=False,
-    maintainer="HSV bench maintainers",
-    maintainer_email="maintainers@hsv-bench.invalid",
-    description="The vehicle plant and the fault injector.",
-    license="Apache-2.0",
     entry_points={
         "console_scripts": [
             "plant = hsv_plant.plant:main",

@@ -151,11 +151,8 @@ def prepare(context: LaunchContext) -> list[Action]:
     except PackageNotFoundError:
         refuse("package hsv is not found: expected a built and sourced workspace (make setup, then source env.sh)")
     command = [hsv, "prepare", options["scenario"], "--json", "--folder", folder]
-    command += ["--real-time-factor", options["real_time_factor"]] if options["real_time_factor"] else []
-    command += ["--live-port", options["live_port"]] if options["live_port"] else []
-    command += ["--step-timeout", options["step_timeout"]] if options["step_timeout"] else []
-    command += ["--namespace", options["namespace"]]
-    command += ["--bag", options["bag"]] if options["bag"] else []
+    for name in ("real_time_factor", "live_port", "step_timeout", "namespace", "bag"):
+        command += [f"--{name.replace('_', '-')}", options[name]] if options[name] else []
     command += [f"--{name}" for name in ("composed", "external", "live", "paused") if options[name] == "true"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:

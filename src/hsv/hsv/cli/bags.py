@@ -42,7 +42,7 @@ def replay(
     from hsv.bags.replay import engine
     from hsv.bags.replay.attached import controller_of, estimated, flown_parameters, refuse_vacuous, supply
     from hsv.bags.replay.processes import processes_of
-    from hsv.flight.trust import require_trust
+    from hsv.flight.assembly import require_trust
 
     opened = Bag(bag)
     supply(opened, design, scenario)

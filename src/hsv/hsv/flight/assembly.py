@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import PurePath
 from typing import Any
 
 from hsv.base.errors import DesignError, HsvError, ParameterError, ScenarioError, TrimError
 from hsv.base.parameters import table_values
-from hsv.control.controllers import NODE, SHIPPED_CONTROLLERS, controller_class
+from hsv.control.controllers import NODE, SHIPPED_CONTROLLERS, controller_class, names_code
 from hsv.control.coverage import uncovered
 from hsv.control.design import (
     TAU,
@@ -132,6 +133,22 @@ def uncovered_of(
         certificate = read_certificate(path) if path.is_file() else None
     values = {**(design.to_parameters() if design else {}), **scenario.parameters()}
     return uncovered(values, design, certificate, [(f.channel, f.type, f.parameters) for f in scenario.fault])
+
+
+def require_trust(controller: str, source: object, trust: bool) -> None:
+    """Refuse a ``controller`` whose code the bag or campaign ``source`` names, unless the user passed ``--trust``.
+
+    A scenario or class on the command line is the user's own; a bag or a campaign may be anybody's. A controller that
+    is registered here under a name is installed code, which data may choose, not bring.
+    """
+    if names_code(controller) and not trust:
+        raise ParameterError(f"{source}: controller = {controller!r}: code that this file names, run only with --trust")
+
+
+def require_path_inside(path: str, field: str, source: object, trust: bool) -> None:
+    """Refuse a path in the bag or campaign ``source`` that leads out of its folder, unless the user trusts it."""
+    if (PurePath(path).is_absolute() or ".." in PurePath(path).parts) and not trust:
+        raise ParameterError(f"{source}: {field} = {path!r}: a path out of the folder, followed only with --trust")
 
 
 def _wrong_in_file(design: str) -> str:

@@ -40,11 +40,7 @@ class Components:
     fault_injector: FaultInjector
 
     def perturbed(self, perturbation: Mapping[str, float]) -> Components:
-        """Return the loop with a perturbed vehicle; all other components are shared.
-
-        Args:
-            perturbation: Relative changes by parameter name.
-        """
+        """Return the loop with a vehicle perturbed by relative changes; all other components are shared."""
         return replace(self, plant=self.plant.perturbed(perturbation))
 
 

@@ -46,13 +46,7 @@ class LoadedLibrary:
         yield self._memory.numbers(numbers)
 
     def request(self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, **_: Any) -> Any:
-        """Call the method ``name`` and return its result.
-
-        Args:
-            name: Name of the method.
-            arguments: Positional arguments.
-            kept: Keyword arguments.
-        """
+        """Call the method ``name`` with the ``arguments`` and the keywords ``kept``, and return its result."""
         return getattr(self, name)(*arguments, **(kept or {}))
 
     def describe(self, symbol: str) -> CBlock:

@@ -14,10 +14,10 @@ from hsv.bags.description import TUBE_STATUS
 from hsv.base.errors import CampaignError, ControllerError
 from hsv.control.design import find_design, read_parameters
 from hsv.control.estimator import ESTIMATOR_ENABLED
+from hsv.flight.assembly import require_path_inside
 from hsv.flight.campaign.sample_runner import FlightReading, Outcome
 from hsv.flight.campaign.summary import Results
 from hsv.flight.campaign.table import OUTCOMES
-from hsv.flight.trust import require_path_inside
 
 
 @dataclass(frozen=True)

@@ -101,13 +101,7 @@ class Campaign:
         return scenario_at_means(self._flown_table(flight, sample), self.scenario_name)[0]
 
     def file(self, flight: int, sample: Sequence[float], **replaced: str) -> str:
-        """Return the scenario of a flight with its sample as a file.
-
-        Args:
-            flight: Number of the flight.
-            sample: One value a factor.
-            replaced: Values that replace those of the scenario, by key.
-        """
+        """Return the scenario of a flight with its sample as a file; ``replaced``: other values, by key."""
         return tomli_w.dumps(self._flown_table(flight, sample) | replaced)
 
     def flight_seed(self, flight: int) -> int:

@@ -14,12 +14,12 @@ import pyarrow.parquet as pq
 
 from hsv.base.errors import CampaignError
 from hsv.control.controllers import names_code
+from hsv.flight.assembly import require_trust
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
 from hsv.flight.campaign.sample_runner import SampleRunner
 from hsv.flight.campaign.store import read_result
 from hsv.flight.campaign.table import OUTCOMES
-from hsv.flight.trust import require_trust
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -64,11 +64,7 @@ class Results:
     """The results of a campaign from its file; only :attr:`sample_runner` loads a controller."""
 
     def __init__(self, path: Path, *, trust: bool = False) -> None:
-        """Read ``path``.
-
-        Args:
-            path: The result file.
-            trust: Whether code named in the file may run, see :mod:`hsv.flight.trust`.
+        """Read the result file ``path``; ``trust``: whether code named in it may run.
 
         Raises:
             CampaignError: The file is missing, is not the result of a campaign, or has another version.
