@@ -60,7 +60,7 @@ def test_compiled_loop_equals_the_components_step_by_step_bit_for_bit(scenario, 
     for name in HISTORIES:
         assert_array_equal(getattr(compiled.history, name), stepped[name], err_msg=name)
     assert compiled.status == stepped["plant_status"][-1]
-    assert_array_equal(compiled.data().saturated, stepped["saturated"])
+    assert_array_equal(compiled.curves.saturated, stepped["saturated"])
 
 
 def test_two_flights_are_bit_identical_and_leave_the_components_as_they_were():
@@ -95,7 +95,7 @@ def test_unstable_loop_ends_diverged_with_everything_finite_and_limited():
     assert np.all(np.isfinite(flight.history.state[:-1]))
     command = flight.history.command
     assert np.all((command >= LIMITS.input_minimum) & (command <= LIMITS.input_maximum))
-    assert flight.data().saturated.any()
+    assert flight.curves.saturated.any()
 
 
 def test_a_plant_whose_arithmetic_overflows_still_ends_diverged():

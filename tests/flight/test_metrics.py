@@ -158,10 +158,10 @@ def test_order_and_names_are_those_of_the_table():
 def test_a_flight_that_was_recorded_has_the_same_metrics_in_every_bit(scenario, limited):
     flown = fly(components(scenario, duration=110.0)).data()
     columns = {name: getattr(flown, name).copy() for name in ("state", "reference", "deviation", "command")}
-    recorded = replace(flown, **columns, unlimited=np.where(flown.saturated, np.nan, flown.command))
-    assert flown.saturated.any() == limited
-    assert np.array_equal(flown.saturated, recorded.saturated)
-    assert np.array_equal(flown.curves, recorded.curves)
+    recorded = replace(flown, **columns, unlimited=np.where(flown.flight_curves.saturated, np.nan, flown.command))
+    assert flown.flight_curves.saturated.any() == limited
+    for name in ("curves", "saturated"):
+        assert np.array_equal(getattr(flown.flight_curves, name), getattr(recorded.flight_curves, name))
     assert flight_metrics(flown) == flight_metrics(recorded)
 
 
@@ -180,4 +180,4 @@ def test_sums_and_extremes_are_those_of_numpy_over_whole_columns():
     assert m["post_fault_attitude_from_nominal"] == nominal[after].max()
     mean = attitude[before & (flown.time >= 95.0 - 1e-9)].mean(axis=0)
     assert m["post_fault_attitude_deviation"] == np.abs(attitude[after] - mean).max()
-    assert m["saturated_steps"] == np.any(flown.saturated, axis=1).sum()
+    assert m["saturated_steps"] == np.any(flown.flight_curves.saturated, axis=1).sum()

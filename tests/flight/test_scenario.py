@@ -96,7 +96,7 @@ def test_metres_serve_as_well_as_feet():
             "tube.change[0].start = 999 s: expected a time before the flight's end, 200 s",
         ),
         ("[[fault]]", "[fault]", "fault = {"),
-        ("saturated_steps", "stalls", "limits.stalls: no such metric, expected one of altitude_rise_time"),
+        ("saturated_steps", "stalls", "limits.stalls: unknown key, expected one of altitude_rise_time"),
         ('"8 ft"', '"8 s"', "limits.altitude_end_error = '8 s': wrong unit"),
         ('"8 ft"', '"-8 ft"', "limits.altitude_end_error = '-8 ft': expected of at least 0 ft"),
         (

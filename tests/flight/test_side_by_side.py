@@ -29,7 +29,9 @@ def check(flights, group=None):
         if levels.set:
             assert level == pytest.approx(levels.worst(own.data()), rel=0, abs=0, nan_ok=True)
         for name in ("curves", "saturated"):
-            assert np.array_equal(getattr(together.curves, name), getattr(own.data(), name), equal_nan=True), name
+            assert np.array_equal(
+                getattr(together.curves, name), getattr(own.data().flight_curves, name), equal_nan=True
+            ), name
         assert together.fingerprint == own.fingerprint
         assert together.status == own.status and len(together.time) == len(own.time)
         for name, column in own.history.columns().items():

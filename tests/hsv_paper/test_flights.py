@@ -16,7 +16,7 @@ def test_a_flight_in_process_is_flown_once_and_not_kept(tmp_path):
     assert flights["case1"] is flight
     assert not list(tmp_path.iterdir())
     again = fly(assemble(flight_parameters(load_scenario("case1")))).data()
-    for name in ("state", "reference", "deviation", "command", "saturated", "gain_index"):
+    for name in ("state", "reference", "deviation", "command", "unlimited", "gain_index"):
         assert np.array_equal(getattr(flight, name), getattr(again, name)), name
     assert flight.fault_start == again.fault_start
     assert np.array_equal(flight.time, again.time)

@@ -152,16 +152,6 @@ class FlightData:
     fault_start: float | None
     """Time of the first fault (s), ``None`` without one."""
 
-    @property
-    def curves(self) -> np.ndarray:
-        """Curves of :class:`FlightCurves`."""
-        return self.flight_curves.curves
-
-    @property
-    def saturated(self) -> np.ndarray:
-        """Mask (n + 1, 2) of the limited commands."""
-        return self.flight_curves.saturated
-
     @cached_property
     def flight_curves(self) -> FlightCurves:
         """Curves from which metrics are computed."""
@@ -187,9 +177,10 @@ def read_curves(signals: np.ndarray, auxiliary: np.ndarray, reference: np.ndarra
     return curves, saturated.view(bool)
 
 
-def flight_metrics(flight: FlightData | FlightCurves) -> dict[str, float]:
-    """Return the metrics of ``flight``, SI, without those that it does not define (no step, no fault)."""
+def flight_metrics(given: FlightData | FlightCurves) -> dict[str, float]:
+    """Return the metrics of a flight, SI, without those that it does not define (no step, no fault)."""
     values: dict[str, float] = {}
+    flight = given.flight_curves if isinstance(given, FlightData) else given
     time, curves = flight.time, flight.curves
     faultless = len(time) if flight.fault_start is None else int(np.searchsorted(time, flight.fault_start - 1e-9))
     before, after = slice(faultless), slice(faultless, None)

@@ -14,7 +14,7 @@ from pydantic import Field, StrictInt, ValidationError
 
 from hsv.base.errors import DocumentError, HsvError, ParameterError, ScenarioError, one_of
 from hsv.base.files import follow_extends, is_path, parse_toml, read_text
-from hsv.base.parameters import Parameter, read_number, table_values
+from hsv.base.parameters import Parameter, table_values
 from hsv.control.controllers import SHIPPED_CONTROLLERS
 from hsv.control.design import TAU, rigid_factors
 from hsv.control.effectiveness import EFFECTIVENESS_PARAMETERS
@@ -142,6 +142,11 @@ _PARAMETERS = (
 
 SETTINGS = frozenset(parameter.name.partition(".")[0] for parameter in _PARAMETERS)
 """Tables of the components: reference, notch filter, laws, hardware (ideal by default) and estimators."""
+
+_LIMITS = tuple(
+    Parameter(f"limits.{name}", 0.0, metric.meaning, metric.unit, 0.0, whole=metric.counted)
+    for name, metric in METRICS.items()
+)
 
 _NO_KEYS = ("name", "own", "settings")
 """Fields that are not keys of a file."""
@@ -334,7 +339,10 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
             ]
             if isinstance(faults, list | tuple)
             else faults,
-            "limits": _limits(table.get("limits", {})),
+            "limits": {
+                name.removeprefix("limits."): value
+                for name, value in table_values(_LIMITS, {"limits": table.get("limits", {})}).items()
+            },
             "vehicle": vehicle,
         }
         scenario = Scenario.model_validate(given, context=reading)
@@ -357,20 +365,6 @@ def _custom_tables(table: dict[str, Any]) -> dict[str, Any]:
         return {}
     known = Scenario.model_fields.keys() | SETTINGS
     return {key: value for key, value in table.items() if isinstance(value, dict) and key not in known}
-
-
-def _limits(table: object) -> dict[str, float]:
-    if not isinstance(table, dict):
-        raise ScenarioError(f"limits = {table!r}: expected a table of metrics")
-    for name in table:
-        if name not in METRICS:
-            raise ScenarioError(f"limits.{name}: no such metric, expected {one_of(METRICS, name)}")
-    return {
-        name: read_number(
-            Parameter(name, 0.0, "", METRICS[name].unit, 0.0, whole=METRICS[name].counted), value, f"limits.{name}"
-        )
-        for name, value in table.items()
-    }
 
 
 def _check(scenario: Scenario, tables: Collection[str]) -> None:

@@ -87,7 +87,7 @@ def input_ranges(flights: Flights, scenarios: Sequence[str]) -> str:
 
 def limited(flights: Flights, scenarios: Sequence[str]) -> str:
     """Return in how many steps of several flights a command was saturated, in words."""
-    steps = sum(int(np.any(flights[scenario].saturated, axis=1).sum()) for scenario in scenarios)
+    steps = sum(int(np.any(flights[scenario].flight_curves.saturated, axis=1).sum()) for scenario in scenarios)
     return f"saturated in {steps or 'no'} step{'s' if steps > 1 else ''} of the {len(scenarios)} flights"
 
 
