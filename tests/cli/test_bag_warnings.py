@@ -135,14 +135,6 @@ def test_a_bag_without_a_step_is_refused(hsv: Hsv, bag: Path, tmp_path: Path) ->
         assert ran.code == 2 and "holds no complete step, expected a flight" in ran.error
 
 
-@pytest.mark.long
-def test_flights_of_one_scenario_are_all_plotted(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
-    other = flown_bag(tmp_path / "other", fault=8.0)
-    assert hsv("plot", str(bag), str(other), "--out", "both.svg").code == 0
-    text = (tmp_path / "both.svg").read_text()
-    assert "short (flown)" in text and "short (other)" in text
-
-
 @pytest.mark.parametrize("command", ["info", *map(long, ("replay", "report", "plot", "export"))])
 def test_a_lost_message_is_said_and_no_row_is_taken_for_another(
     hsv: Hsv, bag: Path, tmp_path: Path, command: str

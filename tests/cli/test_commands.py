@@ -28,33 +28,11 @@ PUBLISHED_POINT = ("--altitude", "85000 ft", "--velocity", "7702.0808 ft/s")
 
 
 @pytest.mark.parametrize("command", sorted(COMMANDS))
-def test_help_of_every_command_has_an_example(hsv, command):
+def test_help_of_every_command_has_an_example_and_json_if_it_prints_numbers(hsv, command):
     ran = hsv(command, "--help")
     assert ran.code == 0
     assert f"Example: hsv {command}" in ran.out
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("words", "prose"),
-    [
-        (("certify",), "A new invariant set is computed, and the nominal trajectory must fit"),
-        (("montecarlo", "fly"), "The exit code is 1 if every flight crashed."),
-    ],
-)
-def test_the_prose_of_a_help_text_is_folded_by_the_terminal_alone(words, prose):
-    ran = subprocess.run(
-        [sys.executable, "-m", "hsv.cli.entry", *words, "-h"],
-        capture_output=True,
-        text=True,
-        env=os.environ | {"COLUMNS": "300"},
-    )
-    assert prose in ran.stdout
-
-
-@pytest.mark.parametrize("command", sorted({*COMMANDS} - PRINT_NO_NUMBERS))
-def test_every_command_that_prints_numbers_prints_json_if_asked(hsv, command):
-    assert "--json" in hsv(command, "--help").out
+    assert command in PRINT_NO_NUMBERS or "--json" in ran.out
 
 
 def test_the_version_is_that_of_the_library(hsv):
@@ -109,12 +87,6 @@ def test_trim_of_the_literature_to_all_digits(hsv):
     assert values["largest_residual_si"] < 1e-12
 
 
-def test_trim_table_for_people(hsv):
-    out = hsv("trim", *PUBLISHED_POINT, "--units", "paper").out
-    for words in (("angle of attack", "1.6446", "deg"), ("elastic coordinate 1", "0.97395", "slug^0.5 ft")):
-        assert any(all(word in line for word in words) for line in out.splitlines())
-
-
 @pytest.mark.parametrize(
     ("coupling", "expected"),
     [("derived", {(13.73, 0.0166), (18.80, 0.0197)}), ("paper_like", {(15.89, 0.0198), (19.47, 0.0199)})],
@@ -167,13 +139,6 @@ def test_simulate_case1(hsv, units):
         unit = unit_key(PAPER_UNITS.get(si, si) if units == "paper" else si)
         assert key == "_".join(filter(None, (name, unit)))
     assert ("altitude_end_error_ft" in ran.json["metrics"]) is (units == "paper")
-
-
-def test_simulate_prints_a_table_with_verdicts(hsv):
-    out = hsv("simulate", "case1_single_k", "--units", "paper").out
-    assert "over 2 ft/s" in out
-    assert "within 0.25 deg" in out
-    assert "x real time" in out
 
 
 def test_simulate_saves_the_histories(hsv, tmp_path):
@@ -373,7 +338,8 @@ def test_a_traceback_is_printed_if_asked_for(hsv, monkeypatch, words):
 
 def test_with_strict_a_limit_that_is_not_kept_is_no_success(hsv):
     assert hsv("simulate", "case1", "--strict").code == 0
-    assert hsv("simulate", "case1_single_k").code == 0
+    ran = hsv("simulate", "case1_single_k", "--units", "paper")
+    assert ran.code == 0 and "over 2 ft/s" in ran.out and "within 0.25 deg" in ran.out
     ran = hsv("simulate", "case1_single_k", "--strict", "--all")
     assert ran.code == 1
     assert "limits not kept" in ran.error

@@ -9,7 +9,7 @@ from marking import long
 from hsv.control.design import digest, find_design, read_parameters
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
-from hsv.flight.fingerprint import _table, as_published, fingerprint, published_in_words
+from hsv.flight.fingerprint import _table, as_published, fingerprint
 from hsv.flight.metrics import flight_metrics
 from hsv.flight.scenario import load_scenario, scenario_names
 
@@ -60,13 +60,6 @@ def test_published_fingerprints_hold_for_the_shipped_scenario_with_its_design():
     ):
         assert as_published("v1:0", other, with_design) is None
     assert as_published(None, scenario, design) is None
-
-
-def test_words_say_what_was_compared():
-    assert published_in_words("v1:0", True) == "as published"
-    assert published_in_words("v1:0", False) == "not the published flight of this scenario"
-    assert published_in_words("v1:0", None) == "none is published"
-    assert published_in_words(None, None) == "none: steps are missing"
 
 
 SOLVED_IN_FLIGHT = {

@@ -52,6 +52,13 @@ def test_nodes_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> 
 
 
 @pytest.mark.long
+def test_composed_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> None:
+    bag = processes.folder / "by_hand"
+    words = ["-p", f"bag.directory:={bag}", *LONG]
+    inject_and_land(processes, processes.start("ros2", "run", "hsv_bringup", "composed", "--ros-args", *words), bag)
+
+
+@pytest.mark.long
 def test_a_flight_by_hand_is_told_and_can_be_repeated(processes: Processes) -> None:
     bag = processes.folder / "by_hand"
     # Nodes need not have the same parameters, and each is repeated with its own.
@@ -191,18 +198,11 @@ def test_who_does_not_answer_is_given_up_by_name(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize(
     ("package", "executable", "arguments", "words"),
     [
-        long("hsv_plant", "plant", ["-p", "duration:=10"], ["duration = 10", "expected double"]),
         long(
             "hsv_plant",
             "plant",
             ["-p", "initial.altitude:=30000.0"],
             ["initial.altitude = 30000.0", "25908 to 26365.2 m"],
-        ),
-        long(
-            "hsv_plant",
-            "plant",
-            ["-p", "vehicle.coupling:=strong"],
-            ["vehicle.coupling = 'strong'", "paper_like, derived"],
         ),
         long(
             "hsv_plant",
@@ -224,7 +224,6 @@ def test_who_does_not_answer_is_given_up_by_name(monkeypatch: pytest.MonkeyPatch
         long(
             "hsv_ctrl", "nominal_trajectory", ["-p", "reference.velocities:=[1.0]"], ["reference.velocities[0] = 1.0"]
         ),
-        long("hsv_ctrl", "nominal_trajectory", ["--params-file", "missing.yaml"], ["missing.yaml"]),
         long("hsv_bringup", "recorder", ["-p", "bag.attachments:=[nowhere.txt]"], ["bag.attachments = 'nowhere.txt'"]),
     ],
 )

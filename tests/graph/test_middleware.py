@@ -60,13 +60,3 @@ def test_fast_dds_takes_our_settings_without_a_word(ros_environment, tmp_path):
     for name in ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"):
         ros_environment.pop(name, None)
     assert said_by_fast_dds(ros_environment, tmp_path) == ""
-
-
-@pytest.mark.long
-@pytest.mark.graph
-@pytest.mark.parametrize("tag", ["initialAnnouncements", "nackSupressionDuration"])
-def test_fast_dds_would_name_a_setting_that_it_does_not_know(ros_environment, tmp_path, tag):
-    misspelled = tmp_path / "misspelled.xml"
-    misspelled.write_text(PROFILES.read_text().replace(tag, f"{tag}s"))
-    said = said_by_fast_dds(ros_environment | {"FASTRTPS_DEFAULT_PROFILES_FILE": str(misspelled)}, tmp_path)
-    assert "XMLPARSER" in said and f"{tag}s" in said

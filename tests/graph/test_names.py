@@ -77,16 +77,6 @@ def test_two_graphs_in_one_domain(processes: Processes) -> None:
 
 
 @pytest.mark.long
-def test_two_graphs_in_one_domain_fly_as_published(processes: Processes) -> None:
-    words = ("hsv", "run", "case1", "--no-report", "--json", "--bag")
-    runs = [processes.start(*words, processes.folder / name, "--namespace", f"/{name}") for name in ("veh1", "veh2")]
-    assert all(output_of(run) and run.returncode == 0 for run in runs)
-    for name in ("veh1", "veh2"):
-        found = json.loads(processes.run("hsv", "info", processes.folder / name, "--json").stdout)
-        assert found["as_published"] is True
-
-
-@pytest.mark.long
 def test_remapped_by_hand_with_duplicates_and_parameters_dumped(processes: Processes) -> None:
     folder = processes.folder
     alone = processes.start("ros2", "run", "hsv_ctrl", "notch_filter", "--ros-args", "-r", "__ns:=/alone")

@@ -56,15 +56,6 @@ def test_limits_of_the_scenario_are_kept(flown, name):
     assert within_limits(name, metrics) == {}
 
 
-def test_case1(flown):
-    _, m = flown("case1")
-    assert m["saturated_steps"] == 0
-    assert abs(m["altitude_end_error"]) <= 8 * FOOT
-    assert abs(m["velocity_end_error"]) <= 2 * FOOT
-    assert m["post_fault_attitude_deviation"] <= 0.25 * DEGREE
-    assert m["elastic_decay_time"] < 12
-
-
 def test_case1_is_what_the_control_study_measured(flown):
     # Control study, section 7; its gains differ in the last digits, so the tolerance is theirs.
     _, m = flown("case1")

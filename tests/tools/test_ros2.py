@@ -63,7 +63,6 @@ def test_run_is_replaced_by_the_executable(prefix):
 def test_run_with_a_prefix_command(prefix):
     result = ros2(prefix, "run", "--prefix", "echo 'a b'", "alpha", "talk", "c")
     assert result.stdout == f"a b {prefix}/lib/alpha/talk c\n"
-    assert ros2(prefix, "run", "--prefix", "no_such_debugger", "alpha", "talk").returncode == 1
 
 
 @pytest.mark.parametrize(
@@ -112,13 +111,6 @@ def test_other_commands_need_the_full_tools(prefix, arguments):
     assert result.returncode == 2
     assert "full ROS 2 command-line tools" in result.stderr
     assert result.stderr.count("\n") == 1
-
-
-@pytest.mark.parametrize("arguments", [(), ("--help",), ("run", "--help"), ("pkg", "prefix", "-h")])
-def test_help(prefix, arguments):
-    result = ros2(prefix, *arguments)
-    assert (result.returncode, result.stderr) == (0, "")
-    assert result.stdout.startswith("usage: ros2")
 
 
 def test_it_steps_aside_for_a_real_ros2_but_not_for_its_own_kind(prefix, tmp_path):

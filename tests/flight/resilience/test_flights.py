@@ -71,15 +71,6 @@ def test_a_flight_that_ends_early_is_compared_as_far_as_it_goes():
     assert distances(short, still, 2.0) == (1.0, 0.0, None)
 
 
-def test_the_baseline_is_lost_between_0_525_and_0_55_of_the_elevator():
-    campaign, fault = plan(("case1",), ("elevator_loss",)), TRIED["elevator_loss"]
-    runner = SubjectRunner(campaign.subjects[0], Moment.after)
-    known = {fault.severity(value): runner.survives(fault, fault.severity(value)) for value in (0.9, 0.4)}
-    found = boundary(lambda severity: runner.survives(fault, severity), known, 0.02, as_it_is)
-    assert 0.525 - 0.02 <= fault.value(found.lost) < fault.value(found.survived) <= 0.55 + 0.02
-    assert runner.survives(fault, fault.severity(0.55)) and not runner.survives(fault, fault.severity(0.525))
-
-
 def test_a_fault_without_effect_leaves_the_flight_where_it_is():
     campaign, fault = plan(("case1",), ("elevator_loss",)), TRIED["elevator_loss"]
     runner = SubjectRunner(campaign.subjects[0], Moment.during)
