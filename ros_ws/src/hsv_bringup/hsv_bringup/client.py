@@ -22,7 +22,7 @@ from hsv.base.processes import take_signals
 from hsv.graph.exclusive import is_published, ros_domain
 from hsv.graph.standstill import Standstill
 from hsv_node import roles
-from hsv_node.middleware import LATCHED, type_name
+from hsv_node.middleware import LATCHED, ServiceCall, type_name
 from hsv_node.process import ends_with
 
 ABSENT_AFTER = 3.0
@@ -79,11 +79,9 @@ class GraphClient(Node):
     def call(self, role: NodeDescription, kind: Any, request: Any) -> Any:
         """Call the service of type ``kind`` of the node in ``role`` and return the reply."""
         service = self._name_of(role, roles.services, kind) or self._refuse_absent(role)
-        client = self.create_client(kind, service)
-        if self.wait_for(client.service_is_ready, service):
-            future = client.call_async(request)
-            if self.wait_for(future.done, service):
-                return future.result()
+        call = ServiceCall(self, kind, service, request)
+        if self.wait_for(call.response, service):
+            return call.response()
         raise RunError(f"no answer from {service} for {SILENT_AFTER:g} s")
 
     def publishers_of(self, topic: str) -> list[str]:

@@ -13,13 +13,11 @@ from hsv_msgs.msg import Fault, Run, VehicleState
 from hsv_msgs.srv import ClearFault, InjectFault
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetParameters, SetParameters
-from rclpy.client import Client
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
-from rclpy.task import Future
 
 from hsv.bags.description import (
     CONTROLLER,
@@ -48,7 +46,7 @@ from hsv.pages.panels import INPUTS
 from hsv_bringup.client import ABSENT_AFTER, SILENT_AFTER
 from hsv_bringup.flow_executor import FlowExecutor
 from hsv_node.main import run_node
-from hsv_node.middleware import LATCHED, message_class, type_name
+from hsv_node.middleware import LATCHED, ServiceCall, message_class, type_name
 from hsv_node.parameters import declare, refuse_unknown
 from hsv_node.process import ProcessNode
 from hsv_node.roles import full_name, node_in_role, services
@@ -91,8 +89,7 @@ class _Request:
     """Function called with the response."""
     refused: Callable[[str], None]
     """Function called with the reason if there is no response."""
-    client: Client | None = None
-    future: Future | None = None
+    call: ServiceCall | None = None
     standstill: Standstill = field(default_factory=Standstill)
 
 
@@ -139,8 +136,8 @@ class LiveNode(ProcessNode):
         for request in list(self._requests):
             if self._finished(request):
                 self._requests.remove(request)
-                if request.client is not None:
-                    self.destroy_client(request.client)
+                if request.call:
+                    request.call.close()
         if time.monotonic() >= self._next_plant_check:
             self._next_plant_check = time.monotonic() + _PLANT_CHECK
             self._check_plant()
@@ -261,21 +258,19 @@ class LiveNode(ProcessNode):
 
     def _finished(self, request: _Request) -> bool:
         """Continue with a request; return whether it is answered or abandoned."""
-        if request.future is not None and request.future.done():
-            request.done(request.future.result())
+        if request.call and (response := request.call.response()):
+            request.done(response)
             return True
-        if request.client is None:
+        if request.call is None:
             node = node_in_role(self, request.role)
             kinds = services(self, *node) if node else {}
             name = next((name for name, types in kinds.items() if type_name(request.kind) in types), None)
             if node and name:
-                request.client = self.create_client(request.kind, name)
+                request.call = ServiceCall(self, request.kind, name, request.request)
                 if request.role is PLANT:
                     self._plant = full_name(*node)
-        elif request.future is None and request.client.service_is_ready():
-            request.future = request.client.call_async(request.request)
         still = request.standstill.look(sorted(self.get_node_names_and_namespaces()))
-        if request.client is None and still > ABSENT_AFTER:
+        if request.call is None and still > ABSENT_AFTER:
             request.refused(f"no {request.role.name}: expected a flight whose {request.role.name} is there")
             return True
         if still > SILENT_AFTER:

@@ -7,13 +7,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters, ListParameters
-from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
-from rclpy.task import Future
 
 from hsv.bags.description import COMPOSED
 from hsv.graph.standstill import Standstill, processor_time_of
+from hsv_node.middleware import ServiceCall
 
 GIVE_UP_AFTER = 10.0
 """Time (s) without answers or processor time of the silent nodes after which the recorder stops waiting for them."""
@@ -64,45 +63,32 @@ class _Peer:
     """Requests to a node: first for the names of its parameters, then for their values."""
 
     def __init__(self, node: Node, name: str) -> None:
-        self._node = node
-        self._list = node.create_client(ListParameters, f"{name}/list_parameters")
-        self._get = node.create_client(GetParameters, f"{name}/get_parameters")
+        self._node, self._name = node, name
+        self._call = ServiceCall(node, ListParameters, f"{name}/list_parameters", ListParameters.Request())
         self._names: list[str] | None = None
-        self._future: Future | None = None
         self.values: dict[str, Any] | None = None
 
     @property
     def service(self) -> str:
         """Name of the service whose reply is pending."""
-        return str(self._client.service_name)
-
-    @property
-    def _client(self) -> Client:
-        return self._list if self._names is None else self._get
+        return self._call.name
 
     def ask(self) -> None:
-        """Send the next request when its service is ready; store the answer when it has arrived."""
-        if self.values is not None:
+        """Take the response if it has arrived, and send the next request."""
+        if self.values is not None or not (response := self._call.response()):
             return
-        if self._future is None:
-            if self._client.service_is_ready():
-                request = ListParameters.Request() if self._names is None else GetParameters.Request(names=self._names)
-                self._future = self._client.call_async(request)
-        elif self._future.done():
-            answer, self._future = self._future.result(), None
-            if self._names is None:
-                self._names = sorted(answer.result.names)
-            else:
-                self.values = {
-                    name: value
-                    for name, sent in zip(self._names, answer.values, strict=True)
-                    if (value := _plain(parameter_value_to_python(sent))) is not None
-                }
+        if self._names is None:
+            self.close()
+            self._names = sorted(response.result.names)
+            request = GetParameters.Request(names=self._names)
+            self._call = ServiceCall(self._node, GetParameters, f"{self._name}/get_parameters", request)
+            return
+        found = zip(self._names, map(parameter_value_to_python, response.values), strict=True)
+        self.values = {name: _plain(value) for name, value in found if value is not None}
 
     def close(self) -> None:
         """Stop asking."""
-        for client in (self._list, self._get):
-            self._node.destroy_client(client)
+        self._call.close()
 
 
 def _plain(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The middleware: quality of service, message classes by name, and settings of Fast DDS."""
+"""The middleware: quality of service, message classes by name, calls of services, and settings of Fast DDS."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.task import Future
 
 STEP = QoSProfile(depth=256, reliability=ReliabilityPolicy.RELIABLE)
 """Quality of service of the step topics; the queue is deeper than the lead of the plant over the recorder."""
@@ -34,6 +36,34 @@ def type_name(kind: type) -> str:
     """Return the type of a class of messages or of a service, such as ``"hsv_msgs/srv/InjectFault"``."""
     package, section, _ = kind.__module__.split(".")
     return f"{package}/{section}/{kind.__name__}"
+
+
+class ServiceCall:
+    """A request to a service, which is sent once the service is ready; the node continues meanwhile."""
+
+    def __init__(self, node: Node, kind: Any, name: str, request: Any) -> None:
+        """Prepare to send the ``request`` to the service ``name`` of type ``kind``."""
+        self.name = name
+        self._node, self._request = node, request
+        self._client = node.create_client(kind, name)
+        self._future: Future | None = None
+
+    @property
+    def sent(self) -> bool:
+        """Whether the request has been sent."""
+        return self._future is not None
+
+    def response(self) -> Any:
+        """Return the response, None until it has arrived; call it repeatedly."""
+        if self._future is not None:
+            return self._future.result() if self._future.done() else None
+        if self._client.service_is_ready():
+            self._future = self._client.call_async(self._request)
+        return None
+
+    def close(self) -> None:
+        """Release the client."""
+        self._node.destroy_client(self._client)
 
 
 def prefer_profiles(environment: MutableMapping[str, str] = os.environ, directory: Path | None = None) -> None:

@@ -13,10 +13,8 @@ import rclpy
 from hsv_msgs.msg import Ready, RecorderProgress, Reference, Run, VehicleState
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import ListParameters
-from rclpy.client import Client
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter as RosParameter
-from rclpy.task import Future
 
 from hsv.bags.description import (
     ACTUATOR,
@@ -44,7 +42,7 @@ from hsv.model.plant import FlightStatus, Plant
 from hsv.model.signals import INPUT_NAMES
 from hsv_node.lockstep import LINK_CHECK, LockstepNode, run_in_words, short_id, step_in_words
 from hsv_node.main import run_node
-from hsv_node.middleware import LATCHED, STEP
+from hsv_node.middleware import LATCHED, STEP, ServiceCall
 from hsv_node.parameters import declare, declare_vehicle, refuse_sim_time
 
 MAX_AHEAD = 100
@@ -307,18 +305,17 @@ def unresponsive(
     # The remappings of the command line do not apply to the helper.
     helper = rclpy.create_node(f"{node.get_name()}_liveness", context=node.context, use_global_arguments=False)
     try:
-        clients: dict[str, Client] = {}
-        futures: dict[str, Future] = {}
+        calls: dict[str, ServiceCall] = {}
         standstill, answered = Standstill(), list[str]()
-        while standstill.look((len(futures), len(answered))) < wait and len(answered) < len(peers):
+        while standstill.look((sum(call.sent for call in calls.values()), len(answered))) < wait and len(
+            answered
+        ) < len(peers):
             for peer in peers:
-                if peer.name not in clients and (name := node.node_in_role(peer)):
-                    clients[peer.name] = helper.create_client(ListParameters, f"{name}/list_parameters")
-            for peer_name, client in clients.items():
-                if peer_name not in futures and client.service_is_ready():
-                    futures[peer_name] = client.call_async(ListParameters.Request())
+                if peer.name not in calls and (name := node.node_in_role(peer)):
+                    service = f"{name}/list_parameters"
+                    calls[peer.name] = ServiceCall(helper, ListParameters, service, ListParameters.Request())
             rclpy.spin_once(helper, timeout_sec=0.05)
-            answered += [name for name, future in futures.items() if future.done() and name not in answered]
+            answered += [name for name, call in calls.items() if call.response() and name not in answered]
         return [peer.name for peer in peers if peer.name not in answered], answered[-1] if answered else None
     finally:
         helper.destroy_node()
