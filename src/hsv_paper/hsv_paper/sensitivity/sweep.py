@@ -96,7 +96,7 @@ def feedback(controller: Controller) -> Feedback:
     gain = design.adjusted_gain(design.tau)
     if values["controller"] == "robust_mpc":
         gain = design.nominal_gains[values["robust_mpc.gain_index"]]
-    return Feedback(gain, flown_sections(values) if values["notch.enabled"] else (), design.period)
+    return Feedback(gain, flown_sections(values) if values.get("notch.enabled", True) else (), design.period)
 
 
 def sweep(scope: Scope, name: str, along: Mapping[Controller, Sequence[Point]]) -> dict[Controller, Columns]:
