@@ -9,7 +9,7 @@ import pytest
 from rich.text import Text
 
 from hsv.api import fly
-from hsv.base.units import UnitSystem, in_system, significant
+from hsv.base.units import UnitSystem, duration_in_words, in_system, significant
 from hsv.cli.output import console
 from hsv.flight.limits import verdict_sentence, verdicts
 from hsv.flight.metrics import METRICS, Group
@@ -68,6 +68,8 @@ def test_units_of_json_are_strict_si_unless_the_papers_are_asked_for(hsv) -> Non
 def test_a_number_has_three_digits_and_all_before_its_point() -> None:
     values = (0.0123456, 1.23456, 12.3456, 123.456, 26060.4, 1.23456e7, -99.96, 0.0)
     assert [significant(v) for v in values] == ["0.0123", "1.23", "12.3", "123", "26060", "1.23e+07", "-100", "0"]
+    seconds = (0.42, 64.0, 97.0, 900.0, 20000.0)
+    assert [duration_in_words(s) for s in seconds] == ["0.42 s", "64 s", "2 min", "15 min", "5 h 33 min"]
 
 
 def test_the_metric_system_is_si_but_for_degrees_and_percent() -> None:

@@ -11,7 +11,7 @@ from hsv.base.errors import QuantityError, one_of
 from hsv.cli.entry import Command
 from hsv.cli.main import run
 from hsv.cli.options import JsonOption
-from hsv.cli.output import check_folder, check_target, console, errors, print_json, stages
+from hsv.cli.output import check_folder, check_target, console, print_estimate, print_json, stages
 
 if TYPE_CHECKING:
     from hsv_paper.claims.page import Ranks
@@ -26,6 +26,9 @@ CoarsenessOption = Annotated[float, typer.Option(help="1: as in the docs; 4: a q
 StudyOption = Annotated[Path, typer.Option("--out", help="Folder for a PDF, a PNG and a page on the study.")]
 
 _FLIGHTS = Path("bags/study")
+
+_SECONDS = {"figure": 4.0, "claims": 900.0}
+"""Time on one processor: of a figure, and of the claims with their 17 scenarios of 1025 vehicles each."""
 
 
 def main() -> None:
@@ -56,6 +59,7 @@ def figures(
     chosen = [figure for number, figure in FIGURES.items() if not only or number in only]
     check_folder(out, "out")
     out.mkdir(parents=True, exist_ok=True)
+    print_estimate(_SECONDS["figure"] * len(chosen), json)
     written = {}
     with stages() as progress, matplotlib.rc_context(RC):
         source = Flights(out)
@@ -92,7 +96,7 @@ def claims(
     if out:
         check_target(out, "out")
     check_folder(flights, "flights")
-    errors.print(f"17 scenarios with 1025 vehicles each: about 15 min, less with the flights kept in {flights}")
+    print_estimate(_SECONDS["claims"], json, f", less with the flights kept in {flights}")
     with stages() as progress:
         evidence = Evidence(flights, progress)
         judged = judge(evidence, progress)
@@ -175,8 +179,7 @@ def make(study: Study, out: Path, flights: Path, coarseness: float, beside: list
         raise QuantityError(f"coarseness = {coarseness}: expected 1 to 100")
     check_folder(out, "out")
     check_folder(flights, "flights")
-    minutes = max(1, round(study.minutes / coarseness))
-    errors.print(f"about {minutes} min on one processor, less with the flights kept in {flights}")
+    print_estimate(60.0 * study.minutes / coarseness, json, f", less with the flights kept in {flights}")
     out.mkdir(parents=True, exist_ok=True)
     with stages() as progress, matplotlib.rc_context(RC):
         outcome = study.run(Scope(coarseness, flights, progress, beside))

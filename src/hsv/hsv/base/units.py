@@ -147,6 +147,14 @@ def in_words(value: float, unit: str, system: UnitSystem) -> str:
     return significant(number) + ("" if name in ("", "1") else f" {name}")
 
 
+def duration_in_words(seconds: float) -> str:
+    """Return a wall time as people read it: ``40 s``, ``12 min`` or ``2 h 5 min``."""
+    hours, minutes = divmod(round(seconds / 60.0), 60)
+    if minutes < 2 and not hours:
+        return f"{significant(seconds, 2)} s"
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
+
+
 def si_unit_of(text: object) -> str:
     """Return the SI unit of a quantity as written, ``"1"`` if it has no unit or is no quantity."""
     try:

@@ -21,7 +21,7 @@ from rich.text import Text
 
 from hsv.base.errors import ParameterError, reason
 from hsv.base.files import json_text
-from hsv.base.units import UnitSystem, in_system, significant, unit_in
+from hsv.base.units import UnitSystem, duration_in_words, in_system, significant, unit_in
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -119,6 +119,12 @@ def print_bag_warnings(*bags: Bag) -> None:
     for bag in {bag.path: bag for bag in bags}.values():
         if words := bag_warnings(bag):
             warn(f"{bag.path}: {'; '.join(words)}")
+
+
+def print_estimate(seconds: float, as_json: bool, remark: str = "") -> None:
+    """Print on standard error how long a computation takes on one processor; nothing for a program."""
+    if not as_json:
+        errors.print(f"about {duration_in_words(seconds)} on one processor{remark}", soft_wrap=True)
 
 
 def report_error(problem: object) -> None:
@@ -312,16 +318,10 @@ def flights(title: str, total: int) -> Iterator[Callable[[int], None]]:
             begun[:1] = begun[:1] or [(time.monotonic(), finished)]
             start, before = begun[0]
             rate = (finished - before) / max(time.monotonic() - start, 1e-9)
-            left = f", {_clock((total - finished) / rate)} left" if finished > before else ""
+            left = f", {duration_in_words((total - finished) / rate)} left" if finished > before else ""
             bar.update(task, completed=finished, note=f"{finished} of {total} flights, {rate:.1f} / s{left}")
 
         yield report
-
-
-def _clock(seconds: float) -> str:
-    minutes, seconds = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes:02} min" if hours else f"{minutes}:{seconds:02}"
 
 
 def check_target(path: Path, field: str, *suffixes: str) -> None:

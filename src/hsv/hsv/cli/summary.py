@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.text import Text
 
 from hsv.base.errors import RunError
-from hsv.base.units import UnitSystem, in_system, significant, unit_in
+from hsv.base.units import UnitSystem, duration_in_words, in_system, significant, unit_in
 from hsv.cli.output import console, errors, folded, json_system, new_table, print_json, say, to_json
 from hsv.flight.fingerprint import as_published, published_in_words
 from hsv.flight.flight import step_times_in_words
@@ -168,11 +168,9 @@ def print_section(title: str, lines: Mapping[str, object]) -> None:
 
 def announce(capacity: Capacity) -> None:
     """Print the expected size and duration of a campaign."""
-    hours, minutes = divmod(capacity.wall_time / 60.0, 60.0)
-    duration = f"{hours:.0f} h {minutes:.0f} min" if hours else f"{significant(capacity.wall_time, 2)} s"
     cores = "core" if capacity.cores == 1 else "cores"
     errors.print(
-        f"{capacity.flights} flights on {capacity.cores} {cores}: about {duration} "
+        f"{capacity.flights} flights on {capacity.cores} {cores}: about {duration_in_words(capacity.wall_time)} "
         f"({significant(capacity.wall_time * capacity.cores / 3600.0, 2)} core hours), "
         f"{significant(capacity.bytes / 1e6, 2)} MB of disk space"
     )
