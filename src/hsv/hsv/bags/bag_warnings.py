@@ -49,10 +49,6 @@ def loss_in_words(loss: Loss) -> list[str]:
 
 
 def completeness(bag: Bag) -> str:
-    """Return the number of complete steps of a bag as text, such as ``"90 of 100 steps"``; empty if all are complete.
-
-    Raises:
-        RecordingError: A message does not fit its definition.
-    """
+    """Return the number of complete steps as text, such as ``"90 of 100 steps"``; empty if all are complete."""
     complete, expected = len(complete_stamps(bag)), len(expected_stamps(bag))
     return f"{complete} of {expected} steps" if complete < expected else ""

@@ -105,11 +105,7 @@ def _topic(bag: Bag, name: str) -> dict[str, Any]:
 
 
 def ending(bag: Bag) -> str:
-    """Return how the flight in ``bag`` ended: ``finished``, ``diverged`` or ``broken off``.
-
-    Raises:
-        RecordingError: A topic is missing or does not fit its definition.
-    """
+    """Return how the flight in ``bag`` ended: ``finished``, ``diverged`` or ``broken off``."""
     status = bag.columns(STATE)["status"]
     if cut_off(bag) and len(status) and bag.times(STATE)[-1] not in complete_stamps(bag):
         return "broken off"  # the last state is recorded, but other topics of its step are not
@@ -125,7 +121,7 @@ def _described(fault: dict[str, Any]) -> tuple[Any, ...]:
 def _faults(bag: Bag) -> list[dict[str, Any]]:
     columns = bag.columns(ACTUATOR)
     active = [[_described(fault) for fault in faults] for faults in columns["active"]]
-    intervals = []
+    found = []
     for key in sorted({fault for faults in active for fault in faults}):
         channel, kind, *parameters = key
         entry = {"channel": channel, "type": kind, "parameters": dict(parameters)}
@@ -133,8 +129,8 @@ def _faults(bag: Bag) -> list[dict[str, Any]]:
         if kind in FAULT_KINDS and FAULT_KINDS[kind].side == SENSOR:
             # A step lists the sensor faults of the next step; the first step also lists those that it has itself.
             acting = np.concatenate((acting[:1], acting[:-1]))
-        intervals += [entry | interval for interval in _intervals(columns["header.stamp"], acting)]
-    return sorted(intervals, key=lambda interval: interval["start_s"])
+        found += [entry | interval for interval in intervals(columns["header.stamp"], acting)]
+    return sorted(found, key=lambda interval: interval["start_s"])
 
 
 def parameters_in_words(fault: dict[str, Any], written: Callable[[float, str], str]) -> str:
@@ -222,13 +218,13 @@ def _tube(bag: Bag) -> dict[str, Any]:
         "checked_steps": int(checked.sum()),
         "outside_steps": int(outside.sum()),
         "largest_level": float(levels.max()) if len(levels) else None,
-        "excursions": _intervals(columns["header.stamp"], outside),
+        "excursions": intervals(columns["header.stamp"], outside),
         "uncertified_steps": int((columns["status"] == constants.get("UNCERTIFIED_VEHICLE", -1)).sum()),
         "uncertified_hardware_steps": int((columns["status"] == constants.get("UNCERTIFIED_HARDWARE", -1)).sum()),
     }
 
 
-def _intervals(stamps: NDArray[np.int64], holds: NDArray[np.bool_]) -> list[dict[str, float | None]]:
+def intervals(stamps: NDArray[np.int64], holds: NDArray[np.bool_]) -> list[dict[str, Any]]:
     """Return the intervals in which a condition ``holds`` (n), each from its first step to the first step after it."""
     edges = np.diff(np.concatenate(([False], holds, [False])).astype(np.int8))
     return [

@@ -244,11 +244,7 @@ class StepMessages:
         self._lengths: tuple[object, ...] | None = None
 
     def step(self, message: bytes) -> int:
-        """Return the step number of a message.
-
-        Raises:
-            MessageError, SignalError: As for :meth:`unpack`.
-        """
+        """Return the step number of a message; it raises as :meth:`unpack`."""
         return int(self._numbers(message)[2])
 
     def unpack(self, message: bytes, signals: Signals) -> None:

@@ -69,7 +69,8 @@ class Bag:
     All times are simulated times in nanoseconds. The time of a message of a step topic is its stamp; the time of
     another message is the stamp of the last step received before it. Damages are skipped and listed in :attr:`loss`.
 
-    Methods accept the name of a topic in the bag, such as ``/veh1/hsv/state``, or its role, such as ``hsv/state``.
+    Methods accept the name of a topic in the bag, such as ``/veh1/hsv/state``, or its role, such as ``hsv/state``. They
+    raise a RecordingError if the topic is not in the bag, or a message does not fit its definition.
 
     Args:
         path: A bag directory, or a file in it.
@@ -122,11 +123,7 @@ class Bag:
         return (min(first for first, _ in times), max(last for _, last in times)) if times else (0, 0)
 
     def times(self, topic: str) -> NDArray[np.int64]:
-        """Return the simulated times (n,) of the messages of a topic, ns.
-
-        Raises:
-            RecordingError: The topic is not in the bag, or a message of a step is too short for a stamp.
-        """
+        """Return the simulated times (n,) of the messages of a topic, ns."""
         name = self._topic(topic).name
         if name in self._step_topics:
             return self._stamps(name, self._data(name))
@@ -147,14 +144,7 @@ class Bag:
         return merge(*topics, key=lambda found: found[1].log_time)
 
     def columns(self, topic: str) -> Columns:
-        """Return all decoded messages of a topic, one array per field; the result is cached.
-
-        Returns:
-            Arrays with the messages along the first axis, by field path; see :mod:`hsv.bags.columns`.
-
-        Raises:
-            RecordingError: The topic is not in the bag, or a message does not fit its definition.
-        """
+        """Return all messages of a topic as arrays by field path, see :mod:`hsv.bags.columns`; they are cached."""
         name = self.name_of(topic)
         if name not in self._columns:
             self._columns[name] = self.track(topic).columns()
@@ -166,19 +156,11 @@ class Bag:
         return units_of(found.definition, self.types.fielddefs, found.type)
 
     def decode(self, topic: str) -> Iterator[tuple[int, Any]]:
-        """Yield time (ns) and deserialized message of each message of a topic.
-
-        Raises:
-            RecordingError: As for :meth:`columns`.
-        """
+        """Yield time (ns) and deserialized message of each message of a topic."""
         return self.track(topic).decode()
 
     def track(self, topic: str) -> Track:
-        """Return the messages of a topic with their definitions.
-
-        Raises:
-            RecordingError: The topic is not in the bag, or its definition cannot be used.
-        """
+        """Return the messages of a topic with their definitions."""
         found = self._topic(topic)
         if found.type not in self.types.fielddefs:
             raise RecordingError(f"{self.path}: topic {found.name}: the definition of {found.type} cannot be used")

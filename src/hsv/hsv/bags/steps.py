@@ -101,11 +101,7 @@ def complete_stamps(bag: Bag) -> NDArray[np.int64]:
 
 
 def lost_seconds(bag: Bag) -> float:
-    """Return the simulated time (s) of the steps that are missing or incomplete in the bag.
-
-    Raises:
-        RecordingError: A message does not fit its definition.
-    """
+    """Return the simulated time (s) of the steps that are missing or incomplete in the bag."""
     stamps = expected_stamps(bag)
     if len(stamps) < 2:
         return 0.0
@@ -117,9 +113,6 @@ def irregularities(bag: Bag) -> list[str]:
     """Return messages about steps that are missing on all or some topics, repeated, or out of order.
 
     In a truncated bag only the steps that all topics have reached are examined.
-
-    Raises:
-        RecordingError: A message does not fit its definition.
     """
     stamps = _stamps(bag)
     every = expected_stamps(bag)

@@ -132,7 +132,7 @@ def view(
     made = layout_for(opened, viewer.layout) if viewer.layout else None
     if viewer.scene:
         mcap = scene_of(opened).absolute()
-    command = [str(viewer.program()), *viewer.arguments(mcap, made)]
+    command = [str(viewer.program()), *(word.format(mcap=mcap, layout=made) for word in viewer.arguments)]
     subprocess.Popen(command, start_new_session=True, stdin=subprocess.DEVNULL)
     layout = str(made) if viewer.imports else None
     if json:

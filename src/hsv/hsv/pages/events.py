@@ -6,11 +6,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 from markupsafe import Markup, escape
 
 from hsv.bags.description import COMMAND, DIAGNOSTICS, PARAMETER_EVENTS, ROSOUT, STATE
-from hsv.bags.info import parameters_in_words
+from hsv.bags.info import intervals, parameters_in_words
 from hsv.bags.reader import Bag
 from hsv.bags.track import expecting_fields
 from hsv.pages.panels import INPUTS
@@ -92,15 +91,10 @@ def _saturation(bag: Bag) -> Iterator[Event]:
     if COMMAND not in bag.roles:
         return
     columns = bag.columns(COMMAND)
-    time, saturated = columns["header.stamp"] * 1e-9, columns["saturated"]
     for column, name in enumerate(INPUTS):
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], saturated[:, column], [False])).astype(np.int8)))
         text = f"command of {name.replace('_', ' ')} limited"
-        intervals = (
-            Event(float(time[first]), float(time[over]) if over < len(time) else None, "saturation", text, name)
-            for first, over in edges.reshape(-1, 2)
-        )
-        yield from _joined(intervals)
+        limited = intervals(columns["header.stamp"], columns["saturated"][:, column])
+        yield from _joined(Event(each["start_s"], each["end_s"], "saturation", text, name) for each in limited)
 
 
 def _ending(bag: Bag, description: dict[str, Any]) -> Iterator[Event]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,8 +18,8 @@ class Viewer:
     name: str
     programs: tuple[str, ...]
     """Names under which it may be installed."""
-    arguments: Callable[[Path, Path | None], list[str]]
-    """Function from the MCAP file and the layout to the arguments of the program."""
+    arguments: tuple[str, ...]
+    """Arguments of the program, with ``{mcap}`` and ``{layout}`` for the paths of the MCAP file and the layout."""
     layout: str
     """File name of the layout; empty without one."""
     imports: bool
@@ -49,19 +48,11 @@ def layout_for(bag: Bag, name: str) -> Path:
     return target
 
 
-def _file(mcap: Path, _: Path | None) -> list[str]:
-    return [str(mcap)]
-
-
-def _plotjuggler(mcap: Path, layout: Path | None) -> list[str]:
-    return ["--datafile", str(mcap), "--layout", str(layout)]
-
-
 VIEWERS = {
     "foxglove": Viewer(
         "Foxglove",
         ("foxglove-studio", "foxglove-desktop"),
-        _file,
+        ("{mcap}",),
         "foxglove.json",
         True,
         "https://foxglove.dev/download",
@@ -70,7 +61,7 @@ VIEWERS = {
     "lichtblick": Viewer(
         "Lichtblick",
         ("lichtblick",),
-        _file,
+        ("{mcap}",),
         "foxglove.json",
         True,
         "https://github.com/lichtblick-suite/lichtblick/releases",
@@ -79,11 +70,11 @@ VIEWERS = {
     "plotjuggler": Viewer(
         "PlotJuggler",
         ("plotjuggler",),
-        _plotjuggler,
+        ("--datafile", "{mcap}", "--layout", "{layout}"),
         "plotjuggler.xml",
         False,
         "https://plotjuggler.io, or: apt install ros-jazzy-plotjuggler-ros",
     ),
-    "rerun": Viewer("Rerun", ("rerun",), _file, "", False, "pip install rerun-sdk"),
+    "rerun": Viewer("Rerun", ("rerun",), ("{mcap}",), "", False, "pip install rerun-sdk"),
 }
 """Viewers in the order in which they are tried."""

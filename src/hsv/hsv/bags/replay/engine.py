@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from rosbags.typesys.store import Typestore
 
 from hsv.bags.compare import Comparison, compare
-from hsv.bags.description import COMMAND, FAULT_INJECTOR, STATE, TOPICS, step_topics
+from hsv.bags.description import COMMAND, TOPICS, step_topics
 from hsv.bags.messages import StepMessages, stamp_in, stamp_of
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
@@ -20,6 +21,8 @@ from hsv.base.processes import Progress
 from hsv.flight.blocks import Signals
 
 PROGRESS_INTERVAL = 200
+
+NOTHING: Mapping[str, Track] = {}
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,8 @@ class _Replica:
         self._inputs = {topic: StepMessages(topic, types) for topic in process.inputs}
         self._outputs = {topic: StepMessages(topic, types) for topic in process.outputs}
         self.tracks = {topic: Track(topic, TOPICS[topic], types, [], [], "replay") for topic in process.outputs}
+        self.ended = False
+        """Whether the plant has reported the end of the flight."""
 
     def step(self, inputs: Mapping[str, bytes]) -> dict[str, bytes]:
         """Step the component, and return and keep its output messages by topic.
@@ -65,6 +70,7 @@ class _Replica:
         self.process.block.step(self.component, signals)
         if self.process.restarts:
             signals.stamp = stamp_of(signals.step, signals.period)
+            self.ended = bool(signals.status)
         made = {topic: messages.pack(signals) for topic, messages in self._outputs.items()}
         for topic, message in made.items():
             self.tracks[topic].data.append(message)
@@ -86,20 +92,11 @@ def replay(bag: Bag, process: Process, values: ParameterSections, progress: Prog
         ParameterError, DesignError: The component refuses its parameters.
     """
     require(bag, process.outputs)
-    replica = _Replica(process, values, bag.types)
-    recorded = {topic: bag.track(topic).data for topic in process.inputs}
+    recorded = {topic: bag.track(topic) for topic in process.inputs}
     steps = complete_steps(bag) if broken_off(bag) else complete_steps(bag, process.inputs)
     with expecting_fields(bag.path):
-        if process.restarts:
-            replica.step({})
-            steps -= 1
-        for number in range(steps):
-            if number % PROGRESS_INTERVAL == 0:
-                progress(process.node.name, number, steps)
-            rows = {topic: number - (topic in process.delayed) for topic in process.inputs}
-            replica.step({topic: recorded[topic][row] for topic, row in rows.items() if row >= 0})
-    progress(process.node.name, steps, steps)
-    return compare_process(bag, process, replica.tracks)
+        tracks = _step([_Replica(process, values, bag.types)], recorded, steps, partial(progress, process.node.name))
+    return compare_process(bag, process, tracks)
 
 
 def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progress) -> list[ProcessComparison]:
@@ -118,7 +115,7 @@ def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progre
     processes = processes_of(controller, estimated(values))
     known = any(COMMAND in process.outputs for process in processes.values())
     with expecting_fields(bag.path):
-        tracks = fly(bag.types, controller, values, progress, None if known else bag.track(COMMAND))
+        tracks = fly(bag.types, controller, values, progress, {} if known else {COMMAND: bag.track(COMMAND)})
     return [compare_process(bag, process, tracks) for process in processes.values()]
 
 
@@ -127,41 +124,46 @@ def fly(
     controller: str,
     values: ParameterSections,
     progress: Progress,
-    commands: Track | None = None,
+    recorded: Mapping[str, Track] = NOTHING,
 ) -> dict[str, Track]:
-    """Fly the loop in this process, message by message as the graph does, and return every step topic.
+    """Fly the loop in this process and return every step topic; see :func:`rerun`.
 
     Args:
         types: Definitions of the messages.
         controller: Name of the controller that closes the loop.
         values: Parameters of the nodes.
         progress: Called with the progress.
-        commands: Recorded commands of a controller that is an external node.
-
-    Raises:
-        RunError: ``types`` lack a field.
-        RecordingError: There are fewer ``commands`` than steps.
+        recorded: The recorded commands of a controller that is an external node.
     """
     replicas = [_Replica(process, values, types) for process in processes_of(controller, estimated(values)).values()]
     plant = next(replica for replica in replicas if replica.process.restarts)
-    signals, state = Signals(), StepMessages(STATE, types)
+    return _step(replicas, recorded, plant.component.steps + 1, partial(progress, "rerun"))
+
+
+def _step(
+    replicas: Sequence[_Replica], recorded: Mapping[str, Track], steps: int, progress: Callable[[int, int], None]
+) -> dict[str, Track]:
+    """Step ``replicas`` message by message as the graph does, until the flight ends; return their outputs.
+
+    Topics in ``recorded`` are taken from there, also if a replica publishes them.
+    """
     latest: dict[str, bytes] = {}
-    for step in range(plant.component.steps + 1):
-        for replica in replicas:
-            if replica.process.node is FAULT_INJECTOR and commands is not None:
-                if step >= len(commands.data):
-                    raise RecordingError(
-                        f"{commands.source}: fewer commands than the flight has steps, and their controller is not here"
-                    )
-                latest[COMMAND] = commands.data[step]
-            inputs = () if step == 0 and replica is plant else replica.process.inputs
-            latest |= replica.step({topic: latest[topic] for topic in inputs if topic in latest})
-        state.unpack(latest[STATE], signals)
+    for step in range(steps):
         if step % PROGRESS_INTERVAL == 0:
-            progress("rerun", step, plant.component.steps)
-        if signals.status:
+            progress(step, steps)
+        if short := next((track for track in recorded.values() if step >= len(track.data)), None):
+            raise RecordingError(
+                f"{short.source}: topic {short.topic}: {step} messages, expected one for every step of the flight"
+            )
+        for replica in replicas:
+            process = replica.process
+            prompt = recorded.keys() & {*process.inputs} - {*process.delayed}
+            latest |= {topic: recorded[topic].data[step] for topic in prompt}
+            latest |= replica.step({topic: latest[topic] for topic in process.inputs if topic in latest})
+        latest |= {topic: track.data[step] for topic, track in recorded.items()}
+        if any(replica.ended for replica in replicas):
             break
-    progress("rerun", plant.component.steps, plant.component.steps)
+    progress(steps, steps)
     return {topic: track for replica in replicas for topic, track in replica.tracks.items()}
 
 

@@ -59,7 +59,7 @@ class Process:
     @property
     def delayed(self) -> tuple[str, ...]:
         """Topics of which a step uses the message of the previous step; the first step has none."""
-        return () if self.restarts else self.node.delayed
+        return self.inputs if self.restarts else self.node.delayed
 
     @property
     def outputs(self) -> tuple[str, ...]:
