@@ -13,8 +13,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from hsv.bags.definitions import definition, type_hash
-from hsv.bags.fields import Field, fields_of
 from hsv.bags.topic import Qos, Topic
+from hsv.bags.typestore import Field, fields_of
 
 MESSAGES = Path(__file__).parents[2] / "ros_ws" / "src" / "hsv_msgs" / "msg"
 STANDARD = {

@@ -104,7 +104,7 @@ def test_surplus_that_serialize_message_leaves_is_accepted(kit: SimpleNamespace)
     raw = bytes.fromhex("0001000000000000000000000000000079006700")
     columns = columns_at_once(store.fielddefs, "std_msgs/msg/Float64MultiArray", [raw])
     assert columns["data"].shape == (1, 0)
-    assert columns_at_once(store.fielddefs, "std_msgs/msg/Float64MultiArray", [raw + bytes(8)]) is None
+    assert columns_at_once(store.fielddefs, "std_msgs/msg/Float64MultiArray", [raw + bytes(80)]) is None
 
 
 @pytest.mark.parametrize("surplus", [b"", bytes.fromhex("ae7f0000006b0cef"), b"\1" * 16])

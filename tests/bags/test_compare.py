@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hsv.bags.columns import Track
 from hsv.bags.compare import Comparison, compare
-from hsv.bags.track import Track
 
 KIND = "hsv_msgs/msg/VehicleForces"
 

@@ -10,15 +10,15 @@ import pytest
 from changed_bags import changed_bag
 from flown_bags import flown_bag
 
-from hsv.bags.bag_warnings import bag_warnings
 from hsv.bags.compare import compare
 from hsv.bags.description import ACTUATOR, COMMAND, MARKERS, STATE, TOPICS, checked_namespace, resolved
 from hsv.bags.flight import flight_fingerprint
-from hsv.bags.overview import OVERVIEW_TOPIC
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import controller_of, flown_parameters
 from hsv.bags.replay.engine import rerun
 from hsv.bags.roles import naming, roles
+from hsv.bags.scene import OVERVIEW_TOPIC
+from hsv.bags.steps import bag_warnings
 from hsv.base.errors import ParameterError, RecordingError
 from hsv.model.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC
 from hsv.pages.layouts import LAYOUTS

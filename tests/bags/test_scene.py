@@ -8,8 +8,7 @@ from bag_readers import by_foxglove
 from mcap.reader import make_reader
 from recorded_flight import record_flight
 
-from hsv.bags.overview import OVERVIEW_TOPIC, overview_message
-from hsv.bags.scene import scene_path, write_scene
+from hsv.bags.scene import OVERVIEW_TOPIC, overview_message, scene_path, write_scene
 from hsv.base.errors import RecordingError
 from hsv.model.airframe.pose import BODY, LEVEL, Sample, transforms
 from hsv.model.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC, frame_transforms

@@ -9,11 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hsv.bags.bag_warnings import bag_warnings
 from hsv.bags.description import INTERFACE_VERSION
 from hsv.bags.reader import Bag
 from hsv.bags.recover import RECOVERED
-from hsv.bags.steps import expected_stamps, irregularities, joined
+from hsv.bags.steps import bag_warnings, expected_stamps, irregularities, joined
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import RecordingError
 

@@ -8,7 +8,7 @@ import pytest
 from rosbags.typesys.store import Typestore
 
 from hsv.bags.definitions import definition
-from hsv.bags.fields import fields_of
+from hsv.bags.typestore import fields_of
 from hsv.bags.units import KNOWN, Units, parse_units, units_of
 
 

@@ -12,8 +12,8 @@ from damaged_bags import Original, damaged, found_in, original
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
-from hsv.bags.bag_warnings import bag_warnings
 from hsv.bags.reader import Bag
+from hsv.bags.steps import bag_warnings
 from hsv.base.errors import RecordingError
 
 Hsv = Callable[..., Any]

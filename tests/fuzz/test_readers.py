@@ -18,11 +18,11 @@ from hypothesis import strategies as st
 from mutations import Mutated, flipped, mutated
 from node_processes import short_scenario
 
-from hsv.bags.bag_warnings import bag_warnings
 from hsv.bags.description import TOPICS
 from hsv.bags.info import describe
 from hsv.bags.reader import Bag
 from hsv.bags.recover import recover
+from hsv.bags.steps import bag_warnings
 from hsv.base.errors import CampaignError, HsvError
 from hsv.base.units import parse_quantity
 from hsv.control.design import certificate_path, find_design, read_design

@@ -15,9 +15,9 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
 from hsv.bags import description
+from hsv.bags.columns import Track
 from hsv.bags.description import INTERFACE_VERSION, TOPICS, WIRE_ALIGNMENT
 from hsv.bags.messages import FRAME, MessageError, StepMessages, Structure, stamp_in, stamp_of
-from hsv.bags.track import Track
 from hsv.bags.typestore import deserialized
 from hsv.base.errors import SignalError
 from hsv.control.nominal_law import NominalStatus

@@ -10,8 +10,8 @@ from recorded_flight import message_types
 from rosbags.typesys.store import Typestore
 
 from hsv.bags.description import MARKERS, TOPICS, resolved
-from hsv.bags.fields import fields_of
-from hsv.bags.overview import OVERVIEW_SCHEMA, OVERVIEW_TOPIC, PARTS, STATES, overview_message
+from hsv.bags.scene import OVERVIEW_SCHEMA, OVERVIEW_TOPIC, PARTS, STATES, overview_message
+from hsv.bags.typestore import fields_of
 from hsv.model.airframe.pose import Sample, transforms
 from hsv.model.airframe.scene import SCENE_TOPIC
 from hsv.pages.layouts import foxglove_layout, plotjuggler_layout

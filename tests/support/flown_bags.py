@@ -9,13 +9,13 @@ from typing import Any
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from hsv.bags.columns import Track
 from hsv.bags.definitions import definition, type_hash
 from hsv.bags.description import TOPICS, resolved
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.replay.attached import controller_of
 from hsv.bags.replay.engine import fly
 from hsv.bags.topic import Qos, Topic
-from hsv.bags.track import Track
 from hsv.bags.writer import BagWriter
 from hsv.flight.assembly import flight_parameters
 from hsv.flight.scenario import load_scenario

@@ -9,11 +9,11 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from hsv.bags.description import STATE, TOPICS, resolved
-from hsv.bags.fields import blank
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.replay.engine import fly
 from hsv.bags.topic import Qos, Topic
+from hsv.bags.typestore import blank
 from hsv.bags.writer import BagWriter
 from hsv.control.design import find_design, find_file
 from hsv.flight.assembly import flight_parameters

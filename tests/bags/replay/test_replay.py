@@ -12,13 +12,13 @@ import pytest
 from flown_bags import flown_bag, parameters, types, write_bag
 from marking import long
 
+from hsv.bags.columns import Track
 from hsv.bags.description import CONTROLLERS, RECORDER, TOPICS, graph
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import flown_parameters, refuse_vacuous
 from hsv.bags.replay.engine import ProcessComparison, fly, replay, rerun
 from hsv.bags.replay.processes import processes_of
-from hsv.bags.track import Track
 from hsv.base.errors import RecordingError
 from hsv.model.faults.table import Fault
 

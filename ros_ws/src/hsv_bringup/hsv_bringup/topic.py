@@ -10,10 +10,10 @@ from typing import Any
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import QoSProfile
 
+from hsv.bags.columns import Track
 from hsv.bags.definitions import definition
 from hsv.bags.description import TOPICS, graph
 from hsv.bags.export import table
-from hsv.bags.track import Track
 from hsv.bags.typestore import message_types
 from hsv.bags.units import units_of
 from hsv.base.errors import ParameterError, RecordingError, RunError

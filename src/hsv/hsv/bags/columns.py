@@ -1,4 +1,4 @@
-"""Decode all messages of a topic into one array per field.
+"""The messages of a topic, and their fields as arrays.
 
 The names of the columns are field paths such as ``header.stamp``. Times and durations become int64 nanoseconds (n,),
 numbers arrays (n,), and arrays or sequences of numbers arrays (n, length). Arrays of objects (n,) hold texts, sequences
@@ -7,23 +7,22 @@ of different lengths, and lists of messages as lists of dictionaries.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces.typing import Typesdict
+from rosbags.serde import SerdeError
+from rosbags.typesys.store import Typestore
 
-from hsv.bags.fields import Field, fields_of, plain
+from hsv.bags.description import TOPIC_OF
 from hsv.bags.messages import ENCAPSULATION, MessageError, Structure
-from hsv.base.errors import RecordingError
-
-_TAIL = 3
-"""Maximum padding at the end of a message, bytes."""
-_EMPTY_SEQUENCE_TAIL = 4
-"""Additional padding per empty sequence, bytes: serialize_message of rmw_fastrtps reserves space as if empty sequences
-were aligned like full ones. Messages received over DDS do not have it."""
+from hsv.bags.typestore import MAX_SURPLUS, Field, deserialized, fields_of, plain
+from hsv.base.errors import RecordingError, SignalError
 
 Read = Callable[[str], Sequence[Any] | NDArray[Any]]
 """Function that returns the values of all messages at a field path."""
@@ -63,11 +62,9 @@ def read_at_once(types: Typesdict, message_type: str, messages: Sequence[bytes])
         structure = Structure(types, message_type, messages[0])
     except MessageError:
         return None
-    empty = sum(length == 0 for _, length in structure.lengths.values())
     surplus = len(messages[0]) - ENCAPSULATION - structure.size
-    if not structure.complete or surplus > _TAIL + _EMPTY_SEQUENCE_TAIL * empty:
-        return None
-    if (rows := structure.rows(messages)) is None:
+    rows = structure.rows(messages) if structure.complete and surplus <= MAX_SURPLUS else None
+    if rows is None:
         return None
     names = structure.dtype.names or ()
     try:
@@ -114,3 +111,74 @@ def _numbers(field: Field, values: Sequence[Any] | NDArray[Any]) -> NDArray[Any]
 
 def _objects(values: Sequence[Any] | NDArray[Any]) -> NDArray[Any]:
     return np.fromiter(values, dtype=object, count=len(values))
+
+
+@contextmanager
+def expecting_fields(source: object) -> Iterator[None]:
+    """Convert errors of a message with a missing field or an invalid signal to RecordingErrors.
+
+    Raises:
+        RecordingError: The error with ``source``, the type or topic of the message, and the field.
+    """
+    try:
+        yield
+    except AttributeError as error:
+        if not (kind := getattr(error.obj, "__msgtype__", None)):
+            raise
+        raise RecordingError(
+            f"{source}: {kind}: recorded with another definition, expected a field {error.name}"
+        ) from None
+    except SignalError as error:
+        raise RecordingError(f"{source}: topic {TOPIC_OF[error.signal]}: {error}") from error
+    except MessageError as error:
+        raise RecordingError(f"{source}: {error}") from error
+
+
+@dataclass(frozen=True)
+class Track:
+    """The messages of one topic in their order."""
+
+    topic: str
+    type: str
+    """``package/msg/Type``."""
+    types: Typestore
+    """Definitions of the type and its dependencies."""
+    times: list[int]
+    """Simulated times, ns."""
+    data: list[bytes]
+    """Messages in CDR with the header of four bytes."""
+    source: str = ""
+    """Source of the messages, for error messages."""
+
+    def cut(self, count: int) -> Track:
+        """Return the first ``count`` messages."""
+        return self.rows(range(min(count, len(self.data))))
+
+    def rows(self, rows: Iterable[int]) -> Track:
+        """Return the messages in the given ``rows``."""
+        chosen = [(self.times[row], self.data[row]) for row in rows]
+        times, data = [time for time, _ in chosen], [message for _, message in chosen]
+        return Track(self.topic, self.type, self.types, times, data, self.source)
+
+    def columns(self) -> Columns:
+        """Return all decoded messages, one array per field; see :mod:`hsv.bags.columns`.
+
+        Raises:
+            RecordingError: A message does not fit its definition.
+        """
+        types = self.types.fielddefs
+        read = read_at_once(types, self.type, self.data) if self.data else None
+        read = read or read_one_by_one([message for _, message in self.decode()])
+        return columns_of(types, self.type, read, f"{self.source}: topic {self.topic}")
+
+    def decode(self) -> Iterator[tuple[int, Any]]:
+        """Yield time (ns) and deserialized message of each message.
+
+        Raises:
+            RecordingError: A message does not fit its definition.
+        """
+        for time, message in zip(self.times, self.data, strict=True):
+            try:
+                yield time, deserialized(self.types, message, self.type)
+            except SerdeError as error:
+                raise RecordingError(f"{self.source}: topic {self.topic}: message at {time} ns: {error}") from None

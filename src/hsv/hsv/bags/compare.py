@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.serde import SerdeError
 
-from hsv.bags.columns import Columns
-from hsv.bags.track import Track
+from hsv.bags.columns import Columns, Track
 from hsv.bags.typestore import deserialized
 
 

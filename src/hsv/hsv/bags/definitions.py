@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rosbags.typesys import TypesysError, get_types_from_msg
 
-from hsv.bags.fields import fields_of
+from hsv.bags.typestore import fields_of
 from hsv.base.errors import RecordingError
 
 SEPARATOR = "=" * 80

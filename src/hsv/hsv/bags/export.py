@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsv.bags.bag_warnings import bag_warnings
 from hsv.bags.reader import Bag
+from hsv.bags.steps import bag_warnings
 from hsv.bags.units import Units
 from hsv.base.errors import RecordingError, reason
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsv.bags.bag_warnings import bag_warnings
 from hsv.bags.description import (
     ACTUATOR,
     COMMAND,
@@ -24,7 +23,7 @@ from hsv.bags.equipment import effectors, equipment_topics, held, measurement_er
 from hsv.bags.flight import flight_fingerprint, input_columns
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
-from hsv.bags.steps import complete_stamps, cut_off, joined
+from hsv.bags.steps import bag_warnings, complete_stamps, cut_off, joined
 from hsv.base.errors import HsvError, ParameterError, RecordingError
 from hsv.base.files import parse_json
 from hsv.control.coverage import uncovered

@@ -23,8 +23,7 @@ from rosbags.typesys.store import Typestore
 
 from hsv.bags.definitions import definition
 from hsv.bags.description import CARRIED, CLOCK, TOPICS, TUBE_STATUS, WIRE_ALIGNMENT
-from hsv.bags.fields import blank, fields_of
-from hsv.bags.typestore import deserialized, message_types
+from hsv.bags.typestore import blank, deserialized, fields_of, message_types
 from hsv.base.errors import ParameterError, RunError, SignalError
 from hsv.flight.blocks import LOOP
 from hsv.model import signals as types

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rosbags.interfaces.typing import ConstValue
 from rosbags.typesys.store import Typestore
 
-from hsv.bags.columns import Columns
+from hsv.bags.columns import Columns, Track
 from hsv.bags.description import INTERFACE_VERSION, ROOT, RUN, TOPICS, TRANSIENT_LOCAL, resolved
 from hsv.bags.files import Unpacker, find_files
 from hsv.bags.metadata import (
@@ -32,7 +32,6 @@ from hsv.bags.metadata import (
 from hsv.bags.roles import TYPES, namespace_of, roles
 from hsv.bags.scan import Damage, Scan
 from hsv.bags.topic import Qos, Topic
-from hsv.bags.track import Track
 from hsv.bags.typestore import message_types
 from hsv.bags.units import Units, units_of
 from hsv.base.errors import RecordingError

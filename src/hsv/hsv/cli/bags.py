@@ -287,10 +287,9 @@ def recover(
 
     Example: hsv recover bags/case1_20260101T000000Z
     """
-    from hsv.bags.bag_warnings import loss_in_words
     from hsv.bags.reader import Bag
     from hsv.bags.recover import recover as mend
-    from hsv.bags.steps import irregularities, lost_seconds
+    from hsv.bags.steps import irregularities, loss_in_words, lost_seconds
 
     recovery = mend(bag, out)
     kept = Bag(recovery.path)

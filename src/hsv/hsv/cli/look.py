@@ -80,9 +80,9 @@ def plot(
 
     Example: hsv plot bags/case1_20260101T000000Z --units paper --out case1.png
     """
-    from hsv.bags.bag_warnings import bag_warnings
     from hsv.bags.flight import flight_data, labels
     from hsv.bags.reader import Bag
+    from hsv.bags.steps import bag_warnings
     from hsv.pages.plots import flight_figure, save_figure
 
     check_target(out, "out", ".png", ".svg", ".pdf")
@@ -174,9 +174,9 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
 
     A bag that lacks a topic, as ``ros2 bag record`` writes it with a filter, has no metrics.
     """
-    from hsv.bags.bag_warnings import completeness
     from hsv.bags.flight import MEASURED, flight_data
     from hsv.bags.info import describe
+    from hsv.bags.steps import completeness
     from hsv.base.errors import RecordingError
     from hsv.cli.summary import print_metrics
     from hsv.flight.metrics import METRICS, flight_metrics

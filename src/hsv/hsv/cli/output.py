@@ -114,7 +114,7 @@ def warn(text: str) -> None:
 
 def print_bag_warnings(*bags: Bag) -> None:
     """Print one line per incomplete bag: damage, missing files, topics and steps, or that the bag is truncated."""
-    from hsv.bags.bag_warnings import bag_warnings
+    from hsv.bags.steps import bag_warnings
 
     for bag in {bag.path: bag for bag in bags}.values():
         if words := bag_warnings(bag):

@@ -8,10 +8,10 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
+from hsv.bags.columns import expecting_fields
 from hsv.bags.description import COMMAND, DIAGNOSTICS, PARAMETER_EVENTS, ROSOUT, STATE
 from hsv.bags.info import intervals, parameters_in_words
 from hsv.bags.reader import Bag
-from hsv.bags.track import expecting_fields
 from hsv.pages.panels import INPUTS
 from hsv.pages.text import quantity
 

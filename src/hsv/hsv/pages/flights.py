@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from hsv.bags.bag_warnings import completeness
 from hsv.bags.description import STATE, TUBE_STATUS
 from hsv.bags.equipment import effectors, equipment_topics, measurement_errors, moving_air
 from hsv.bags.flight import flight_data, labels
 from hsv.bags.info import describe
 from hsv.bags.reader import Bag
-from hsv.bags.steps import joined
+from hsv.bags.steps import completeness, joined
 from hsv.base.errors import HsvError
 from hsv.control.design import parse_parameters
 from hsv.flight.limits import Verdict, verdicts

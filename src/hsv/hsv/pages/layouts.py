@@ -19,7 +19,7 @@ from hsv.bags.description import (
     TUBE_STATUS,
     resolved,
 )
-from hsv.bags.overview import FAULTS, OVERVIEW_TOPIC
+from hsv.bags.scene import FAULTS, OVERVIEW_TOPIC
 from hsv.model.airframe.pose import LEVEL, Sample, transforms
 from hsv.model.airframe.scene import SCENE_TOPIC
 from hsv.model.signals import N_RIGID

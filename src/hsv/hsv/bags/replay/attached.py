@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hsv.bags.columns import expecting_fields
 from hsv.bags.description import (
     ACTUATOR,
     COMMAND,
@@ -29,7 +30,6 @@ from hsv.bags.messages import StepMessages
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.steps import cut_off, expected_stamps, joined
-from hsv.bags.track import expecting_fields
 from hsv.base.errors import DesignError, ParameterError, RecordingError
 from hsv.base.parameters import validate
 from hsv.control.controllers import CONTROLLER_PARAMETERS

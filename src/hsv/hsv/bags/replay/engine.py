@@ -8,6 +8,7 @@ from functools import partial
 
 from rosbags.typesys.store import Typestore
 
+from hsv.bags.columns import Track, expecting_fields
 from hsv.bags.compare import Comparison, compare
 from hsv.bags.description import COMMAND, TOPICS, step_topics
 from hsv.bags.messages import StepMessages, stamp_in, stamp_of
@@ -15,7 +16,6 @@ from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import broken_off, complete_steps, estimated
 from hsv.bags.replay.processes import Process, processes_of
-from hsv.bags.track import Track, expecting_fields
 from hsv.base.errors import RecordingError
 from hsv.base.processes import Progress
 from hsv.flight.blocks import Signals
