@@ -52,7 +52,7 @@ class FlowExecutor(SingleThreadedExecutor):
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Sweep while messages come, at most ``SWEEPS`` times; then run one other callback, waiting if none came."""
         sweeps = 0
-        while sweeps < SWEEPS and self._sweep():
+        while sweeps < SWEEPS and self._take(self._flowing, 1):
             sweeps += 1
         super().spin_once(timeout_sec=0.0 if sweeps else timeout_sec)
 
@@ -62,21 +62,15 @@ class FlowExecutor(SingleThreadedExecutor):
         Returns:
             Whether there were any.
         """
+        return self._take(self._subscriptions, SWEEPS)
+
+    def _take(self, subscriptions: list[_Subscription], limit: int) -> bool:
         came = False
-        for take, kind, raw, callback in self._subscriptions:
-            for _ in range(SWEEPS):
+        for take, kind, raw, callback in subscriptions:
+            for _ in range(limit):
                 taken = take(kind, raw)
                 if taken is None:
                     break
-                came = True
-                callback(taken[0])
-        return came
-
-    def _sweep(self) -> bool:
-        came = False
-        for take, kind, raw, callback in self._flowing:
-            taken = take(kind, raw)
-            if taken is not None:
                 came = True
                 callback(taken[0])
         return came

@@ -60,7 +60,7 @@ class LockstepNode(ProcessNode):
         super().__init__(role.name)
         self._task = task
         place = f"one {role.name} a domain and namespace (ROS_DOMAIN_ID, -r __ns:=)"
-        self.claim_name(f"{place}, and another name for every other node (-r __node:=)")
+        self.claim(None, f"{place}, and another name for every other node (-r __node:=)")
         for topic in role.own_topics:
             self.claim(topic, place)
         if role.known_by:

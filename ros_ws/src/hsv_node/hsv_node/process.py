@@ -37,22 +37,19 @@ class ProcessNode(Node):
         """The nodes of this process."""
         self._claims: list[socket.socket] = []
 
-    def claim_name(self, expected: str) -> None:
-        """Reserve the full name of this node, because two nodes of one name cannot be distinguished."""
-        name = self.get_fully_qualified_name()
-        self._keep("node", name, f"another node is called {name}", expected)
+    def claim(self, topic: str | None, expected: str) -> None:
+        """Reserve a topic, or with None the full name of this node, before it publishes.
 
-    def claim(self, topic: str, expected: str) -> None:
-        """Reserve a topic for this node before it publishes."""
-        name = self.resolve_topic_name(topic)
-        self._keep("topic", name, f"another node publishes {name}", expected)
-
-    def _keep(self, kind: str, name: str, taken: str, expected: str) -> None:
+        Raises:
+            RunError: Another node of this machine has it; ``expected`` says what is due.
+        """
+        name = self.resolve_topic_name(topic) if topic else self.get_fully_qualified_name()
         domain = self.context.get_domain_id()
-        held = claim(kind, domain, name)
+        held = claim("topic" if topic else "node", domain, name)
         if held is None:
             self.destroy_node()
-            raise RunError(f"{taken} in ROS domain {domain}: expected {expected}")
+            use = "publishes" if topic else "is called"
+            raise RunError(f"another node {use} {name} in ROS domain {domain}: expected {expected}")
         self._claims.append(held)
 
     def destroy_node(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import multiprocessing
 import os
@@ -15,7 +14,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessP
 from concurrent.futures import Executor as Pool
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
-from functools import cache, partial
+from functools import partial
 from importlib.metadata import version
 from itertools import islice
 from multiprocessing.process import BaseProcess
@@ -25,6 +24,7 @@ from typing import Any
 
 from hsv.base.errors import CampaignError, RunError, reason
 from hsv.base.processes import ctrl_c_held_back, end_with_parent
+from hsv.flight.sources import DIGITS, code_digest
 
 Job = Callable[[str, int], bytes]
 """A function that flies a batch, by its number, of the campaign written in a text, and returns the result."""
@@ -370,13 +370,9 @@ def _answers(host: str, port: int, greets: bool) -> bool:
         return False
 
 
-@cache
 def program() -> str:
-    """Return the version of the library, and the first digits of the SHA-256 of its sources."""
-    digest, folder = hashlib.sha256(), Path(__file__).parents[2]
-    for path in sorted(folder.rglob("*.py")):
-        digest.update(f"{path.relative_to(folder).as_posix()}\n".encode() + path.read_bytes())
-    return f"hsv {version('hsv')}, sources {digest.hexdigest()[:12]}"
+    """Return the version of the library, and the first digits of the digest of the code that flies."""
+    return f"hsv {version('hsv')}, sources {code_digest()[:DIGITS]}"
 
 
 def _check_workers(client: Any, address: str) -> None:

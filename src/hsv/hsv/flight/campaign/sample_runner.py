@@ -12,9 +12,9 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from hsv.base.errors import CampaignError, ControllerError, ScenarioError
+from hsv.base.errors import ControllerError, ScenarioError
 from hsv.control.controller import Controller
-from hsv.control.library import LibraryController, library_digest
+from hsv.control.library import LibraryController
 from hsv.core import lanes
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
@@ -58,12 +58,7 @@ class SampleRunner:
     def __init__(self, campaign: Campaign) -> None:
         self.campaign = campaign
         self.scenario = campaign.scenario
-        if library_digest(self.scenario.controller) != campaign.library:
-            raise CampaignError(
-                f"controller = {self.scenario.controller!r}: not the library that the campaign began with, expected "
-                f"the one of SHA-256 {campaign.library}"
-            )
-        self._variants = FlightVariants(self.scenario, campaign.design)
+        self._variants = FlightVariants(self.scenario, campaign.design, campaign.library)
         parts = self._variants.unchanged
         self._levels = TubeLevels(parts)
         self._group = FlightGroup()

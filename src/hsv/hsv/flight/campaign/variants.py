@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from hsv.base.errors import CampaignError
 from hsv.control.controllers import HIDDEN_PARAMETERS, SHIPPED_CONTROLLERS
 from hsv.control.design import design_of
+from hsv.control.library import library_digest
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.assembly import assemble, assemble_flight, scenario_parameters
@@ -29,13 +31,19 @@ _CHANGES = {p.name.removeprefix(_PERTURBATION): p for p in PLANT_PARAMETERS if p
 class FlightVariants:
     """A scenario's flight, and variants of it."""
 
-    def __init__(self, scenario: Scenario, design: Mapping[str, Any]) -> None:
+    def __init__(self, scenario: Scenario, design: Mapping[str, Any], library: str | None = None) -> None:
         """Assemble the flight.
 
         Args:
             scenario: Scenario of the flight that is varied.
             design: Flat parameters of the controller's design.
+            library: SHA-256 of the controller's library, empty if it is in none; None: not checked.
         """
+        if library is not None and library_digest(scenario.controller) != library:
+            raise CampaignError(
+                f"controller = {scenario.controller!r}: not the library that the campaign began with, expected the one "
+                f"of SHA-256 {library}"
+            )
         self._parameters = dict(design)
         self._design = design_of(design)
         self._nominal = {**design, **scenario_parameters(scenario)}
