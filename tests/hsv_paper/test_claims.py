@@ -15,7 +15,7 @@ from hsv.model.vehicle import load_vehicle
 from hsv_paper.claims.evidence import Evidence, nominal, shown, worst
 from hsv_paper.claims.numbers import FAMILY, FLOWN_GAIN, losses
 from hsv_paper.claims.page import METRICS, Rank, page, ranking
-from hsv_paper.claims.table import GROUPS, Finding, Judged, Reading, Verdict, judge
+from hsv_paper.claims.table import GROUPS, Finding, Reading, Verdict, judge
 from hsv_paper.cli import claim_json
 
 CLAIMS = [claim for claims in GROUPS.values() for claim in claims]
@@ -62,9 +62,9 @@ def evidence(tmp_path_factory):
     return Evidence(tmp_path_factory.mktemp("evidence"), over=[over[0], over[36], over[-1]])
 
 
-def finding(*values, leading=1):
+def finding(*values, leading=1, claim=CLAIMS[0]):
     readings = tuple(Reading(f"reading {i}", value, "1", at_most=1.0) for i, value in enumerate(values))
-    return Finding(readings, "why", leading)
+    return Finding(claim, readings, "why", leading)
 
 
 def test_there_are_twenty_claims_and_more_each_quoted_once():
@@ -105,7 +105,7 @@ def test_a_lost_flight_has_no_worst_value():
 
 
 def test_the_page_holds_every_claim_and_the_ranking():
-    judged = {group: [Judged(claim, finding(0.5, 2.0)) for claim in claims] for group, claims in GROUPS.items()}
+    judged = {group: [finding(0.5, 2.0, claim=claim) for claim in claims] for group, claims in GROUPS.items()}
     ranks = {metric: {"tube": Rank(1.0, 2.0, 1, 1)} for metric in METRICS}
     text = page(judged, ranks)
     for claim in CLAIMS:
@@ -125,7 +125,7 @@ def test_every_claim_is_measured_and_says_why(claim, evidence):
     for reading in result.readings:
         # Infinite is what grows without bound or has not decayed by the end, and is shown as that.
         assert not math.isnan(reading.value), reading.what
-    json.dumps(claim_json("group", Judged(claim, result)))
+    json.dumps(claim_json("group", result))
     verdict, rows = published(claim)
     assert [row.leads for row in rows] == [i < result.leading for i in range(len(result.readings))]
     for reading, row in zip(result.readings, rows, strict=True):

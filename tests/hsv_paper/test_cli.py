@@ -2,10 +2,10 @@ import pytest
 
 from hsv.cli.output import console
 from hsv_paper.claims.page import CONTROLLERS, METRICS, Rank
-from hsv_paper.claims.table import GROUPS, Finding, Judged, Reading
+from hsv_paper.claims.table import GROUPS, Finding, Reading
 from hsv_paper.cli import print_claims
 
-FINDING = Finding((Reading("first", 0.5, "1", at_most=1.0), Reading("second", 2.0, "1", at_most=1.0)), "It is so.")
+READINGS = Reading("first", 0.5, "1", at_most=1.0), Reading("second", 2.0, "1", at_most=1.0)
 RANKS = {metric: {name: Rank(123456.0, 2e5, 1, 2) for name in CONTROLLERS} for metric in METRICS}
 
 
@@ -95,7 +95,7 @@ def test_claims_refuse_a_page_that_could_not_be_written_before_they_fly(hsv_pape
 @pytest.fixture
 def printed(monkeypatch, capsys):
     monkeypatch.setattr(console, "width", 80)
-    judged = {group: [Judged(claim, FINDING) for claim in claims] for group, claims in GROUPS.items()}
+    judged = {group: [Finding(claim, READINGS, "It is so.") for claim in claims] for group, claims in GROUPS.items()}
 
     print_claims(judged, RANKS)
     return [line.rstrip() for line in capsys.readouterr().out.splitlines()]

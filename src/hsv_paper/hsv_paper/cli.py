@@ -15,7 +15,7 @@ from hsv.cli.output import check_folder, check_target, console, print_estimate, 
 
 if TYPE_CHECKING:
     from hsv_paper.claims.page import Ranks
-    from hsv_paper.claims.table import Judged
+    from hsv_paper.claims.table import Finding
     from hsv_paper.study import Study
 
 COMMANDS = {name: Command(__name__) for name in ("figures", "claims", "sensitivity", "limits")}
@@ -105,37 +105,36 @@ def claims(
         out.write_text(page(judged, ranks), encoding="utf-8")
     if json:
         ranked = {metric: {name: vars(rank) for name, rank in row.items()} for metric, row in ranks.items()}
-        entries = [claim_json(group, entry) for group, entries in judged.items() for entry in entries]
+        entries = [claim_json(group, found) for group, findings in judged.items() for found in findings]
         print_json({"claims": entries, "ranking": ranked})
     else:
         print_claims(judged, ranks)
 
 
-def claim_json(group: str, entry: Judged) -> dict[str, Any]:
+def claim_json(group: str, found: Finding) -> dict[str, Any]:
     """Return a claim with its finding for JSON."""
     return {
         "group": group,
-        "name": entry.claim.name,
-        "quote": entry.claim.quote,
-        "location": entry.claim.location,
-        "verdict": str(entry.finding.verdict),
-        "why": entry.finding.why,
-        "readings": [{**vars(reading), "holds": reading.holds} for reading in entry.finding.readings],
+        "name": found.claim.name,
+        "quote": found.claim.quote,
+        "location": found.claim.location,
+        "verdict": str(found.verdict),
+        "why": found.why,
+        "readings": [{**vars(reading), "holds": reading.holds} for reading in found.readings],
     }
 
 
-def print_claims(judged: dict[str, list[Judged]], ranks: Ranks) -> None:
+def print_claims(judged: dict[str, list[Finding]], ranks: Ranks) -> None:
     """Print a line of at most 80 characters for each claim, and the ranking."""
     from rich.markdown import Markdown
 
     from hsv_paper.claims.page import ranking_table, tally
 
-    for group, entries in judged.items():
+    for group, findings in judged.items():
         console.print(group, style="bold")
-        for entry in entries:
-            where = entry.claim.location.rpartition(", ")[2].replace("Figures", "Fig.").replace("Figure", "Fig.")
-            name, verdict = entry.claim.name, entry.finding.verdict
-            console.print(f"{name:43} {where.replace(' and ', ', '):12} {verdict}", highlight=False)
+        for found in findings:
+            where = found.claim.location.rpartition(", ")[2].replace("Figures", "Fig.").replace("Figure", "Fig.")
+            console.print(f"{found.claim.name:43} {where.replace(' and ', ', '):12} {found.verdict}", highlight=False)
     console.print(f"{tally(judged)}\n", style="bold")
     console.print(Markdown(ranking_table(ranks)))
 

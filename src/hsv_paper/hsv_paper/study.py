@@ -68,12 +68,12 @@ class Scope:
         return max(least, round(number / self.coarseness))
 
 
-@dataclass(frozen=True)
 class Outcome:
     """Results of a study: its figure, and the parts of its page, text and tables, in their order."""
 
-    figure: Figure
-    parts: Sequence[str | Rows]
+    def __init__(self, figure: Figure, *parts: str | Rows) -> None:
+        """Keep the figure and the parts."""
+        self.figure, self.parts = figure, parts
 
     @property
     def tables(self) -> list[Rows]:
@@ -102,14 +102,21 @@ class Study:
         return _PAGE.format(kind=self.kind, title=self.title, command=command, name=self.name, parts=parts)
 
 
-def markdown(rows: Rows) -> str:
-    """Return a table in Markdown, its first column aligned left; "–" stands for ``None``."""
-    lines = [list(rows[0]), ["---", *["---:"] * (len(rows[0]) - 1)]]
+def markdown(rows: Rows, right: Sequence[str] | None = None) -> str:
+    """Return a table in Markdown; "–" stands for ``None``.
+
+    Args:
+        rows: Rows with the same columns.
+        right: Columns that are aligned right; by default all but the first.
+    """
+    heads = list(rows[0])
+    lines = [heads, ["---:" if head in (heads[1:] if right is None else right) else "---" for head in heads]]
     lines += [
         ["–" if cell is None else cell if isinstance(cell, str) else f"{cell:g}" for cell in row.values()]
         for row in rows
     ]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    head, *body = (f"| {' | '.join(line)} |" for line in lines)
+    return "\n".join((head.replace("|  |", "| |"), *body))
 
 
 def rounded(value: float | None, digits: int = 0) -> float | None:

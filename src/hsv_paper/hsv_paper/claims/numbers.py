@@ -414,7 +414,7 @@ def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.
         over: Relative changes of the vehicle's parameters, one flight each.
     """
     values = flight_parameters(load_scenario(scenario))
-    sections = flown_sections(values) if values.get("notch.enabled", True) else ()
+    sections = tuple(assemble(values).notch_filter.sections)
     model = ChannelModel(
         replace(ControlDesign.from_parameters(values), notch=sections), Vehicle.from_parameters(values)
     )

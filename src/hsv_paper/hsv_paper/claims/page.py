@@ -11,7 +11,8 @@ import numpy as np
 from hsv.flight.corners import screening_corners
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.claims.evidence import ELEVATORS, FUEL, Evidence, nominal, shown, worst
-from hsv_paper.claims.table import THRESHOLDS, Judged, Reading, Verdict
+from hsv_paper.claims.table import THRESHOLDS, Finding, Reading, Verdict
+from hsv_paper.study import markdown
 
 CONTROLLERS = {
     "RMPC, single gain (DM)": "case1_rmpc",
@@ -118,79 +119,71 @@ def ranking(evidence: Evidence) -> Ranks:
     return ranks
 
 
-def page(judged: dict[str, list[Judged]], ranks: Ranks) -> str:
+def page(judged: dict[str, list[Finding]], ranks: Ranks) -> str:
     """Return the page in Markdown."""
     parts = [_HEADER, tally(judged) + "\n", summary(judged), "## Ranking\n" + ranking_table(ranks)]
-    for group, entries in judged.items():
-        parts += [f"## {group}\n", *(details(entry) for entry in entries)]
+    for group, findings in judged.items():
+        parts += [f"## {group}\n", *map(details, findings)]
     return "\n".join(parts)
 
 
-def tally(judged: dict[str, list[Judged]]) -> str:
+def tally(judged: dict[str, list[Finding]]) -> str:
     """Return a sentence with the number of claims for each verdict."""
-    counts = Counter(entry.finding.verdict for group in judged.values() for entry in group)
+    counts = Counter(found.verdict for findings in judged.values() for found in findings)
     holds, conditions, fails = (counts[verdict] for verdict in Verdict)
     return f"Of {counts.total()} claims, {holds} hold, {conditions} hold under conditions, and {fails} do not hold."
 
 
-def summary(judged: dict[str, list[Judged]]) -> str:
+def summary(judged: dict[str, list[Finding]]) -> str:
     """Return the table of all claims with their verdicts."""
-    rows = ["| claim | location | verdict | actuators |", "| --- | --- | --- | --- |"]
-    rows += [
-        f"| {e.claim.name} | {e.claim.location} | {e.finding.verdict} | {_conditions(e.finding.readings)} |"
-        for entries in judged.values()
-        for e in entries
+    rows = [
+        {
+            "claim": found.claim.name,
+            "location": found.claim.location,
+            "verdict": found.verdict,
+            "actuators": _conditions(found.readings),
+        }
+        for findings in judged.values()
+        for found in findings
     ]
-    return "\n".join(rows) + "\n"
+    return markdown(rows, ()) + "\n"
 
 
-def details(entry: Judged) -> str:
+def details(found: Finding) -> str:
     """Return a claim with its quote, its verdict with the reason, and its readings."""
-    claim, finding = entry.claim, entry.finding
-    named = any(reading.actuators for reading in finding.readings)
-    rows = ["| reading | measured | threshold | |", "| --- | ---: | --- | --- |"]
-    if named:
-        rows = ["| reading | actuators | measured | threshold | |", "| --- | --- | ---: | --- | --- |"]
-    for number, r in enumerate(finding.readings):
-        what = r.what.replace("|", "\\|")
-        what = f"**{what}**" if number < finding.leading else what
-        behind = f"{_elevator(r.actuators)} | " if named else ""
-        rows.append(f"| {what} | {behind}{r.measured()} | {r.threshold()} | {'yes' if r.holds else 'no'} |")
-    table = "\n".join(rows)
+    named, claim = any(reading.actuators for reading in found.readings), found.claim
+    rows = [
+        {"reading": f"**{what}**" if number < found.leading else what}
+        | ({"actuators": _elevator(r.actuators)} if named else {})
+        | {"measured": r.measured(), "threshold": r.threshold(), "": "yes" if r.holds else "no"}
+        for number, r in enumerate(found.readings)
+        if (what := r.what.replace("|", "\\|"))
+    ]
     return (
         f"### {claim.name[0].upper()}{claim.name[1:]}\n> {claim.quote}\n\n{claim.location}. "
-        f"**{finding.verdict.capitalize()}.** {finding.why}\n\n{table}\n"
+        f"**{found.verdict.capitalize()}.** {found.why}\n\n{markdown(rows, ('measured',))}\n"
     )
 
 
 def ranking_table(ranks: Ranks) -> str:
     """Return the ranking with its description."""
-    controllers = list(next(iter(ranks.values())))
-    rows = [_RANKING, f"| | {' | '.join(controllers)} |", f"| --- |{' --- |' * len(controllers)}"]
+    rows: list[dict[str, str]] = []
     for metric, row in ranks.items():
         what, unit = METRICS[metric]
-        cells = [
-            f"{shown(r.nominal, unit)} ({r.nominal_place}) / {shown(r.worst, unit)} ({r.worst_place})"
-            for r in row.values()
-        ]
-        rows.append(f"| {what} | {' | '.join(cells)} |")
-    means = [
-        [np.mean([getattr(row[name], place) for row in ranks.values()]) for place in ("nominal_place", "worst_place")]
-        for name in controllers
-    ]
-    rows.append(f"| **mean rank** | {' | '.join(f'{a:.1f} / {b:.1f}' for a, b in means)} |")
-    return "\n".join(rows) + "\n"
+        rows.append({"": what})
+        for name, r in row.items():
+            worst_of_all = f"{shown(r.worst, unit)} ({r.worst_place})"
+            rows[-1][name] = f"{shown(r.nominal, unit)} ({r.nominal_place}) / {worst_of_all}"
+    rows.append({"": "**mean rank**"})
+    for name in next(iter(ranks.values())):
+        places = [(row[name].nominal_place, row[name].worst_place) for row in ranks.values()]
+        rows[-1][name] = " / ".join(f"{mean:.1f}" for mean in np.mean(places, axis=0))
+    return f"{_RANKING}\n{markdown(rows, ())}\n"
 
 
 def _conditions(readings: Sequence[Reading]) -> str:
     """Return the actuators with which all readings of a claim hold and those with which not; empty if it names none."""
-    kept: dict[str, bool] = {}
-    for reading in readings:
-        if reading.actuators:
-            kept[reading.actuators] = kept.get(reading.actuators, True) and reading.holds
-    sides = (("yes", True), ("not", False))
-    return "; ".join(
-        f"{word}: {', '.join(_elevator(name) for name in kept if kept[name] is side)}"
-        for word, side in sides
-        if side in kept.values()
-    )
+    failed = {reading.actuators for reading in readings if not reading.holds}
+    names = dict.fromkeys(reading.actuators for reading in readings if reading.actuators)
+    kept, lost = ([_elevator(name) for name in names if (name in failed) is side] for side in (False, True))
+    return "; ".join(f"{word}: {', '.join(side)}" for word, side in (("yes", kept), ("not", lost)) if side)

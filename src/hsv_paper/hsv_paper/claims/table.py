@@ -75,12 +75,13 @@ class Reading:
 
 @dataclass(frozen=True)
 class Finding:
-    """The readings of a claim, and the reasons for their results.
+    """A claim with its readings, and the reasons for their results.
 
     The first ``leading`` readings are the statement itself under the paper's own conditions, one for each number in it;
     the others repeat it under further conditions.
     """
 
+    claim: Claim
     readings: tuple[Reading, ...]
     why: str
     leading: int = 1
@@ -148,7 +149,7 @@ class Claim(BaseModel, frozen=True, extra="forbid"):
             ]
             first += found[:lead]
             further += found[lead:]
-        return Finding((*first, *further), self.why.format_map(words), sum(leads) or 1)
+        return Finding(self, (*first, *further), self.why.format_map(words), sum(leads) or 1)
 
     def _actuators(self, row: Row) -> tuple[str, ...]:
         return (self.actuators or ("",)) if row.actuators is None else row.actuators
@@ -215,26 +216,15 @@ class _Fact:
         return format(self.value, spec) if spec else shown(self.value, self.unit)
 
 
-@dataclass(frozen=True)
-class Judged:
-    """A claim with its finding."""
-
-    claim: Claim
-    finding: Finding
-
-
 GROUPS = {group: tuple(map(Claim.model_validate, claims)) for group, claims in _TABLE.items()}
 """All claims by part of the paper and topic."""
 
 
-def judge(evidence: Evidence, progress: Progress = lambda what, done, total: None) -> dict[str, list[Judged]]:
-    """Return all claims with their findings, by group."""
-    total = sum(map(len, GROUPS.values()))
-    judged: dict[str, list[Judged]] = {}
-    for group, claims in GROUPS.items():
-        judged[group] = []
-        for claim in claims:
-            progress("claims", sum(map(len, judged.values())), total)
-            judged[group].append(Judged(claim, claim.measure(evidence)))
-    progress("claims", total, total)
+def judge(evidence: Evidence, progress: Progress = lambda what, done, total: None) -> dict[str, list[Finding]]:
+    """Return the findings on all claims, by group."""
+    judged: dict[str, list[Finding]] = {}
+    for done, (group, claims) in enumerate(GROUPS.items()):
+        progress("claims", done, len(GROUPS))
+        judged[group] = [claim.measure(evidence) for claim in claims]
+    progress("claims", len(GROUPS), len(GROUPS))
     return judged

@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from hsv.base.units import to_paper
 from hsv.flight.metrics import METRICS, FlightData, flight_metrics
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.flights import Flights
+from hsv_paper.study import Outcome
 
 _LIMITS = load_vehicle().decoupled
 
@@ -37,22 +37,15 @@ Made by `hsv-paper figures --only {number} --out docs/figures`, including all nu
 
 
 @dataclass(frozen=True)
-class Drawing:
-    """A drawn figure and three remarks on it, with the numbers of this drawing."""
-
-    figure: Figure
-    shows: str
-    agrees: str
-    differs: str
-
-
-@dataclass(frozen=True)
 class PaperFigure:
-    """A figure of the paper: its number, its caption, how it is drawn, and the scenarios that it shows."""
+    """A figure of the paper: its number, its caption, how it is drawn, and the scenarios that it shows.
+
+    The parts of a drawing are three remarks: what is shown, what agrees with the paper, and what differs.
+    """
 
     number: int
     caption: str
-    draw: Callable[[Flights], Drawing]
+    draw: Callable[[Flights], Outcome]
     scenarios: tuple[str, ...] = ()
 
     @property
@@ -60,10 +53,12 @@ class PaperFigure:
         """Name of the figure's files without extension."""
         return f"figure_{self.number:02}"
 
-    def page(self, drawing: Drawing) -> str:
+    def page(self, drawing: Outcome) -> str:
         """Return the page of a drawing in Markdown."""
-        shown = {"shows": drawing.shows, "agrees": drawing.agrees, "differs": drawing.differs}
-        text = _PAGE.format(number=self.number, stem=self.stem, caption=self.caption, **shown)
+        shows, agrees, differs = drawing.parts
+        text = _PAGE.format(
+            number=self.number, stem=self.stem, caption=self.caption, shows=shows, agrees=agrees, differs=differs
+        )
         runs = ", ".join(f"`hsv run {name}`" for name in self.scenarios)
         return text + (f"\nThe flights can be repeated with {runs}.\n" if runs else "")
 

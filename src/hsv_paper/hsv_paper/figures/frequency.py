@@ -22,10 +22,10 @@ from hsv_paper.designs import (
     extended_model,
     inputs_of,
 )
-from hsv_paper.figures.figure import Drawing
 from hsv_paper.flights import Flights
 from hsv_paper.linear_loop import ELEVATOR
 from hsv_paper.modes import PeakFall, elastic_modes, linearised, open_loop_modes, peak_falls, pitch_rate_response
+from hsv_paper.study import Outcome
 
 POLE_FREQUENCIES = (10.0, 15.0, 20.0)
 POLE_DAMPINGS = (0.2, 0.5, 0.8)
@@ -35,7 +35,7 @@ _BETWEEN = f"{BETWEEN[0] / FOOT:.0f} ft and {BETWEEN[1] / FOOT:.0f} ft/s"
 _POLYTOPIC = {"color": plots.BLUE, "linestyle": ":", "linewidth": 2.0}
 
 
-def figure_02(flights: Flights) -> Drawing:
+def figure_02(flights: Flights) -> Outcome:
     """Draw elevator to pitch rate of the polytopic model and of the decoupled model, between the samples."""
     flown, model = design("baseline"), certificate("baseline")["model"]
     frequencies = np.logspace(-2.0, 2.0, 600)
@@ -51,7 +51,7 @@ def figure_02(flights: Flights) -> Drawing:
     plots.letter((magnitude, phase))
     magnitude.legend(loc="upper right")
     accuracy, (rows, columns) = model["accuracy"], model["vertices"]
-    return Drawing(
+    return Outcome(
         figure,
         f"The response is from elevator deflection to pitch rate at {_BETWEEN}, between the samples of the model. Both "
         f"models are discrete with a period of {flown.period:g} s; the polytopic model has {rows * columns} vertices "
@@ -65,7 +65,7 @@ def figure_02(flights: Flights) -> Drawing:
     )
 
 
-def figure_03(flights: Flights) -> Drawing:
+def figure_03(flights: Flights) -> Outcome:
     """Draw elevator to filtered pitch rate of the coupled model, one parameter of the poles changed at a time."""
     section, frequencies = design("baseline").notch[0], np.logspace(0.0, 2.0, 1500)
     plain = pitch_rate_response("paper_like", frequencies)
@@ -89,7 +89,7 @@ def figure_03(flights: Flights) -> Drawing:
     grid[0, 0].set_title(f"  effect of $\\omega_p$, $\\varepsilon_p$ = {section.pole_damping:g}", loc="right")
     grid[0, 1].set_title(f"  effect of $\\varepsilon_p$, $\\omega_p$ = {section.pole_frequency:g} rad/s", loc="right")
     lag = float(np.degrees(np.angle(notch_response([section], np.array([5.0]))[0])))
-    return Drawing(
+    return Outcome(
         figure,
         "The response is from elevator to filtered pitch rate of the coupled model, with the paper-like coupling, "
         f"where Case 1 starts. The zeros are at {section.zero_frequency:g} rad/s, with a damping of "
@@ -102,7 +102,7 @@ def figure_03(flights: Flights) -> Drawing:
     )
 
 
-def figure_04(flights: Flights) -> Drawing:
+def figure_04(flights: Flights) -> Outcome:
     """Draw all poles of the coupled model, and those near the origin enlarged, for both sets of coupling."""
     figure = plots.new_figure(4.2)
     whole, near = figure.subplots(1, 2, width_ratios=(1.5, 1))
@@ -145,7 +145,7 @@ def figure_04(flights: Flights) -> Drawing:
     like, derived = (
         [f"{mode.natural_frequency:.2f}" for mode in elastic_modes(name).values()] for name in ("paper_like", "derived")
     )
-    return Drawing(
+    return Outcome(
         figure,
         "The figure shows the poles of the coupled model linearised where Case 1 starts (85500 ft, 7900 ft/s), for "
         "both sets of inertial coupling.",
@@ -160,7 +160,7 @@ def figure_04(flights: Flights) -> Drawing:
     )
 
 
-def figure_05(flights: Flights) -> Drawing:
+def figure_05(flights: Flights) -> Outcome:
     """Draw elevator to pitch rate about both modes, with and without the design's filter, and its gain alone."""
     section, frequencies = design("baseline").notch, np.logspace(0.7, 1.7, 3000)
     plain, filter_ = pitch_rate_response("paper_like", frequencies), notch_response(section, frequencies)
@@ -182,7 +182,7 @@ def figure_05(flights: Flights) -> Drawing:
     phase.set_xticks(ticks, [str(t) for t in ticks], minor=False)
     phase.set_xticks([], minor=True)
     first, second = (_fall_in_words(fall) for fall in peak_falls(section).values())
-    return Drawing(
+    return Outcome(
         figure,
         "The response is from elevator to pitch rate of the coupled model, with the paper-like coupling, where Case 1 "
         f"starts; the notch is at {section[0].zero_frequency:g} rad/s.",
@@ -194,7 +194,7 @@ def figure_05(flights: Flights) -> Drawing:
     )
 
 
-def figure_08(flights: Flights) -> Drawing:
+def figure_08(flights: Flights) -> Outcome:
     """Draw elevator to filtered pitch rate of the co-designed model and of the ECM without and with its coupling."""
     inputs, model, frequencies = inputs_of("adjustable"), certificate("adjustable")["model"], CODESIGN_FREQUENCIES
     figure, magnitude, phase = plots.bode_panels()
@@ -213,7 +213,7 @@ def figure_08(flights: Flights) -> Drawing:
     plots.letter((magnitude, phase))
     magnitude.legend(loc="upper right")
     accuracy, (rows, columns) = model["accuracy"], model["vertices"]
-    return Drawing(
+    return Outcome(
         figure,
         f"The response is from elevator deflection to filtered pitch rate at {_BETWEEN}, between the samples of the "
         f"model. All models are discrete with a period of {inputs.model.period:g} s; the co-designed model has "

@@ -13,9 +13,9 @@ from hsv.control.design import TubeSet
 from hsv.flight.metrics import FlightData
 from hsv.model.signals import N_RIGID
 from hsv_paper.designs import design
-from hsv_paper.figures.figure import Drawing
 from hsv_paper.flights import Flights
 from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, GREY, letter, new_figure
+from hsv_paper.study import Outcome
 
 WITH, WITHOUT = "case1_uncertain", "case1_uncertain_no_notch"
 
@@ -63,7 +63,7 @@ def rigid_level(tube: TubeSet, error: np.ndarray) -> np.ndarray:
     return np.asarray(np.einsum("ki,ij,kj->k", offset, shape, offset))
 
 
-def figure_06(flights: Flights) -> Drawing:
+def figure_06(flights: Flights) -> Outcome:
     """Draw three projections of the set, whole and enlarged about the states; below, levels over time."""
     tube = design("baseline").tube
     assert tube is not None
@@ -103,7 +103,7 @@ def figure_06(flights: Flights) -> Drawing:
         axis.set_title("enlarged", loc="left")
     closer = int(np.count_nonzero(np.abs(errors[1][:, 4]) < np.abs(errors[0][:, 4])))
     without, with_ = (_pitch_rate_error(flights[name]) for *_, name in shown)
-    return Drawing(
+    return Outcome(
         figure,
         f"The errors e = x - x_r - x_n with uncertain parameters are shown at the same {len(INSTANTS)} instants, which "
         "are labelled with the seconds since the fault where there is space, in three projections of the certified "

@@ -19,7 +19,6 @@ from hsv.flight.scenario import load_scenario
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.figures.figure import (
     LIMITS,
-    Drawing,
     gain_switches,
     in_words,
     input_extremes,
@@ -30,6 +29,7 @@ from hsv_paper.figures.figure import (
 from hsv_paper.flights import Flights
 from hsv_paper.modes import elastic_modes
 from hsv_paper.plots import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
+from hsv_paper.study import Outcome
 
 _LIMITS = load_vehicle().decoupled
 
@@ -292,7 +292,7 @@ def _of_case_2(flights: Flights, metric: str) -> list[float]:
     return [measured(flights, names[0], metric) for names in (ADJUSTABLE, WHOLE, BASELINE)]
 
 
-def figure_09(flights: Flights) -> Drawing:
+def figure_09(flights: Flights) -> Outcome:
     """Draw altitude and velocity; the altitude with the single gain leaves its panel."""
     top = 86480.0
     panels = replace(ALTITUDE, shown=(85450.0, top)), replace(VELOCITY, shown=(7880.0, 8190.0))
@@ -305,7 +305,7 @@ def figure_09(flights: Flights) -> Drawing:
     arrow = {"arrowstyle": "-", "color": RED, "linewidth": 0.5}
     text, at, place = f"{single_gain:.0f} ft above the\ncommand at 200 s", (leaves, top - 10), (leaves + 12, top - 190)
     figure.axes[0].annotate(text, at, place, color=RED, fontsize=8, arrowprops=arrow)
-    return Drawing(
+    return Outcome(
         figure,
         _conditions_1() + " The single gain, designed for the whole step, is also shown.",
         f"Both tube controllers track through the fault, with an altitude error at 200 s of {notch:.1f} ft with the "
@@ -319,7 +319,7 @@ def figure_09(flights: Flights) -> Drawing:
     )
 
 
-def figure_10(flights: Flights) -> Drawing:
+def figure_10(flights: Flights) -> Outcome:
     """Draw angle of attack, pitch angle and pitch rate."""
     figure = histories(ATTITUDE, _case_1(flights), zoom=Zoom(95.0, 125.0), height=2.1)
     tube, without, robust = (
@@ -328,7 +328,7 @@ def figure_10(flights: Flights) -> Drawing:
     rate, rate_without = (
         np.degrees(np.ptp(_during(flights[names[0]], 110.0, 120.0)[:, 4])) for names in (NOTCH, NO_NOTCH)
     )
-    return Drawing(
+    return Outcome(
         figure,
         _conditions_1(),
         "The attitude moves at the fault and settles at the new equilibrium. The excursion is smaller with the tube "
@@ -341,7 +341,7 @@ def figure_10(flights: Flights) -> Drawing:
     )
 
 
-def figure_11(flights: Flights) -> Drawing:
+def figure_11(flights: Flights) -> Outcome:
     """Draw both elastic coordinates with their derivatives."""
     curves = _case_1(flights, vibrating=True)
     figure = histories(ELASTIC, curves, zoom=Zoom(99.0, 107.0), nominal_apart=True, height=1.9)
@@ -358,7 +358,7 @@ def figure_11(flights: Flights) -> Drawing:
 
     flight = flights[NOTCH[0]]
     bursts = [largest(flight.time[step]) for step in gain_switches(flight)]
-    return Drawing(
+    return Outcome(
         figure,
         _conditions_1("the middle column shows"),
         "The coordinates vibrate at the fault and return to rest. With the notch, both rates are within 5 % of their "
@@ -378,14 +378,14 @@ def figure_11(flights: Flights) -> Drawing:
     )
 
 
-def figure_12(flights: Flights) -> Drawing:
+def figure_12(flights: Flights) -> Outcome:
     """Draw both inputs as commanded."""
     figure = histories(INPUTS, _case_1(flights), zoom=Zoom(98.0, 118.0), height=2.3)
     _, largest = input_extremes(flights, RMPC)
     flight = flights[NOTCH[0]]
     steps = gain_switches(flight)
     jumps = np.abs(flight.command[steps] - flight.command[steps - 1]).max(axis=0)
-    return Drawing(
+    return Outcome(
         figure,
         _conditions_1() + f" The limits, {LIMITS}, are drawn where they are near the curves.",
         f"The inputs stay within their limits and are {limited(flights, CASE_1)}. With uncertain and nominal "
@@ -402,7 +402,7 @@ def figure_12(flights: Flights) -> Drawing:
     )
 
 
-def figure_13(flights: Flights) -> Drawing:
+def figure_13(flights: Flights) -> Outcome:
     """Draw both elastic rates, with the notch at the second mode and without a notch."""
     curves = [
         Curve("Tube-MPC without notch", GREEN, flights[NO_FILTER]),
@@ -416,7 +416,7 @@ def figure_13(flights: Flights) -> Drawing:
     modes = {name: mode.natural_frequency for name, mode in elastic_modes("paper_like").items()}
     sections = assemble(flight_parameters(load_scenario(SECOND_MODE))).notch_filter.sections
     passed = abs(notch_response(sections, np.array([modes["first"]]))[0])
-    return Drawing(
+    return Outcome(
         figure,
         'The parameters are nominal, which is our interpretation of the paper\'s "nominal system", and the fault '
         f"occurs. The notch is at {sections[0].zero_frequency:g} rad/s; the second coupled mode is at "
@@ -428,12 +428,12 @@ def figure_13(flights: Flights) -> Drawing:
     )
 
 
-def figure_14(flights: Flights) -> Drawing:
+def figure_14(flights: Flights) -> Outcome:
     """Draw altitude and velocity along the ramp."""
     closer = Zoom(78.0, 130.0, "end of the ramp, and the fault")
     figure = histories((ALTITUDE, VELOCITY), _case_2(flights), zoom=closer, reference=True, height=2.6)
     lag = _of_case_2(flights, "velocity_integral_absolute_error")
-    return Drawing(
+    return Outcome(
         figure,
         _conditions_2(),
         f"The ramp is tracked through the fault; the altitude error is at most "
@@ -446,7 +446,7 @@ def figure_14(flights: Flights) -> Drawing:
     )
 
 
-def figure_15(flights: Flights) -> Drawing:
+def figure_15(flights: Flights) -> Outcome:
     """Draw angle of attack, pitch angle and pitch rate."""
     figure = histories(ATTITUDE, _case_2(flights), zoom=Zoom(95.0, 125.0), height=2.1)
     off = _of_case_2(flights, "post_fault_attitude_deviation")
@@ -460,7 +460,7 @@ def figure_15(flights: Flights) -> Drawing:
         np.degrees(max(np.abs(_during(flights[names[0]], start, start + 5.0)[:, 4]).max() for start in (20.0, 80.0)))
         for names in (ADJUSTABLE, WHOLE, BASELINE)
     ]
-    return Drawing(
+    return Outcome(
         figure,
         _conditions_2(),
         f"The attitude moves by {off[0]:.2f} deg at the fault and settles.",
@@ -472,12 +472,12 @@ def figure_15(flights: Flights) -> Drawing:
     )
 
 
-def figure_16(flights: Flights) -> Drawing:
+def figure_16(flights: Flights) -> Outcome:
     """Draw both elastic coordinates with their derivatives."""
     figure = histories(ELASTIC, _case_2(flights), zoom=Zoom(99.0, 107.0), nominal_apart=True, height=1.9)
     decay = _of_case_2(flights, "elastic_decay_time")
     nominal = [measured(flights, names[1], "elastic_decay_time") for names in (ADJUSTABLE, WHOLE)]
-    return Drawing(
+    return Outcome(
         figure,
         _conditions_2("the middle column shows"),
         f"The coordinates vibrate at the fault and are at rest after {decay[0]:.1f} s (both rates within 5 % of "
@@ -488,7 +488,7 @@ def figure_16(flights: Flights) -> Drawing:
     )
 
 
-def figure_17(flights: Flights) -> Drawing:
+def figure_17(flights: Flights) -> Outcome:
     """Draw both inputs as commanded."""
     figure = histories(INPUTS, _case_2(flights), zoom=Zoom(98.0, 118.0), height=2.3)
 
@@ -499,7 +499,7 @@ def figure_17(flights: Flights) -> Drawing:
         after = flight.time >= flight.fault_start
         return float(flight.time[after][np.argmax(flight.command[after, 1])] - flight.fault_start)
 
-    return Drawing(
+    return Outcome(
         figure,
         _conditions_2() + f" The limits, {LIMITS}, are outside the range of the panels.",
         f"The inputs stay within a reasonable range and are {limited(flights, CASE_2)}. With uncertain and nominal "

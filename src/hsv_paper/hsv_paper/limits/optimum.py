@@ -182,56 +182,41 @@ class _Local:
         self._found = np.zeros(0)  # of the last step that was not corrected
         n = len(point.input)
         self._states, self._moved = n * N_STATES, n * (N_STATES + N_INPUTS) + 1
-        end, slope = problem.transitions(point)
-        scale = np.concatenate((STATE_SCALE, INPUT_SCALE, [1.0]))
-        slope = slope * scale / STATE_SCALE[:, None]
-        slope[:, :, -1] *= problem.period_slope[:, None]
-        # The unknown (N, 12) of each state, input and s in each period; -1: the given first state.
         k = np.arange(n)[:, None]
-        state = N_STATES * (k - 1) + np.arange(N_STATES)
-        state[0] = -1
-        inputs = self._states + N_INPUTS * k + np.arange(N_INPUTS)
-        columns = np.hstack((state, inputs, np.full((n, 1), self._moved - 1)))
-        rows = np.broadcast_to(np.arange(self._states).reshape(n, N_STATES, 1), slope.shape)
-        into = np.broadcast_to(columns[:, None, :], slope.shape)
-        moving, own = into >= 0, np.arange(self._states)
-        entries = [(slope[moving], rows[moving], into[moving]), (-np.ones(self._states), own, own)]
+        # The unknown of each state, input and s (N, 12) in each period; the first state is given, below zero here.
+        state, inputs = N_STATES * (k - 1) + np.arange(N_STATES), self._states + N_INPUTS * k + np.arange(N_INPUTS)
+        unknown = np.hstack((state, inputs, np.full((n, 1), self._moved - 1)))
+        free = unknown >= 0
+        entries = np.ones(free.sum()), (np.flatnonzero(free), unknown[free])
+        moved = sparse.csr_matrix(entries, (unknown.size, self._moved))
+        scale = np.tile(np.concatenate((STATE_SCALE, INPUT_SCALE, [1.0])), (n, 1))
+        scale[:, -1] = problem.period_slope
+        end, slope = problem.transitions(point)
+        equations = [
+            _blocks(slope * scale[:, None, :] / STATE_SCALE[:, None]) @ moved - sparse.eye(self._states, self._moved)
+        ]
         right = [((point.state[1:] - end) / STATE_SCALE).ravel()]
         if problem.at_rest:
             rates = derivative(point.state[-1], point.input[-1], problem.vehicle)
             last = np.hstack(jacobian(point.state[-1], point.input[-1], problem.vehicle))
-            where = np.concatenate((np.arange(N_STATES) - N_STATES + self._states, columns[-1, N_STATES:-1]))
-            row = np.repeat(self._states + np.arange(N_STATES), len(where))
-            entries.append(((last * scale[:-1] / STATE_SCALE[:, None]).ravel(), row, np.tile(where, N_STATES)))
+            at = [*range(self._states - N_STATES, self._states), *unknown[-1, N_STATES:-1]]
+            equations.append((last * scale[-1, :-1] / STATE_SCALE[:, None]) @ sparse.eye(self._moved, format="csr")[at])
             right.append(-rates / STATE_SCALE)
         self._right = np.concatenate(right)
-        m = len(self._right)
-        self._size = self._moved + 2 * m
-        entries += [(sign * np.ones(m), np.arange(m), first + np.arange(m)) for sign, first in self._slacks(m)]
-        value, row, column = (np.concatenate(of) for of in zip(*entries, strict=True))
-        self._equations = sparse.csr_matrix((value, (row, column)), (m, self._size))
-        self._curvature = self._convex(columns, scale)
-        self._bound(scale)
+        slack = sparse.eye(len(self._right))
+        self._equations = sparse.hstack((sparse.vstack(equations), slack, -slack), format="csr")
+        # The curvature of the Lagrangian, each period's without its negative eigenvalues.
+        weights = point.multipliers / STATE_SCALE
+        lengths = problem.periods(point.scalar)
+        curved = curvatures(point.state[:-1], point.input, lengths, problem.substeps, problem.vehicle, weights)
+        values, vectors = np.linalg.eigh(curved * scale[:, :, None] * scale[:, None, :])
+        curved = (vectors * np.maximum(values, 0.0)[:, None, :]) @ vectors.transpose(0, 2, 1)
+        self._curvature = moved.T @ _blocks(curved) @ moved
+        self._bound()
 
-    def _slacks(self, m: int) -> tuple[tuple[float, int], tuple[float, int]]:
-        return (1.0, self._moved), (-1.0, self._moved + m)
-
-    def _convex(self, columns: np.ndarray, scale: np.ndarray) -> sparse.csc_matrix:
-        """Return the curvature of the Lagrangian, each period's without its negative eigenvalues; the upper half."""
-        problem, point = self._problem, self._point
-        period, weights = problem.periods(point.scalar), point.multipliers / STATE_SCALE
-        blocks = curvatures(point.state[:-1], point.input, period, problem.substeps, problem.vehicle, weights)
-        scale = np.tile(scale, (len(period), 1))
-        scale[:, -1] = problem.period_slope
-        values, vectors = np.linalg.eigh(blocks * scale[:, :, None] * scale[:, None, :])
-        blocks = (vectors * np.maximum(values, 0.0)[:, None, :]) @ vectors.transpose(0, 2, 1)
-        i, j = np.broadcast_arrays(columns[:, :, None], columns[:, None, :])
-        upper = (i >= 0) & (i <= j)
-        return sparse.csc_matrix((blocks[upper], (i[upper], j[upper])), (self._size, self._size))
-
-    def _bound(self, scale: np.ndarray) -> None:
+    def _bound(self) -> None:
         """Write the equations and the bounds of the problem as rows of the unknowns: lower <= z - slope ds <= upper."""
-        problem, point, n = self._problem, self._point, len(self._point.input)
+        problem, point, n, size = self._problem, self._point, len(self._point.input), self._equations.shape[1]
         sizes = np.concatenate((np.tile(STATE_SCALE, n), np.tile(INPUT_SCALE, n), [1.0]))
         value = np.concatenate((point.state[1:].ravel(), point.input.ravel(), [point.scalar]))
         no_slope = np.zeros(self._states)
@@ -243,17 +228,16 @@ class _Local:
             )
         ]
         given = (bounds[0] == bounds[1]) & (slopes[0] == slopes[1])
-        unknowns = sparse.eye(self._size, format="csr")
-        equal, below = [], []
+        unknowns = sparse.eye(size, format="csr")
+        below = []
         for sign, slope, room in zip((-1.0, 1.0), slopes, bounds, strict=True):
             by_scalar = sparse.csr_matrix(slope[:, None]) @ unknowns[self._moved - 1]
             rows, use = sign * (unknowns[: self._moved] - by_scalar), np.isfinite(room) & ~given
             below.append((rows[use], sign * room[use]))
-        equal = [(rows[given], room[given])]
-        below.append((-unknowns[self._moved :], np.zeros(self._size - self._moved)))
-        self._given = np.concatenate([room for _, room in equal])
-        self._room = np.concatenate([room for _, room in below])
-        self._matrix = sparse.vstack([self._equations, *(rows for rows, _ in (*equal, *below))], format="csc")
+        below.append((-unknowns[self._moved :], np.zeros(size - self._moved)))
+        self._given = room[given]
+        self._room = np.concatenate([limit for _, limit in below])
+        self._matrix = sparse.vstack([self._equations, rows[given], *(part for part, _ in below)], format="csc")
 
     def step(self, weight: float, missed: np.ndarray | None = None) -> tuple[Point, float]:
         """Return the next point with a proximal ``weight``, and by how much the merit should fall.
@@ -269,16 +253,16 @@ class _Local:
         if missed is not None:
             found = self._found
             right = self._equations @ found - missed - (found[moved : moved + m] - found[moved + m :])
-        proximal, cost = np.zeros(self._size), np.zeros(self._size)
-        proximal[: moved - 1] = weight / len(point.input)
-        cost[moved - 1], cost[moved:] = self._problem.cost, _PENALTY
-        quadratic = sparse.csc_matrix(sparse.diags(proximal) + self._curvature)
+        proximal = np.append(np.full(moved - 1, weight / len(point.input)), 0.0)
+        quadratic = sparse.triu(self._curvature + sparse.diags(proximal))
+        cost = np.concatenate((np.zeros(moved - 1), [self._problem.cost], np.full(2 * m, _PENALTY)))
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-10
         cones = [clarabel.ZeroConeT(m + len(self._given)), clarabel.NonnegativeConeT(len(self._room))]
         bound = np.concatenate((right, self._given, self._room))
-        solution = clarabel.DefaultSolver(quadratic, cost, self._matrix, bound, cones, settings).solve()
+        padded = sparse.block_diag((quadratic, sparse.csc_matrix((2 * m, 2 * m))), format="csc")
+        solution = clarabel.DefaultSolver(padded, cost, self._matrix, bound, cones, settings).solve()
         z = np.array(solution.x)
         if not np.isfinite(z).all():
             raise DesignError(f"optimal control: the solver ended with {solution.status}")
@@ -288,7 +272,12 @@ class _Local:
         state[1:] += z[: self._states].reshape(-1, N_STATES) * STATE_SCALE
         inputs = point.input + z[self._states : moved - 1].reshape(-1, N_INPUTS) * INPUT_SCALE
         multipliers = np.array(solution.z)[: self._states].reshape(-1, N_STATES)
-        bent = z @ (self._curvature @ z) - 0.5 * (z**2 @ self._curvature.diagonal())
         promise = _PENALTY * (np.abs(self._right).sum() - z[moved:].sum())
-        promise -= self._problem.cost * z[moved - 1] + bent
+        promise -= self._problem.cost * z[moved - 1] + 0.5 * z[:moved] @ (self._curvature @ z[:moved])
         return Point(point.scalar + z[moved - 1], state, inputs, multipliers), float(promise)
+
+
+def _blocks(blocks: np.ndarray) -> sparse.bsr_matrix:
+    """Return the block-diagonal matrix of ``blocks`` (N, rows, columns)."""
+    n = len(blocks)
+    return sparse.bsr_matrix((blocks, np.arange(n), np.arange(n + 1)))

@@ -206,33 +206,31 @@ def run(scope: Scope) -> Outcome:
     changes = [", ".join(f"{n.replace('_', ' ')} {100.0 * x:+g} %" for n, x in over[i].items()) for i in chosen]
     return Outcome(
         _figure(rest, settled, flights, faults, limits),
-        (
-            _TRANSFER.format(
-                rest=rest.time,
-                rest_mesh=100.0 * abs(rest.coarser / rest.time - 1.0),
-                settled=settled.time,
-                settled_mesh=100.0 * abs(settled.coarser / settled.time - 1.0),
-                bound=math.floor(100.0 * bound) / 100.0,
-                periods=periods,
-                deviation=max(rest.flown.deviation(), settled.flown.deviation()),
-                gap=100.0 * (rest.time / bound - 1.0),
-            ),
-            [settling(name, data) for name, data in flights.items()],
-            _FAULT,
-            optima,
-            f"Flown: with {MARGIN:g} more than the least, through the loop's plant and fault injector, and {AFTER:g} s "
-            "in the trim\nafter it. At the least itself no elevator is left in a trim at the static limit, and "
-            "rounding decides.\n\n"
-            f"All vehicles, the nominal one and {len(limits) - 1} corners of the parameter bounds:",
-            [
-                over_all("trim at Case 1's target", limits[:, 0]),
-                over_all("a trim in the envelope", limits[:, 1]),
-                *(over_all(f"{turned}, known after {t:g} s", needed[:, CURVE.index(t)]) for t in problems.DELAYS),
-            ],
-            *(f"Corner {index}: {change}." for index, change in zip(chosen, changes, strict=True)),
-            f"Of the passive controllers, that of `case1` loses the nominal vehicle below {survived:.3f}, by bisection "
-            "with the fault\nat 100 s; [resilience](../resilience.md) has the others, and faults in the manoeuvre.",
+        _TRANSFER.format(
+            rest=rest.time,
+            rest_mesh=100.0 * abs(rest.coarser / rest.time - 1.0),
+            settled=settled.time,
+            settled_mesh=100.0 * abs(settled.coarser / settled.time - 1.0),
+            bound=math.floor(100.0 * bound) / 100.0,
+            periods=periods,
+            deviation=max(rest.flown.deviation(), settled.flown.deviation()),
+            gap=100.0 * (rest.time / bound - 1.0),
         ),
+        [settling(name, data) for name, data in flights.items()],
+        _FAULT,
+        optima,
+        f"Flown: with {MARGIN:g} more than the least, through the loop's plant and fault injector, and {AFTER:g} s "
+        "in the trim\nafter it. At the least itself no elevator is left in a trim at the static limit, and "
+        "rounding decides.\n\n"
+        f"All vehicles, the nominal one and {len(limits) - 1} corners of the parameter bounds:",
+        [
+            over_all("trim at Case 1's target", limits[:, 0]),
+            over_all("a trim in the envelope", limits[:, 1]),
+            *(over_all(f"{turned}, known after {t:g} s", needed[:, CURVE.index(t)]) for t in problems.DELAYS),
+        ],
+        *(f"Corner {index}: {change}." for index, change in zip(chosen, changes, strict=True)),
+        f"Of the passive controllers, that of `case1` loses the nominal vehicle below {survived:.3f}, by bisection "
+        "with the fault\nat 100 s; [resilience](../resilience.md) has the others, and faults in the manoeuvre.",
     )
 
 

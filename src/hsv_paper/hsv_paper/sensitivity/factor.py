@@ -67,28 +67,26 @@ def run(scope: Scope) -> Outcome:
     corners = in_words(scope.over)
     return Outcome(
         figure,
-        (
-            "The adjustable design is computed and flown for each factor. (a) Largest real part of the poles of the "
-            "linear sampled loop around the coupled vehicle, including the notch filter, over both ends of the step, "
-            f"before and after the fault: nominal vehicle (solid), and the worst of {corners} of the parameter bounds "
-            "(dashed). Shaded: one Lyapunov function is found for the factor and all larger ones up to 1, over the "
-            "vertices of the design's model, which does not include the coupling. (b) Half-width of the invariant set "
-            "in velocity: Z' for the gain in use and W'(τ), the same for the full W, and the paper's τZ. (c) Range "
-            "that remains for the nominal input about the target's trim, on the smaller side, relative to that at "
-            "τ = 1 (eq. 53). (d) Time until a step of +600 ft, +250 ft/s has settled to 2 % under K'(τ). (e) Case 2: "
-            "integral of the error of altitude and velocity, nominal vehicle, relative to that at τ = 1. (f) Attitude "
-            "deviation from nominal after the fault: nominal vehicle, and the worst of "
-            f"{in_words(fraction(load_vehicle().uncertainty))}, a different selection.",
-            f"One Lyapunov function is found for every factor from τ = {least:.2f} to 1 (1.00: not even there is the "
-            "loop stable).",
-            stable,
-            "The paper claims that a smaller factor is faster but less robust (4.3). After a step, K' may use more of "
-            "the inputs; on the ramp, the nominal input is hardly used.",
-            [
-                {name: rounded(value, _DIGITS.get(name, 2)) for name, value in row.items() if name != _DRAWN_ONLY}
-                for row in rows
-            ],
-        ),
+        "The adjustable design is computed and flown for each factor. (a) Largest real part of the poles of the "
+        "linear sampled loop around the coupled vehicle, including the notch filter, over both ends of the step, "
+        f"before and after the fault: nominal vehicle (solid), and the worst of {corners} of the parameter bounds "
+        "(dashed). Shaded: one Lyapunov function is found for the factor and all larger ones up to 1, over the "
+        "vertices of the design's model, which does not include the coupling. (b) Half-width of the invariant set "
+        "in velocity: Z' for the gain in use and W'(τ), the same for the full W, and the paper's τZ. (c) Range "
+        "that remains for the nominal input about the target's trim, on the smaller side, relative to that at "
+        "τ = 1 (eq. 53). (d) Time until a step of +600 ft, +250 ft/s has settled to 2 % under K'(τ). (e) Case 2: "
+        "integral of the error of altitude and velocity, nominal vehicle, relative to that at τ = 1. (f) Attitude "
+        "deviation from nominal after the fault: nominal vehicle, and the worst of "
+        f"{in_words(fraction(load_vehicle().uncertainty))}, a different selection.",
+        f"One Lyapunov function is found for every factor from τ = {least:.2f} to 1 (1.00: not even there is the "
+        "loop stable).",
+        stable,
+        "The paper claims that a smaller factor is faster but less robust (4.3). After a step, K' may use more of "
+        "the inputs; on the ramp, the nominal input is hardly used.",
+        [
+            {name: rounded(value, _DIGITS.get(name, 2)) for name, value in row.items() if name != _DRAWN_ONLY}
+            for row in rows
+        ],
     )
 
 

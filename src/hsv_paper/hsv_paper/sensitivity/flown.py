@@ -90,21 +90,19 @@ def coupling(scope: Scope) -> Outcome:
     unstable = np.array(growth_over(feedback(WITHOUT_NOTCH), PAPER_LIKE, scope.over)) >= 0.0
     return Outcome(
         figure,
-        (
-            f"Case 1 on the coupled model, with the nominal vehicle (solid) and the worst of {in_words(scope.over)} of "
-            "the parameter bounds (dashed). (a) Largest real part of the poles of the linear sampled loop, over both "
-            "ends of the step, before and after the fault; the limits of stability below are found by root finding. "
-            "(b), (c) Flights; a line ends where a flight is lost, and a decay time of 100 s means that the rates have "
-            f"not decayed by the end of the flight. {SATURATED} {RMPC_GAIN}; with κ = 0 and without notch, it is the "
-            "controller of the paper, which flies it on the decoupled model only.",
-            [
-                {"controller": c.label, **coupling_limits(feedback(c), scope.over), **lost_where(kappas, columns)}
-                for c, columns in results.items()
-            ],
-            f"The paper-like coupling is κ = {PAPER_LIKE:.2f}. The loop of the {WITHOUT_NOTCH.label} becomes unstable "
-            f"at κ = {'–' if limit is None else f'{limit:.4f}'} (nominal vehicle); with the paper-like coupling, it is "
-            f"unstable at {unstable[1:].sum()} of the {len(scope.over) - 1} corners.",
-        ),
+        f"Case 1 on the coupled model, with the nominal vehicle (solid) and the worst of {in_words(scope.over)} of "
+        "the parameter bounds (dashed). (a) Largest real part of the poles of the linear sampled loop, over both "
+        "ends of the step, before and after the fault; the limits of stability below are found by root finding. "
+        "(b), (c) Flights; a line ends where a flight is lost, and a decay time of 100 s means that the rates have "
+        f"not decayed by the end of the flight. {SATURATED} {RMPC_GAIN}; with κ = 0 and without notch, it is the "
+        "controller of the paper, which flies it on the decoupled model only.",
+        [
+            {"controller": c.label, **coupling_limits(feedback(c), scope.over), **lost_where(kappas, columns)}
+            for c, columns in results.items()
+        ],
+        f"The paper-like coupling is κ = {PAPER_LIKE:.2f}. The loop of the {WITHOUT_NOTCH.label} becomes unstable "
+        f"at κ = {'–' if limit is None else f'{limit:.4f}'} (nominal vehicle); with the paper-like coupling, it is "
+        f"unstable at {unstable[1:].sum()} of the {len(scope.over) - 1} corners.",
     )
 
 
@@ -147,14 +145,12 @@ def sampling(scope: Scope) -> Outcome:
     plots.letter(axes)
     return Outcome(
         figure,
-        (
-            "At each period, the polytopic model, F and K are designed from the baseline's inputs, and its notch is "
-            "discretised at that period. The panels show the largest real part of the poles of the sampled loop over "
-            "the coupling, over both ends of the step, before and after the fault: nominal vehicle (solid) and the "
-            f"worst of {in_words(scope.over)} of the parameter bounds (dashed). The limits of stability below are "
-            "found by root finding; the flights are those of Case 1 with the paper-like coupling and the notch.",
-            rows,
-        ),
+        "At each period, the polytopic model, F and K are designed from the baseline's inputs, and its notch is "
+        "discretised at that period. The panels show the largest real part of the poles of the sampled loop over "
+        "the coupling, over both ends of the step, before and after the fault: nominal vehicle (solid) and the "
+        f"worst of {in_words(scope.over)} of the parameter bounds (dashed). The limits of stability below are "
+        "found by root finding; the flights are those of Case 1 with the paper-like coupling and the notch.",
+        rows,
     )
 
 
@@ -169,12 +165,10 @@ def parameters(scope: Scope) -> Outcome:
         axis.axvline(1.0, **plots.DOTTED_GREY)
     return Outcome(
         figure,
-        (
-            "Case 1 on the coupled model with the paper-like coupling, flown with the nominal vehicle and "
-            f"{in_words(over[0])} of the scaled bounds. {LOSSES} {RMPC_GAIN}.",
-            "In multiples of the bounds:",
-            [{"controller": c.label, **lost_where(scales, columns)} for c, columns in results.items()],
-        ),
+        "Case 1 on the coupled model with the paper-like coupling, flown with the nominal vehicle and "
+        f"{in_words(over[0])} of the scaled bounds. {LOSSES} {RMPC_GAIN}.",
+        "In multiples of the bounds:",
+        [{"controller": c.label, **lost_where(scales, columns)} for c, columns in results.items()],
     )
 
 
@@ -217,12 +211,10 @@ def fault(scope: Scope) -> Outcome:
         axis.set_xlim(1.0, 0.3)
     return Outcome(
         figure,
-        (
-            "Case 1 on the coupled model with the paper-like coupling, flown with the nominal vehicle and "
-            f"{in_words(scope.over)} of the parameter bounds. {LOSSES} {RMPC_GAIN}.",
-            "By effectiveness, from 1 down:",
-            [{"controller": c.label, **lost_where(shares, found, 3, rising=False)} for c, found in results.items()],
-        ),
+        "Case 1 on the coupled model with the paper-like coupling, flown with the nominal vehicle and "
+        f"{in_words(scope.over)} of the parameter bounds. {LOSSES} {RMPC_GAIN}.",
+        "By effectiveness, from 1 down:",
+        [{"controller": c.label, **lost_where(shares, found, 3, rising=False)} for c, found in results.items()],
     )
 
 
@@ -275,13 +267,11 @@ def ramp(scope: Scope) -> Outcome:
 
     return Outcome(
         figure,
-        (
-            f"Case 2 with a ramp that starts at {shipped.start:g} s; nominal vehicle (solid) and the worst of "
-            f"{in_words(scope.over)} of the parameter bounds (dashed). The ramp of {lengths[-1]:g} s ends when the "
-            "fault occurs, so that its largest error includes the effect of the fault. (c) Attitude deviation from "
-            f"nominal after the fault; the black line is half a degree. {SATURATED}",
-            [row(controller, columns, index) for controller, columns in results.items() for index in (0, -1)],
-        ),
+        f"Case 2 with a ramp that starts at {shipped.start:g} s; nominal vehicle (solid) and the worst of "
+        f"{in_words(scope.over)} of the parameter bounds (dashed). The ramp of {lengths[-1]:g} s ends when the "
+        "fault occurs, so that its largest error includes the effect of the fault. (c) Attitude deviation from "
+        f"nominal after the fault; the black line is half a degree. {SATURATED}",
+        [row(controller, columns, index) for controller, columns in results.items() for index in (0, -1)],
     )
 
 

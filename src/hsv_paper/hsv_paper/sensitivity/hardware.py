@@ -290,29 +290,27 @@ def run(scope: Scope) -> Outcome:
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return Outcome(
         figure,
-        (
-            "Linear sampled loop of Case 1 around the coupled nominal vehicle, with a second-order elevator (damping "
-            f"{SURFACE.damping_ratio:g}) and the fuel delivery of {FUEL.natural_frequency:g} rad/s; each value is the "
-            "worst over both ends of the step, before and after the fault. (a) Largest real part of the poles over the "
-            "bandwidth of the elevator. (b) The same over a delay of the command. (c) Delay at which the loop becomes "
-            "unstable, by root finding. (d) Rms elevator command due to the noise of the fine sensor set, without a "
-            "fault; there is no line where the loop is unstable. The limits of the actuators are not included in (a) "
-            f"to (d). (e), (f) Flight through a {GUSTS[-1]}, from below or from above, whichever is worse, at the end "
-            f"of the step and after the fault, with an elevator of {SURFACE.natural_frequency:g} rad/s and its limits: "
-            "(e) largest change of an attitude angle, with a line at half a degree, and (f) largest elevator command, "
-            "with a line at the stop. The gust velocity at which an attitude angle changes by half a degree, the "
-            "elevator command exceeds its stop, or the flight is lost is found by root finding over such flights. "
-            f"{RMPC_GAIN}. *Worst* is the worst of {in_words(scope.over)}.",
-            "Bandwidths of the elevator at which the loop is stable, and largest real part of the poles (1/s) with "
-            "published elevators:",
-            tables[0],
-            "Tolerated delays with an ideal elevator and one of 50 rad/s, and the rms elevator command due to sensor "
-            "noise with the latter (–: the loop is unstable):",
-            tables[1],
-            f"Velocities (ft/s) from which on a limit is reached, in a {GUSTS[0]}, and in a {GUSTS[1]} "
-            f"(–: not up to {FEET * VELOCITIES[-1]:.0f} ft/s):",
-            tables[2],
-        ),
+        "Linear sampled loop of Case 1 around the coupled nominal vehicle, with a second-order elevator (damping "
+        f"{SURFACE.damping_ratio:g}) and the fuel delivery of {FUEL.natural_frequency:g} rad/s; each value is the "
+        "worst over both ends of the step, before and after the fault. (a) Largest real part of the poles over the "
+        "bandwidth of the elevator. (b) The same over a delay of the command. (c) Delay at which the loop becomes "
+        "unstable, by root finding. (d) Rms elevator command due to the noise of the fine sensor set, without a "
+        "fault; there is no line where the loop is unstable. The limits of the actuators are not included in (a) "
+        f"to (d). (e), (f) Flight through a {GUSTS[-1]}, from below or from above, whichever is worse, at the end "
+        f"of the step and after the fault, with an elevator of {SURFACE.natural_frequency:g} rad/s and its limits: "
+        "(e) largest change of an attitude angle, with a line at half a degree, and (f) largest elevator command, "
+        "with a line at the stop. The gust velocity at which an attitude angle changes by half a degree, the "
+        "elevator command exceeds its stop, or the flight is lost is found by root finding over such flights. "
+        f"{RMPC_GAIN}. *Worst* is the worst of {in_words(scope.over)}.",
+        "Bandwidths of the elevator at which the loop is stable, and largest real part of the poles (1/s) with "
+        "published elevators:",
+        tables[0],
+        "Tolerated delays with an ideal elevator and one of 50 rad/s, and the rms elevator command due to sensor "
+        "noise with the latter (–: the loop is unstable):",
+        tables[1],
+        f"Velocities (ft/s) from which on a limit is reached, in a {GUSTS[0]}, and in a {GUSTS[1]} "
+        f"(–: not up to {FEET * VELOCITIES[-1]:.0f} ft/s):",
+        tables[2],
     )
 
 

@@ -77,20 +77,18 @@ def run(scope: Scope) -> Outcome:
     corners, derived = in_words(scope.over), SETS[1].scenario
     return Outcome(
         figure,
-        (
-            "(a), (b) Largest real part of the poles of the sampled loop over the centre of the notch and the damping "
-            "of its zeros, over both ends of the step, before and after the fault. The colours and the solid line, the "
-            f"limit of stability, are those of the nominal vehicle; the dashed line is the limit of the worst of "
-            f"{corners} of the parameter bounds; the cross is the baseline's filter. Zeros and poles have the same "
-            f"centre; the damping of the poles is {own.pole_damping:g}. (c) Decay time in flight, nominal vehicle "
-            "(solid) and worst corner (dashed); there is no point where a flight is lost. The dotted lines are the "
-            f"limits of the scenarios; the scenario {derived} itself flies another design, "
-            f"{load_scenario(derived).design}.",
-            f"The linear loop is stable with centres from and to, at a zero damping of {own.zero_damping:g}, and up to "
-            f"a zero damping, with the centre at {own.zero_frequency:g} rad/s; ≤ and ≥: to the end of the range "
-            f"studied ({own.pole_damping:g}: even without a notch).",
-            rows,
-        ),
+        "(a), (b) Largest real part of the poles of the sampled loop over the centre of the notch and the damping "
+        "of its zeros, over both ends of the step, before and after the fault. The colours and the solid line, the "
+        f"limit of stability, are those of the nominal vehicle; the dashed line is the limit of the worst of "
+        f"{corners} of the parameter bounds; the cross is the baseline's filter. Zeros and poles have the same "
+        f"centre; the damping of the poles is {own.pole_damping:g}. (c) Decay time in flight, nominal vehicle "
+        "(solid) and worst corner (dashed); there is no point where a flight is lost. The dotted lines are the "
+        f"limits of the scenarios; the scenario {derived} itself flies another design, "
+        f"{load_scenario(derived).design}.",
+        f"The linear loop is stable with centres from and to, at a zero damping of {own.zero_damping:g}, and up to "
+        f"a zero damping, with the centre at {own.zero_frequency:g} rad/s; ≤ and ≥: to the end of the range "
+        f"studied ({own.pole_damping:g}: even without a notch).",
+        rows,
     )
 
 

@@ -14,8 +14,7 @@ from matplotlib.lines import Line2D
 
 from hsv.base.units import to_paper
 from hsv.control.design import ControlDesign, find_design, read_parameters
-from hsv.control.notch_filter import flown_sections
-from hsv.flight.assembly import scenario_parameters
+from hsv.flight.assembly import assemble, scenario_parameters
 from hsv.flight.metrics import METRICS
 from hsv.flight.scenario import load_scenario
 from hsv_paper.flights import Point, Table
@@ -96,7 +95,7 @@ def feedback(controller: Controller) -> Feedback:
     gain = design.adjusted_gain(design.tau)
     if values["controller"] == "robust_mpc":
         gain = design.nominal_gains[values["robust_mpc.gain_index"]]
-    return Feedback(gain, flown_sections(values) if values.get("notch.enabled", True) else (), design.period)
+    return Feedback(gain, tuple(assemble(values).notch_filter.sections), design.period)
 
 
 def sweep(scope: Scope, name: str, along: Mapping[Controller, Sequence[Point]]) -> dict[Controller, Columns]:

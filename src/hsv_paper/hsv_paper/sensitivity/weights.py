@@ -161,49 +161,47 @@ def run(scope: Scope) -> Outcome:
 
     return Outcome(
         figure,
-        (
-            "The baseline with one group of its scales or input bounds multiplied by a factor (1 is the baseline "
-            "itself; a weight is one over the square of its scale, so that a larger scale is a smaller weight). The "
-            "left panels vary F, the right panels K with its input bounds; everything else is unchanged. The flights "
-            "are those of Case 1 with the paper-like coupling, for the nominal vehicle and "
-            f"{in_words(scope.over)} of the parameter bounds. (a) Largest real part of the poles of the linear sampled "
-            "loop, over all vehicles and both ends of the step, before and after the fault; with notch (solid) and "
-            "without (dashed). (b) Time until altitude (solid) and velocity (dashed) have settled to 2 % of the step, "
-            "nominal vehicle; a line ends where they do not settle before the fault. (c), (d) Attitude deviation from "
-            "nominal after the fault, worst corner; the black line is half a degree. (e) Altitude error at the end, "
-            "nominal vehicle (solid) and worst corner (dashed). (f) The same error with robust MPC and the fourth "
-            "gain, as the paper flies it: on the decoupled model, without notch; a dashed line ends where a flight is "
-            "lost.",
-            rows(
-                "F",
-                lambda group, i: {
-                    "worst attitude from nominal, deg": rounded(DEGREES * of_F[group][ATTITUDE][i], 3),
-                    "worst altitude error at end, ft": rounded(FEET * of_F[group]["altitude_end_error_worst"][i], 1),
-                    "linear loop without notch, worst": "unstable" if unstable[group][i] else "stable",
-                },
-            ),
-            rows(
-                "K",
-                lambda group, i: {
-                    "altitude settled, s": rounded(of_K[group]["altitude_settling_time_nominal"][i], 1),
-                    "velocity settled, s": rounded(of_K[group]["velocity_settling_time_nominal"][i], 1),
-                    "worst attitude from nominal, deg": rounded(DEGREES * of_K[group][ATTITUDE][i], 3),
-                    "altitude error at end, ft": rounded(FEET * of_K[group]["altitude_end_error_nominal"][i], 1),
-                    "the same, RMPC": rounded(FEET * of_rmpc[group]["altitude_end_error_nominal"][i]),
-                    "flights of RMPC lost, %": rounded(100.0 * (1.0 - of_rmpc[group]["finished"][i])),
-                },
-            ),
-            "Scale of the elevator in F up to which the linear loop is stable, in rad "
-            f"({_inputs().feedback.input_scale.elevator_deflection:g} in the baseline; –: at every factor):",
-            [
-                {
-                    "controller": controller.label,
-                    "nominal vehicle": _elevator_limit(controller is WITH_NOTCH, scope.over[:1]),
-                    f"worst of {in_words(scope.over)}": _elevator_limit(controller is WITH_NOTCH, scope.over),
-                }
-                for controller in (WITH_NOTCH, WITHOUT_NOTCH)
-            ],
+        "The baseline with one group of its scales or input bounds multiplied by a factor (1 is the baseline "
+        "itself; a weight is one over the square of its scale, so that a larger scale is a smaller weight). The "
+        "left panels vary F, the right panels K with its input bounds; everything else is unchanged. The flights "
+        "are those of Case 1 with the paper-like coupling, for the nominal vehicle and "
+        f"{in_words(scope.over)} of the parameter bounds. (a) Largest real part of the poles of the linear sampled "
+        "loop, over all vehicles and both ends of the step, before and after the fault; with notch (solid) and "
+        "without (dashed). (b) Time until altitude (solid) and velocity (dashed) have settled to 2 % of the step, "
+        "nominal vehicle; a line ends where they do not settle before the fault. (c), (d) Attitude deviation from "
+        "nominal after the fault, worst corner; the black line is half a degree. (e) Altitude error at the end, "
+        "nominal vehicle (solid) and worst corner (dashed). (f) The same error with robust MPC and the fourth "
+        "gain, as the paper flies it: on the decoupled model, without notch; a dashed line ends where a flight is "
+        "lost.",
+        rows(
+            "F",
+            lambda group, i: {
+                "worst attitude from nominal, deg": rounded(DEGREES * of_F[group][ATTITUDE][i], 3),
+                "worst altitude error at end, ft": rounded(FEET * of_F[group]["altitude_end_error_worst"][i], 1),
+                "linear loop without notch, worst": "unstable" if unstable[group][i] else "stable",
+            },
         ),
+        rows(
+            "K",
+            lambda group, i: {
+                "altitude settled, s": rounded(of_K[group]["altitude_settling_time_nominal"][i], 1),
+                "velocity settled, s": rounded(of_K[group]["velocity_settling_time_nominal"][i], 1),
+                "worst attitude from nominal, deg": rounded(DEGREES * of_K[group][ATTITUDE][i], 3),
+                "altitude error at end, ft": rounded(FEET * of_K[group]["altitude_end_error_nominal"][i], 1),
+                "the same, RMPC": rounded(FEET * of_rmpc[group]["altitude_end_error_nominal"][i]),
+                "flights of RMPC lost, %": rounded(100.0 * (1.0 - of_rmpc[group]["finished"][i])),
+            },
+        ),
+        "Scale of the elevator in F up to which the linear loop is stable, in rad "
+        f"({_inputs().feedback.input_scale.elevator_deflection:g} in the baseline; –: at every factor):",
+        [
+            {
+                "controller": controller.label,
+                "nominal vehicle": _elevator_limit(controller is WITH_NOTCH, scope.over[:1]),
+                f"worst of {in_words(scope.over)}": _elevator_limit(controller is WITH_NOTCH, scope.over),
+            }
+            for controller in (WITH_NOTCH, WITHOUT_NOTCH)
+        ],
     )
 
 
