@@ -81,7 +81,7 @@ def coupling(scope: Scope) -> Outcome:
     draw_metric(axes[2], kappas, results, "post_fault_attitude_deviation", "attitude excursion (deg)")
     plots.plain_log(axes[2])
     axes[2].set_xlabel(r"coupling $\kappa$ (0: decoupled, 1: derived from a beam model)")
-    mark_couplings(axes)
+    mark_couplings(axes, axes[:1])
     axes[0].text(PAPER_LIKE + 0.005, 1.32, "paper-like", color=plots.GREY, fontsize=8)
     axes[0].text(0.995, 1.32, "derived", color=plots.GREY, fontsize=8, ha="right")
     plots.letter(axes)
@@ -139,7 +139,7 @@ def sampling(scope: Scope) -> Outcome:
         rows.append(row | {"lost, %": rounded(100.0 * (1.0 - columns["finished"][0]))})
     for axis, name in zip(axes, ("with the notch", "without"), strict=True):
         axis.set_title(name, loc="right")
-    mark_couplings(axes)
+    mark_couplings(axes, axes)
     axes[1].set_xlabel(rf"coupling $\kappa$ ({PAPER_LIKE:g}: paper-like, 1: derived)")
     axes[0].legend(loc="upper left")
     plots.letter(axes)
@@ -291,9 +291,10 @@ def draw_growth(
     axis.set_ylabel("largest real part (1/s)")
 
 
-def mark_couplings(axes: Sequence[Axes]) -> None:
-    """Mark the limit of stability in the first panel, and the paper-like and the derived coupling in all."""
-    axes[0].axhline(0.0, **plots.ZERO)
+def mark_couplings(axes: Sequence[Axes], growths: Sequence[Axes]) -> None:
+    """Mark the limit of stability in the panels of growths, and the paper-like and the derived coupling in all."""
+    for axis in growths:
+        axis.axhline(0.0, **plots.ZERO)
     for axis in axes:
         for kappa in (PAPER_LIKE, 1.0):
             axis.axvline(kappa, **plots.DOTTED_GREY)
