@@ -1,4 +1,7 @@
-"""All nodes of the graph in one process with one executor; messages and bag are the same, and it is faster."""
+"""All nodes of the graph in one process with one executor.
+
+Messages and bag are the same as of separate processes; the flight is faster.
+"""
 
 from __future__ import annotations
 

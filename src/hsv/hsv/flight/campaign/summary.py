@@ -158,25 +158,23 @@ def limits(results: Results) -> dict[str, float]:
     return stated
 
 
+def _within(results: Results) -> dict[str, tuple[float | None, np.ndarray]]:
+    """Return the mask (flights) of the flights that finish, and of those within each limit, with the limit."""
+    finished = ~(results.column("diverged") | results.crashed)
+    # A comparison with NaN is false: an undefined metric is not within its limit.
+    return {"flown_to_the_end": (None, finished)} | {
+        name: (limit, finished & (np.abs(results.column(name)) <= limit)) for name, limit in limits(results).items()
+    }
+
+
 def within_all(results: Results) -> int:
-    """Return the number of flights that finish within every limit; an undefined metric is not within its limit."""
-    within = ~(results.column("diverged") | results.crashed)
-    for name, limit in limits(results).items():
-        within &= np.abs(results.column(name)) <= limit
-    return int(np.count_nonzero(within))
+    """Return the number of flights that finish within every limit."""
+    return int(np.count_nonzero(np.logical_and.reduce([mask for _, mask in _within(results).values()])))
 
 
 def shares(results: Results) -> list[Share]:
-    """Return the share of flights that finish, and that finish within each limit.
-
-    An undefined metric is not within its limit.
-    """
-    finished = ~(results.column("diverged") | results.crashed)
-    rows = [_share(results.campaign, "flown_to_the_end", None, finished)]
-    for name, limit in limits(results).items():
-        # A comparison with NaN is false.
-        rows.append(_share(results.campaign, name, limit, finished & (np.abs(results.column(name)) <= limit)))
-    return rows
+    """Return the share of flights that finish, and that finish within each limit."""
+    return [_share(results.campaign, name, limit, mask) for name, (limit, mask) in _within(results).items()]
 
 
 def _share(campaign: Campaign, name: str, limit: float | None, within: np.ndarray) -> Share:

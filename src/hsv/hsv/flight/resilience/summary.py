@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from hsv.base.errors import CampaignError
@@ -33,7 +33,7 @@ class Cell:
     @property
     def worst(self) -> FlownFault:
         """The flight that was lost first, or went farthest from that without the fault."""
-        return worst_of(self.flights)
+        return min(self.flights, key=_rank)
 
     @property
     def attitude(self) -> float | None:
@@ -58,15 +58,9 @@ class Cell:
         return min((f.time_to_loss for f in self.flights if f.time_to_loss is not None), default=None)
 
 
-def worst_of(flights: Iterable[FlownFault]) -> FlownFault:
-    """Return the flight that its controller crashed, else was lost first, else went farthest off in attitude."""
-
-    def rank(flight: FlownFault) -> tuple[float, ...]:
-        if flight.survived:
-            return (1.0, 0.0, -(flight.attitude or 0.0))
-        return (0.0, flight.time_to_loss or 0.0, 0.0)
-
-    return min(flights, key=rank)
+def _rank(flight: FlownFault) -> tuple[float, float]:
+    """Return the rank of a flight, the worst first: crashed, else lost first, else farthest off in attitude."""
+    return (1.0, -(flight.attitude or 0.0)) if flight.survived else (0.0, flight.time_to_loss or 0.0)
 
 
 @dataclass(frozen=True)
@@ -81,9 +75,8 @@ class Square:
     @property
     def worst(self) -> tuple[Cell, FlownFault]:
         """The worst flight of all, and its cell."""
-        flights = {id(cell.worst): cell for row in self.cells.values() for cell in row}
-        found = worst_of(cell.worst for cell in flights.values())
-        return flights[id(found)], found
+        cell = min((cell for row in self.cells.values() for cell in row), key=lambda cell: _rank(cell.worst))
+        return cell, cell.worst
 
     @property
     def survived(self) -> tuple[int, int]:
@@ -133,18 +126,17 @@ class ResilienceResults:
         return [flight for cell in self.cells for flight in cell.flights]
 
 
-def boundary_in_words(fault: TriedFault, boundary: Boundary) -> str:
-    """Return in words how far the nominal vehicle survives."""
-    if boundary.survived is None:
-        return f"lost at {fault.in_words(fault.harmless)}"
-    if boundary.lost is None:
-        return f"all, to {fault.in_words(fault.worst)}"
-    return f"to {fault.in_words(fault.value(boundary.survived))}"
-
-
 def boundaries_in_words(fault: TriedFault, boundaries: Mapping[Moment, Boundary]) -> list[str]:
     """Return the survived range of the nominal vehicle at each time as texts; equal texts are given once."""
-    return list(dict.fromkeys(boundary_in_words(fault, boundaries[moment]) for moment in Moment))
+
+    def in_words(boundary: Boundary) -> str:
+        if boundary.survived is None:
+            return f"lost at {fault.in_words(fault.harmless)}"
+        if boundary.lost is None:
+            return f"all, to {fault.in_words(fault.worst)}"
+        return f"to {fault.in_words(fault.value(boundary.survived))}"
+
+    return list(dict.fromkeys(in_words(boundaries[moment]) for moment in Moment))
 
 
 def parameter_words(name: str) -> str:
