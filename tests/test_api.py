@@ -52,7 +52,7 @@ def test_a_flight_is_a_table_with_units():
 
 
 def test_a_campaign_is_a_table_with_a_row_per_flight():
-    table = hsv.montecarlo("case1", 3, seed=5, factors={"fault[0].start": ("90 s", "110 s")}, workers=1)
+    table = hsv.montecarlo("case1", 3, seed=5, factors={"fault[0].start": ("90 s", "110 s")})
     assert len(table) == 3 and table["fingerprint"].nunique() == 3
     assert table["sample_fault[0].start"].between(90.0, 110.0).all()
     assert table.attrs["units"]["sample_fault[0].start"] == "s"
@@ -64,6 +64,7 @@ def test_a_trim_point_has_names_and_units():
     point = hsv.trim("85500 ft", 2407.92)
     assert point.quantities["altitude"] == (pytest.approx(26060.4), "m")
     assert hsv.trim(26060.4, "7900 ft/s").quantities == point.quantities
+    assert hsv.trim().state.tolist() == hsv.linearise().operating_state.tolist()
     with pytest.raises(TrimError, match=r"altitude = '200 ft', velocity = '10 ft/s': no equilibrium"):
         hsv.trim("200 ft", "10 ft/s")
 

@@ -27,6 +27,7 @@ from hsv.flight.flight import Flight
 from hsv.flight.metrics import METRICS
 from hsv.flight.scenario import Scenario
 from hsv.flight.scenario import load_scenario as load
+from hsv.model.signals import PUBLISHED_ALTITUDE, PUBLISHED_VELOCITY
 from hsv.model.trim import Trim, trim_at
 from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
 
@@ -80,7 +81,7 @@ def montecarlo(
     method: str = "uniform",
     scale: float = 1.0,
     factors: Mapping[str, tuple[object, object]] | None = None,
-    workers: int = 0,
+    workers: int = 1,
 ) -> DataFrame:
     """Return the flights of a campaign as a table: a row per flight with its sample, end, metrics and fingerprint.
 
@@ -94,7 +95,7 @@ def montecarlo(
         method: ``uniform``, ``latin_hypercube``, ``sobol`` or ``corners`` (all combinations of extreme values).
         scale: Factor on the bounds of the uncertain parameters; 0 leaves them alone.
         factors: Least and largest value, as a file has them, by field of the scenario.
-        workers: Processes; 0: one per processor, 1: this process.
+        workers: Processes; 1: this process, 0: one per processor.
 
     Raises:
         CampaignError, ScenarioError, DesignError: Names the setting that is wrong.
@@ -113,8 +114,8 @@ def montecarlo(
 
 
 def trim(
-    altitude: float | str,
-    velocity: float | str,
+    altitude: float | str = PUBLISHED_ALTITUDE,
+    velocity: float | str = PUBLISHED_VELOCITY,
     climb_rate: float | str = 0.0,
     acceleration: float | str = 0.0,
     *,

@@ -35,6 +35,7 @@ from hsv.cli.output import (
     unit_key,
     writing,
 )
+from hsv.model.signals import PUBLISHED_ALTITUDE, PUBLISHED_VELOCITY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,9 +49,6 @@ if TYPE_CHECKING:
     from hsv.design.compare import Row
     from hsv.design.inputs import DesignInputs
     from hsv.model.lpv.linearisation import Mode
-
-ALTITUDE, VELOCITY = "85000 ft", "7702.0808 ft/s"
-"""Flight condition at which the literature publishes a trim: the default of trim and linearise."""
 
 _DESIGN_SECONDS = 100.0
 """Time that hsv design baseline took on one processor, with 20 vertices, 7 nominal gains and 1025 flights."""
@@ -80,8 +78,8 @@ HALF_WIDTHS = {
 
 
 def trim(
-    altitude: AltitudeOption = ALTITUDE,
-    velocity: VelocityOption = VELOCITY,
+    altitude: AltitudeOption = PUBLISHED_ALTITUDE,
+    velocity: VelocityOption = PUBLISHED_VELOCITY,
     climb_rate: Annotated[str, Option(help="Climb rate with unit, e.g. '10 ft/s'.")] = "0 m/s",
     acceleration: Annotated[str, Option(help="Acceleration with unit, e.g. '4 ft/s^2'.")] = "0 m/s^2",
     vehicle: VehicleOption = "",
@@ -109,8 +107,8 @@ def trim(
 
 
 def linearise(
-    altitude: AltitudeOption = ALTITUDE,
-    velocity: VelocityOption = VELOCITY,
+    altitude: AltitudeOption = PUBLISHED_ALTITUDE,
+    velocity: VelocityOption = PUBLISHED_VELOCITY,
     vehicle: VehicleOption = "",
     coupling: CouplingOption = "",
     model: Annotated[str, Option(help="Model: coupled (CM), decoupled (DM), with notch filter (ECM).")] = "CM",

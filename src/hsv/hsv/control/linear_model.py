@@ -14,7 +14,14 @@ from hsv.base.units import UnitSystem, in_system, unit_in
 from hsv.control.notch_filter import continuous, default_sections, series
 from hsv.model.dynamics import MODELS, jacobian
 from hsv.model.lpv.linearisation import Filter, Mode, extended_jacobian, extended_state, modes
-from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
+from hsv.model.signals import (
+    INPUT_NAMES,
+    INPUT_UNITS,
+    PUBLISHED_ALTITUDE,
+    PUBLISHED_VELOCITY,
+    STATE_NAMES,
+    STATE_UNITS,
+)
 from hsv.model.trim import trim_at
 from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
 
@@ -106,8 +113,8 @@ class LinearModel:
 
 
 def linearise(
-    altitude: float | str = "85000 ft",
-    velocity: float | str = "7702.0808 ft/s",
+    altitude: float | str = PUBLISHED_ALTITUDE,
+    velocity: float | str = PUBLISHED_VELOCITY,
     *,
     vehicle: str = "",
     coupling: str = "",

@@ -26,6 +26,9 @@ N_RIGID = 5
 """The first five states are those of the rigid body."""
 PITCH_RATE = STATE_NAMES.index("pitch_rate")
 
+PUBLISHED_ALTITUDE, PUBLISHED_VELOCITY = "85000 ft", "7702.0808 ft/s"
+"""Flight condition at which the literature publishes a trim: the default of trim and linearise."""
+
 NEVER = 2**62
 """A step that is not reached."""
 
