@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 from hsv.base.errors import CampaignError, reason
 from hsv.flight.campaign.executors import Executor, Job
@@ -41,14 +41,17 @@ class Plan(Protocol):
 class Store(ABC):
     """The place where the results of a campaign are kept, and the jobs that make them."""
 
-    fly: ClassVar[Job]
-    """The job that flies a batch"""
-    time: ClassVar[Job]
-    """The job that returns how long (s, as a text) a flight takes, by the number of its kind"""
+    def __init__(self, place: Path, lock: Path, fly: Job, time: Job) -> None:
+        """Keep the results in a file or folder.
 
-    def __init__(self, place: Path, lock: Path) -> None:
-        """Keep the results in a file or folder; ``lock`` is a file next to them."""
+        Args:
+            place: The file or folder.
+            lock: A file next to it.
+            fly: The job that flies a batch.
+            time: The job that returns how long (s, as a text) a flight takes, by the number of its kind.
+        """
         self._place, self._lock = place, lock
+        self.fly, self.time = fly, time
 
     @contextmanager
     def opened(self, *, restart: bool = False) -> Iterator[set[int]]:

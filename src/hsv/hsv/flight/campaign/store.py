@@ -27,11 +27,8 @@ _ROWS = 1024
 class ResultStore(Store):
     """The store of the batches of one campaign; a stored batch is complete even if the process is killed."""
 
-    fly = staticmethod(fly_batch)
-    time = staticmethod(time_flight)
-
     def __init__(self, out: Path, campaign: Campaign) -> None:
-        super().__init__(out, out.with_name(out.name + ".lock"))
+        super().__init__(out, out.with_name(out.name + ".lock"), fly_batch, time_flight)
         self.out = out
         self.folder = out.with_name(out.name + ".parts")
         self._campaign = campaign

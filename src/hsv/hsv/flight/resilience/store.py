@@ -20,12 +20,9 @@ Outcome = tuple[tuple[FlownFault, ...], Boundary]
 class CaseStore(Store):
     """The store of the results of a campaign's cases; several campaigns can share a folder."""
 
-    fly = staticmethod(fly_case)
-    time = staticmethod(time_flight)
-
     def __init__(self, out: Path, campaign: ResilienceCampaign) -> None:
         self.folder = out / "cases"
-        super().__init__(self.folder, self.folder / ".lock")
+        super().__init__(self.folder, self.folder / ".lock", fly_case, time_flight)
         self._cases = campaign.cases
         # The digest is of the code that is loaded: files may change during the flights.
         self._code = code_digest().encode()
