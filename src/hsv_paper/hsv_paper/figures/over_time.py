@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,27 +62,25 @@ SECOND_MODE, NO_FILTER = "case1_second_mode_notch", "case1_no_notch"
 """Scenarios of Figure 13."""
 
 
-@dataclass(frozen=True)
-class Panel:
-    """A quantity over time: axis label in the paper's unit, SI unit, and its values in a flight."""
+class Panel(NamedTuple):
+    """A quantity over time: axis label in the paper's unit, SI unit, and the array and the column of a flight.
+
+    ``shown``: range of the axis in the paper's unit, if a curve leaves the panel.
+    """
 
     label: str
     unit: str
-    value: Callable[[FlightData], np.ndarray]
+    array: str
+    column: int
     shown: tuple[float, float] | None = None
-    """Range of the axis in the paper's unit, if a curve leaves the panel."""
-    limits: tuple[float, ...] = ()
-    """Limits of the quantity, SI."""
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A controller: its flight with uncertain parameters, and the one with nominal parameters."""
+class Curve(NamedTuple):
+    """A controller: its scenarios with uncertain parameters and, where it is shown, with nominal ones."""
 
     label: str
     color: str
-    flight: FlightData
-    nominal: FlightData | None = None
+    scenarios: Sequence[str]
     width: float = 1.1
 
 
@@ -95,128 +92,107 @@ class Zoom(NamedTuple):
     title: str = "about the fault"
 
 
-class _Column(NamedTuple):
-    """Contents of a column: flights with uncertain or nominal parameters or both, and the time range."""
-
-    title: str
-    width: float
-    window: Zoom | None
-    uncertain: bool
-    nominal: bool
-
-
-def state(index: int) -> Callable[[FlightData], np.ndarray]:
-    """Return a function that returns a state of a flight."""
-    return lambda flight: flight.state[:, index]
-
-
-def command(index: int) -> Callable[[FlightData], np.ndarray]:
-    """Return a function that returns a commanded input of a flight."""
-    return lambda flight: flight.command[:, index]
-
-
-ALTITUDE = Panel("$h$ (ft)", "m", state(0))
-VELOCITY = Panel("$V$ (ft/s)", "m/s", state(1))
-ATTITUDE = (
-    Panel(r"$\alpha$ (deg)", "rad", state(2)),
-    Panel(r"$\theta$ (deg)", "rad", state(3)),
-    Panel("$q$ (deg/s)", "rad/s", state(4)),
+_STATES = (
+    ("$h$ (ft)", "m"),
+    ("$V$ (ft/s)", "m/s"),
+    (r"$\alpha$ (deg)", "rad"),
+    (r"$\theta$ (deg)", "rad"),
+    ("$q$ (deg/s)", "rad/s"),
+    (r"$\eta_1$ (slug$^{1/2}$ ft)", "kg^0.5 m"),
+    (r"$\dot\eta_1$ (slug$^{1/2}$ ft/s)", "kg^0.5 m/s"),
+    (r"$\eta_2$ (slug$^{1/2}$ ft)", "kg^0.5 m"),
+    (r"$\dot\eta_2$ (slug$^{1/2}$ ft/s)", "kg^0.5 m/s"),
 )
-ELASTIC = (
-    Panel(r"$\eta_1$ (slug$^{1/2}$ ft)", "kg^0.5 m", state(5)),
-    Panel(r"$\dot\eta_1$ (slug$^{1/2}$ ft/s)", "kg^0.5 m/s", state(6)),
-    Panel(r"$\eta_2$ (slug$^{1/2}$ ft)", "kg^0.5 m", state(7)),
-    Panel(r"$\dot\eta_2$ (slug$^{1/2}$ ft/s)", "kg^0.5 m/s", state(8)),
-)
-INPUTS = tuple(
-    Panel(label, unit, command(i), limits=(float(_LIMITS.input_minimum[i]), float(_LIMITS.input_maximum[i])))
-    for i, (label, unit) in enumerate(((r"$\Phi$", "1"), (r"$\delta_e$ (deg)", "rad")))
-)
+ALTITUDE, VELOCITY, *_OTHERS = (Panel(*state, "state", i) for i, state in enumerate(_STATES))
+ATTITUDE, ELASTIC = _OTHERS[:3], _OTHERS[3:]
+INPUTS = Panel(r"$\Phi$", "1", "command", 0), Panel(r"$\delta_e$ (deg)", "rad", "command", 1)
 
 
 def histories(
+    flights: Flights,
     panels: Sequence[Panel],
     curves: Sequence[Curve],
+    zoom: Zoom | None,
+    height: float,
     *,
-    zoom: Zoom | None = None,
     reference: bool = False,
-    nominal_apart: bool = False,
-    height: float = 2.0,
+    apart: bool = False,
 ) -> Figure:
     """Return a figure with one row per panel, over the whole flight and enlarged; all samples are drawn.
 
     Args:
+        flights: Gives the flights.
         panels: Panels to show.
         curves: Controllers to show, the last one on top.
-        zoom: Range of an additional, enlarged column.
-        reference: Whether the panels are altitude and velocity, with their commands.
-        nominal_apart: Show nominal flights in a column of their own, if vibration would hide them; otherwise they are
-            thin lines on top.
+        zoom: Range of an additional, enlarged column, or ``None``.
         height: Height of a row, inches.
+        reference: Whether the panels are altitude and velocity, with their commands.
+        apart: Show nominal flights in a column of their own, if vibration would hide them; otherwise they are thin
+            lines on top.
     """
-    if nominal_apart:
-        columns = [
-            _Column("uncertain parameters", 1.3, None, True, False),
-            _Column("nominal parameters", 1.3, None, False, True),
-        ]
-    else:
-        columns = [_Column("", 1.7, None, True, True)]
+    # Title, width, time range, and the indices of the scenarios of each curve.
+    columns: list[tuple[str, float, Zoom | None, Sequence[int]]] = [("", 1.7, None, (0, 1))]
+    if apart:
+        columns = [("uncertain parameters", 1.3, None, [0]), ("nominal parameters", 1.3, None, [1])]
     if zoom:
-        columns.append(_Column(zoom.title, 1.0, zoom, True, not nominal_apart))
+        columns.append((zoom.title, 1.0, zoom, [0] if apart else (0, 1)))
     figure = new_figure(height * len(panels) + 0.5)
-    ratios = [column.width for column in columns]
-    grid = figure.subplots(len(panels), len(columns), squeeze=False, width_ratios=ratios)
-    limited = False
+    grid = figure.subplots(len(panels), len(columns), squeeze=False, width_ratios=[column[1] for column in columns])
+    limits = False
     for row, panel in zip(grid, panels, strict=True):
-        if nominal_apart:
+        if apart:
             row[1].sharey(row[0])
-        for axis, column in zip(row, columns, strict=True):
-            limited |= _panel(axis, panel, curves, column, reference)
+        for axis, (_, _, window, indices) in zip(row, columns, strict=True):
+            drawn = [
+                (flights[curve.scenarios[index]], {"color": curve.color, "linewidth": _THIN if thin else curve.width})
+                for thin, index in enumerate(indices)
+                for curve in curves
+                if index < len(curve.scenarios)
+            ]
+            limits |= _panel(axis, panel, drawn, window, reference)
         row[0].set_ylabel(panel.label)
     letter(grid[:, 0])
     for axis, column in zip(grid[0], columns, strict=True):
-        axis.set_title(column.title, loc="center")
+        axis.set_title(column[0], loc="center")
     for axis in grid[-1]:
         axis.set_xlabel("Time (s)")
     handles = [Line2D([], [], label="command", **_COMMAND)] if reference else []
     handles += [Line2D([], [], color=c.color, linewidth=c.width, label=c.label) for c in curves]
-    if not nominal_apart and any(curve.nominal is not None for curve in curves):
+    if not apart and any(len(curve.scenarios) > 1 for curve in curves):
         handles.append(Line2D([], [], color=GREY, linewidth=_THIN, label="thin: nominal parameters"))
-    if curves[0].flight.fault_start is not None:
-        handles.append(Line2D([], [], label="elevator fault", **_FAULT))
-    if limited:
+    handles.append(Line2D([], [], label="elevator fault", **_FAULT))
+    if limits:
         handles.append(Line2D([], [], label="limit of the input", **_LIMIT))
     figure.legend(handles=handles, loc="outside upper center", ncols=min(3, len(handles)), frameon=False)
     return figure
 
 
-def _panel(axis: Axes, panel: Panel, curves: Sequence[Curve], column: _Column, reference: bool) -> bool:
-    """Draw a panel; return whether a limit is near enough to be in it."""
-    window, unit = column.window, to_paper(1.0, panel.unit)[0]
+def _panel(
+    axis: Axes, panel: Panel, drawn: Sequence[tuple[FlightData, Any]], window: Zoom | None, reference: bool
+) -> bool:
+    """Draw flights with their line styles; return whether a limit of the input is near enough to be in the panel."""
+    unit, first = to_paper(1.0, panel.unit)[0], drawn[0][0]
 
-    def line(flight: FlightData, **style: Any) -> None:
-        inside = slice(None) if window is None else (flight.time >= window.start) & (flight.time <= window.end)
-        axis.plot(flight.time[inside], unit * panel.value(flight)[inside], **style)
+    def line(time: np.ndarray, values: np.ndarray, style: Any) -> None:
+        inside = slice(None) if window is None else (time >= window.start) & (time <= window.end)
+        axis.plot(time[inside], unit * values[inside, panel.column], **style)
 
-    for curve in curves:
-        flight = curve.flight if column.uncertain else curve.nominal
-        if flight is not None:
-            line(flight, color=curve.color, linewidth=curve.width)
-    for curve in curves:
-        if column.uncertain and column.nominal and curve.nominal is not None:
-            line(curve.nominal, color=curve.color, linewidth=_THIN)
-    first = curves[0].flight
+    for flight, style in drawn:
+        line(flight.time, getattr(flight, panel.array), style)
     if reference:
-        line(replace(first, state=first.reference), **_COMMAND)
+        line(first.time, first.reference, _COMMAND)
     if first.fault_start is not None:
         axis.axvline(first.fault_start, **_FAULT)
     if window:
         axis.set_xlim(window.start, window.end)
         return False
-    axis.set_xlim(0.0, max(curve.flight.time[-1] for curve in curves))
+    axis.set_xlim(0.0, max(flight.time[-1] for flight, _ in drawn))
     low, high = axis.get_ylim()
     margin, off = _NEAR * (high - low), _OFF * (high - low)
-    near = [unit * limit for limit in panel.limits if low - margin <= unit * limit <= high + margin]
+    near = []
+    if panel.array == "command":
+        limits = unit * _LIMITS.input_minimum[panel.column], unit * _LIMITS.input_maximum[panel.column]
+        near = [limit for limit in limits if low - margin <= limit <= high + margin]
     for limit in near:
         axis.axhline(limit, **_LIMIT)
     if near:  # keep the limit visible beside the frame
@@ -226,35 +202,28 @@ def _panel(axis: Axes, panel: Panel, curves: Sequence[Curve], column: _Column, r
     return bool(near)
 
 
-def _case_1(flights: Flights, *, single: bool = False, vibrating: bool = False) -> list[Curve]:
+def _case_1(*, single: bool = False, vibrating: bool = False) -> list[Curve]:
     """Return the controllers of Figures 9 to 12; the one that rings most is drawn first and does not hide the others.
 
     Args:
-        flights: Gives the flights.
         single: Show robust MPC with the single gain too.
         vibrating: Robust MPC rings about as much as the tube with notch: draw it last, with a thinner line.
     """
     # The curve without notch is wider, so that it stays visible where both coincide.
-    without = ("Tube-MPC without notch", GREEN, NO_NOTCH, 2.0 if single else 1.1)
-    tube = ("Tube-MPC with notch", BLUE, NOTCH, 1.1)
-    robust = [("RMPC on the DM, fourth gain", ORANGE, RMPC, 0.7 if vibrating else 1.1)]
+    without = Curve("Tube-MPC without notch", GREEN, NO_NOTCH, 2.0 if single else 1.1)
+    tube = Curve("Tube-MPC with notch", BLUE, NOTCH)
+    robust = [Curve("RMPC on the DM, fourth gain", ORANGE, RMPC, 0.7 if vibrating else 1.1)]
     if single:
-        robust.append(("RMPC on the DM, single gain", RED, RMPC_SINGLE, 1.1))
-    return _curves(flights, (without, tube, *robust) if vibrating else (without, *robust, tube))
+        robust.append(Curve("RMPC on the DM, single gain", RED, RMPC_SINGLE))
+    return [without, tube, *robust] if vibrating else [without, *robust, tube]
 
 
-def _case_2(flights: Flights) -> list[Curve]:
-    """Return the three controllers of Figures 14 to 17, the paper's on top."""
-    shown = (
-        ("baseline", ORANGE, BASELINE, 2.0),
-        (r"adjustable, $\tau$ = 1", GREEN, WHOLE, 1.4),
-        (r"adjustable, $\tau$ = 0.8", BLUE, ADJUSTABLE, 0.9),
-    )
-    return _curves(flights, shown)
-
-
-def _curves(flights: Flights, shown: Sequence[tuple[str, str, Scenarios, float]]) -> list[Curve]:
-    return [Curve(label, color, flights[names[0]], flights[names[1]], width) for label, color, names, width in shown]
+_CASE_2 = (
+    Curve("baseline", ORANGE, BASELINE, 2.0),
+    Curve(r"adjustable, $\tau$ = 1", GREEN, WHOLE, 1.4),
+    Curve(r"adjustable, $\tau$ = 0.8", BLUE, ADJUSTABLE, 0.9),
+)
+"""The three controllers of Figures 14 to 17, the paper's on top."""
 
 
 def _conditions_1(nominal: str = "thin lines show") -> str:
@@ -295,8 +264,8 @@ def _of_case_2(flights: Flights, metric: str) -> list[float]:
 def figure_09(flights: Flights) -> Outcome:
     """Draw altitude and velocity; the altitude with the single gain leaves its panel."""
     top = 86480.0
-    panels = replace(ALTITUDE, shown=(85450.0, top)), replace(VELOCITY, shown=(7880.0, 8190.0))
-    figure = histories(panels, _case_1(flights, single=True), reference=True, height=2.7)
+    panels = ALTITUDE._replace(shown=(85450.0, top)), VELOCITY._replace(shown=(7880.0, 8190.0))
+    figure = histories(flights, panels, _case_1(single=True), None, 2.7, reference=True)
     notch, without, robust, single_gain = (
         measured(flights, names[0], "altitude_end_error") for names in (NOTCH, NO_NOTCH, RMPC, RMPC_SINGLE)
     )
@@ -321,7 +290,7 @@ def figure_09(flights: Flights) -> Outcome:
 
 def figure_10(flights: Flights) -> Outcome:
     """Draw angle of attack, pitch angle and pitch rate."""
-    figure = histories(ATTITUDE, _case_1(flights), zoom=Zoom(95.0, 125.0), height=2.1)
+    figure = histories(flights, ATTITUDE, _case_1(), Zoom(95.0, 125.0), 2.1)
     tube, without, robust = (
         measured(flights, names[0], "post_fault_attitude_deviation") for names in (NOTCH, NO_NOTCH, RMPC)
     )
@@ -343,8 +312,7 @@ def figure_10(flights: Flights) -> Outcome:
 
 def figure_11(flights: Flights) -> Outcome:
     """Draw both elastic coordinates with their derivatives."""
-    curves = _case_1(flights, vibrating=True)
-    figure = histories(ELASTIC, curves, zoom=Zoom(99.0, 107.0), nominal_apart=True, height=1.9)
+    figure = histories(flights, ELASTIC, _case_1(vibrating=True), Zoom(99.0, 107.0), 1.9, apart=True)
     decay = {name: measured(flights, name, "elastic_decay_time") for name in (*NOTCH, *NO_NOTCH)}
     unit = to_paper(1.0, "kg^0.5 m/s")[0]
 
@@ -380,7 +348,7 @@ def figure_11(flights: Flights) -> Outcome:
 
 def figure_12(flights: Flights) -> Outcome:
     """Draw both inputs as commanded."""
-    figure = histories(INPUTS, _case_1(flights), zoom=Zoom(98.0, 118.0), height=2.3)
+    figure = histories(flights, INPUTS, _case_1(), Zoom(98.0, 118.0), 2.3)
     _, largest = input_extremes(flights, RMPC)
     flight = flights[NOTCH[0]]
     steps = gain_switches(flight)
@@ -405,10 +373,10 @@ def figure_12(flights: Flights) -> Outcome:
 def figure_13(flights: Flights) -> Outcome:
     """Draw both elastic rates, with the notch at the second mode and without a notch."""
     curves = [
-        Curve("Tube-MPC without notch", GREEN, flights[NO_FILTER]),
-        Curve("Tube-MPC with notch for the second mode", BLUE, flights[SECOND_MODE]),
+        Curve("Tube-MPC without notch", GREEN, [NO_FILTER]),
+        Curve("Tube-MPC with notch for the second mode", BLUE, [SECOND_MODE]),
     ]
-    figure = histories((ELASTIC[1], ELASTIC[3]), curves, zoom=Zoom(99.0, 107.0), height=2.3)
+    figure = histories(flights, (ELASTIC[1], ELASTIC[3]), curves, Zoom(99.0, 107.0), 2.3)
     first, second = (
         [measured(flights, name, f"elastic_rate_{mode}_decay_time") for name in (NO_FILTER, SECOND_MODE)]
         for mode in (1, 2)
@@ -431,7 +399,7 @@ def figure_13(flights: Flights) -> Outcome:
 def figure_14(flights: Flights) -> Outcome:
     """Draw altitude and velocity along the ramp."""
     closer = Zoom(78.0, 130.0, "end of the ramp, and the fault")
-    figure = histories((ALTITUDE, VELOCITY), _case_2(flights), zoom=closer, reference=True, height=2.6)
+    figure = histories(flights, (ALTITUDE, VELOCITY), _CASE_2, closer, 2.6, reference=True)
     lag = _of_case_2(flights, "velocity_integral_absolute_error")
     return Outcome(
         figure,
@@ -448,7 +416,7 @@ def figure_14(flights: Flights) -> Outcome:
 
 def figure_15(flights: Flights) -> Outcome:
     """Draw angle of attack, pitch angle and pitch rate."""
-    figure = histories(ATTITUDE, _case_2(flights), zoom=Zoom(95.0, 125.0), height=2.1)
+    figure = histories(flights, ATTITUDE, _CASE_2, Zoom(95.0, 125.0), 2.1)
     off = _of_case_2(flights, "post_fault_attitude_deviation")
 
     def moved(start: float) -> float:
@@ -474,7 +442,7 @@ def figure_15(flights: Flights) -> Outcome:
 
 def figure_16(flights: Flights) -> Outcome:
     """Draw both elastic coordinates with their derivatives."""
-    figure = histories(ELASTIC, _case_2(flights), zoom=Zoom(99.0, 107.0), nominal_apart=True, height=1.9)
+    figure = histories(flights, ELASTIC, _CASE_2, Zoom(99.0, 107.0), 1.9, apart=True)
     decay = _of_case_2(flights, "elastic_decay_time")
     nominal = [measured(flights, names[1], "elastic_decay_time") for names in (ADJUSTABLE, WHOLE)]
     return Outcome(
@@ -490,7 +458,7 @@ def figure_16(flights: Flights) -> Outcome:
 
 def figure_17(flights: Flights) -> Outcome:
     """Draw both inputs as commanded."""
-    figure = histories(INPUTS, _case_2(flights), zoom=Zoom(98.0, 118.0), height=2.3)
+    figure = histories(flights, INPUTS, _CASE_2, Zoom(98.0, 118.0), 2.3)
 
     def peak_delay(scenario: str) -> float:
         """Return the time (s) from the fault to the largest elevator deflection."""

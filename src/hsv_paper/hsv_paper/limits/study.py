@@ -330,7 +330,8 @@ faulty vehicle, anywhere in the envelope of commands, and never outside the rang
 The optimum equals the larger of the turning limit and the static limit of the trim that it leads to, to the resolution
 of the bisection: nothing else limits the recovery. The reason, for the rigid pitch motion: angle of attack and pitch
 rate each grow with the other, the elevator lowers the growth of both and thrust raises that of the pitch rate, so that
-elevator at its stop and no fuel keep both below those of any other input.
+elevator at its stop and no fuel keep both below those of any other input. Known at once, a loss costs nothing as long
+as a trim is left.
 
 For the nominal vehicle and the worst of all corners:"""
 
