@@ -52,11 +52,7 @@ ARGUMENTS = {
 """Default and description of each launch argument; the arguments correspond to the options of hsv run."""
 
 CHOICES = {
-    "composed": ("true", "false"),
-    "external": ("true", "false"),
-    "live": ("true", "false"),
-    "paused": ("true", "false"),
-    "report": ("true", "false"),
+    **dict.fromkeys(("composed", "external", "live", "paused", "report"), ("true", "false")),
     "units": ("metric", "si", "paper"),
     "log_level": ("debug", "info", "warn", "error", "fatal"),
 }

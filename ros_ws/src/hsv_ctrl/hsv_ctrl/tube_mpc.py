@@ -35,14 +35,12 @@ class TubeNode(BlockNode):
             raise ParameterError(
                 f"parameter controller = {self.controller!r}: expected {role.name}, which this node is"
             )
-        self._begin()
+        self._outside = False
+        self._mode = EffectivenessMode.HEALTHY
 
     def start_run(self, run: Run) -> None:
         """Reset the tube status: the flight starts inside the tube."""
         super().start_run(run)
-        self._begin()
-
-    def _begin(self) -> None:
         self._outside = False
         self._mode = EffectivenessMode.HEALTHY
 

@@ -295,15 +295,16 @@ class PeerNode(LockstepNode):
         return 0.25 if self._announced else LINK_CHECK
 
     def _on_run(self, run: Run) -> None:
+        period = self.get_parameter("period").value if self.has_parameter("period") else run.period
+        refusal = ""
         if run.interface_version != Run.INTERFACE_VERSION:
-            self.get_logger().fatal(
+            refusal = (
                 f"interface version {run.interface_version} of the plant: expected {Run.INTERFACE_VERSION}, as here"
             )
-            self.finish(2)
-            return
-        period = self.get_parameter("period").value if self.has_parameter("period") else run.period
-        if period != run.period:
-            self.get_logger().fatal(f"parameter period = {period}: expected the plant's, {run.period}")
+        elif period != run.period:
+            refusal = f"parameter period = {period}: expected the plant's, {run.period}"
+        if refusal:
+            self.get_logger().fatal(refusal)
             self.finish(2)
             return
         self._run = run

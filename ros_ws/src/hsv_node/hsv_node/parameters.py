@@ -96,7 +96,7 @@ def declare_design(node: Node, extra: tuple[Parameter, ...] = ()) -> tuple[dict[
 
     # A complete design is known by its digest; the shipped one then need not be parsed.
     whole = given(node, "design.hash") or given(node, "design.name")
-    shipped = {}
+    shipped: dict[str, Any] = {}
     with suppress(DesignError):  # an installation without designs
         shipped = {} if whole else read_parameters(find_design(DEFAULT_DESIGN))
     values = declare(node, (*extra, *DESIGN_PARAMETERS), shipped)
