@@ -22,6 +22,7 @@ COMMANDS = [
     "design baseline",
     "check tube_mpc",
     "montecarlo case1 --samples 2000",
+    "montecarlo case1 --samples 2000 --scheduler 127.0.0.1:9",
     "resilience --controllers case1 --faults elevator_loss",
     "bench --only in_process",
     "certify baseline.yaml",

@@ -102,10 +102,9 @@ SUBSCRIBE = textwrap.dedent(
     import sys
     import rclpy
     from rclpy.experimental import EventsExecutor
-    from hsv.bags.description import TOPICS
+    from hsv.bags.description import LATCHED_TOPICS, OTHER_TOPICS, ROSOUT, RUN, TOPICS
     from hsv.bags.reader import Bag
-    from hsv_node.middleware import message_class
-    from hsv_node.middleware import STEP
+    from hsv_node.middleware import LATCHED, STEP, message_class
     from std_srvs.srv import Trigger
 
     rclpy.init()
@@ -139,6 +138,12 @@ SUBSCRIBE = textwrap.dedent(
         print(call("step"))
         wait(lambda: all(len(messages) >= step for messages in heard.values()), f"step {step}")
     assert all(len(messages) == 3 for messages in heard.values()), {t: len(m) for t, m in heard.items()}
+    # A late subscriber of a latched topic gets what was played before, among the log of nodes that run now.
+    for topic, kind in {"/hsv/run": LATCHED_TOPICS[RUN], ROSOUT: OTHER_TOPICS[ROSOUT]}.items():
+        played, late = {data for time, data in recorded.messages(topic) if time <= 40_000_000}, []
+        node.create_subscription(message_class(kind), topic, late.append, LATCHED, raw=True)
+        assert played
+        wait(lambda: played <= {*late}, "what was played on " + topic)
     print(call("resume"))
     wait(lambda: all(len(heard[topic]) >= len(expected[topic]) for topic in topics), "the end")
     assert heard == expected
@@ -149,7 +154,7 @@ SUBSCRIBE = textwrap.dedent(
 
 def test_player_steps_and_plays_the_recorded_bytes(shared_processes: Processes, bag: Path) -> None:
     topics = ["/hsv/state", "/hsv/command"]
-    words = ["--rate", "20", "--paused", "--topics", *topics]
+    words = ["--rate", "20", "--paused", "--topics", *topics, "/hsv/run", "/rosout"]
     player = shared_processes.start("ros2", "run", "hsv_bringup", "player", bag, *words)
     done = shared_processes.run(sys.executable, "-c", SUBSCRIBE, bag, ",".join([*topics, "/clock"]))
     assert done.returncode == 0, done.stdout

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Thread
 
 import pytest
 from distributed import LocalCluster
@@ -49,15 +50,16 @@ def test_an_address_that_is_none_is_refused_at_once(monkeypatch, address):
         pass
 
 
-@pytest.mark.parametrize("listens", [False, True])
-def test_a_scheduler_that_does_not_answer_is_named_once(monkeypatch, capfd, listens):
-    waited = []
+@pytest.mark.parametrize("answer", [None, b"", b"\x01"], ids=["absent", "mute", "of another kind"])
+def test_a_scheduler_that_does_not_answer_is_named_once(monkeypatch, capfd, answer):
+    waited, links = [], []
     monkeypatch.setattr("hsv.flight.campaign.executors.ANSWER", 1.5)
     monkeypatch.setattr("hsv.flight.campaign.executors.NOTICE", 0.1)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
-        if listens:
+        if answer is not None:
             silent.listen()
+            Thread(target=lambda: (links.append(silent.accept()[0]), links[0].sendall(answer)), daemon=True).start()
         address = f"127.0.0.1:{silent.getsockname()[1]}"
         with pytest.raises(CampaignError, match=f"'{address}': no answer"), make_executor(0, address, waited.append):
             pass
@@ -72,6 +74,26 @@ def cluster():
         n_workers=0, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
     ) as started:
         yield started
+
+
+@pytest.mark.long
+def test_a_worker_that_does_not_answer_is_reported_and_refused(monkeypatch, cluster):
+    monkeypatch.setattr("hsv.flight.campaign.executors.NOTICE", 0.5)
+    monkeypatch.setattr("hsv.flight.campaign.executors.WORKERS", 2.0)
+    waited = []
+    cluster.scale(1)
+    wait_until(lambda: cluster.scheduler.workers and cluster.workers)
+    (worker,) = cluster.workers.values()
+    os.kill(worker.pid, signal.SIGSTOP)
+    try:
+        with (
+            pytest.raises(CampaignError, match="a worker does not answer"),
+            make_executor(0, cluster.scheduler_address, waited.append),
+        ):
+            pass
+    finally:
+        os.kill(worker.pid, signal.SIGCONT)
+    assert waited[-1] == "waiting for the answers of all workers"
 
 
 @pytest.mark.long

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import multiprocessing
 import os
 import pickle
-import socket
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from concurrent.futures import Executor as Pool
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
@@ -298,7 +305,7 @@ def make_executor(workers: int, scheduler: str = "", notice: Notice = lambda wor
         if workers:
             raise CampaignError(f"workers = {workers}: expected no --workers with --scheduler, whose workers fly")
         with _connected(scheduler, notice) as client:
-            _check_workers(client, scheduler)
+            _check_workers(client, scheduler, notice)
             yield DaskExecutor(client, notice)
         return
     workers = workers or os.cpu_count() or 1
@@ -331,14 +338,12 @@ def _connected(address: str, notice: Notice) -> Iterator[Any]:
         for logger in map(logging.getLogger, _LOGS):
             stack.callback(logger.setLevel, logger.level)
             logger.setLevel(logging.CRITICAL)
-        # Dask's own wait for a scheduler cannot be interrupted.
-        greets = address.partition("://")[0] in ("tcp", address)
         waiting = partial(notice, f"waiting for the scheduler {address}")
-        if not _in_time(lambda: _answers(host, port, greets), ANSWER, waiting):
-            raise silent
         try:
-            client = stack.enter_context(Client(address, timeout=NOTICE, set_as_default=False))
-        except (OSError, ValueError) as error:
+            if not asyncio.run(_answers(address, waiting)):
+                raise silent
+            client = stack.enter_context(Client(address, timeout=ANSWER, set_as_default=False))
+        except (OSError, ValueError, TypeError) as error:
             raise silent from error
         if not client.nthreads():
             notice("waiting for the scheduler's workers")
@@ -361,13 +366,24 @@ def _in_time(done: Callable[[], Any], limit: float, notice: Callable[[], None] =
     return True
 
 
-def _answers(host: str, port: int, greets: bool) -> bool:
-    """Return whether a scheduler is there: one that ``greets``, as over TCP, sends the first bytes."""
-    try:
-        with socket.create_connection((host, port), timeout=NOTICE) as link:
-            return not greets or bool(link.recv(1))
-    except OSError:
-        return False
+async def _answers(address: str, waiting: Callable[[], None]) -> bool:
+    """Return whether a scheduler answers within :data:`ANSWER`; call ``waiting`` if it takes more than :data:`NOTICE`.
+
+    A client of Dask that waits for its scheduler cannot be interrupted.
+    """
+    from distributed.core import rpc
+    from distributed.security import Security
+
+    arguments = Security().get_connection_args("client")
+    async with rpc(address, timeout=ANSWER, connection_args=arguments) as scheduler:
+        identity = asyncio.ensure_future(scheduler.identity())
+        if not (await asyncio.wait([identity], timeout=NOTICE))[0]:
+            waiting()
+            await asyncio.wait([identity], timeout=ANSWER - NOTICE)
+        if not identity.done():
+            identity.cancel()
+            return False
+        return identity.exception() is None and identity.result().get("type") == "Scheduler"
 
 
 def program() -> str:
@@ -375,8 +391,8 @@ def program() -> str:
     return f"hsv {version('hsv')}, sources {code_digest()[:DIGITS]}"
 
 
-def _check_workers(client: Any, address: str) -> None:
-    """Refuse the scheduler at ``address`` if one of its workers has another program, or none."""
+def _check_workers(client: Any, address: str, notice: Notice) -> None:
+    """Refuse the scheduler at ``address`` if one of its workers has another program, or none, or does not answer."""
 
     def worker_program() -> str:
         # A local function travels by value: the worker may not have the library.
@@ -384,7 +400,13 @@ def _check_workers(client: Any, address: str) -> None:
 
         return program()
 
-    for worker, answer in sorted(client.run(worker_program, on_error="return").items()):
+    # In a thread, which ends with the client: an interruption need not wait for a worker that is stopped.
+    pool = ThreadPoolExecutor(1)
+    answers = pool.submit(client.run, worker_program, on_error="return")
+    pool.shutdown(wait=False)
+    if not _in_time(answers.done, WORKERS, partial(notice, "waiting for the answers of all workers")):
+        raise CampaignError(f"scheduler = {address!r}: a worker does not answer, expected {program()} on each")
+    for worker, answer in sorted(answers.result().items()):
         if answer == program():
             continue
         has = answer
