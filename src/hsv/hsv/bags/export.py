@@ -53,8 +53,10 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
         )
     topics = [bag.name_of(topic) for topic in topics]
     lacking = "; ".join(bag_warnings(bag))
-    make = {Format.npz: _arrays, Format.mat: _structures}.get(form, _tables)
-    contents = make(bag, topics)
+    if form.single:
+        contents = (_structures if form is Format.mat else _arrays)(bag, topics)
+    else:
+        contents = {topic: table(*_columns(bag, topic)) for topic in topics}
     try:
         (target.parent if form.single else target).mkdir(parents=True, exist_ok=form.single)
     except OSError as error:
@@ -70,8 +72,7 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
                 else:
                     np.savez_compressed(stream, **contents, **notes)
             return [target]
-        write = _write_csv if form is Format.csv else _write_parquet
-        written = [write(target / f"{_file_stem(topic)}.{form}", table) for topic, table in contents.items()]
+        written = [_write(target / f"{_file_stem(topic)}.{form}", table) for topic, table in contents.items()]
         if lacking:
             written.append(target / f"{INCOMPLETE}.txt")
             written[-1].write_text(f"{bag.path}: {lacking}\n", encoding="utf-8")
@@ -87,10 +88,6 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
 
 def _refused(target: Path, error: OSError) -> RecordingError:
     return RecordingError(f"out = {str(target)!r}: cannot be written: {reason(error)}")
-
-
-def _tables(bag: Bag, topics: Iterable[str]) -> dict[str, Any]:
-    return {topic: table(*_columns(bag, topic)) for topic in topics}
 
 
 def _arrays(bag: Bag, topics: Iterable[str]) -> dict[str, Any]:
@@ -173,21 +170,10 @@ def _text(value: Any) -> str:
     return json.dumps(value.tolist() if isinstance(value, np.ndarray) else value)
 
 
-def _arrow(table: dict[str, NDArray[Any]]) -> Any:
+def _write(path: Path, table: dict[str, NDArray[Any]]) -> Path:
     import pyarrow
+    from pyarrow import csv, parquet
 
-    return pyarrow.table({name: pyarrow.array(column) for name, column in table.items()})
-
-
-def _write_csv(path: Path, table: dict[str, NDArray[Any]]) -> Path:
-    from pyarrow import csv
-
-    csv.write_csv(_arrow(table), path)
-    return path
-
-
-def _write_parquet(path: Path, table: dict[str, NDArray[Any]]) -> Path:
-    from pyarrow import parquet
-
-    parquet.write_table(_arrow(table), path)
+    write = csv.write_csv if path.suffix == f".{Format.csv}" else parquet.write_table
+    write(pyarrow.table({name: pyarrow.array(column) for name, column in table.items()}), path)
     return path

@@ -28,6 +28,8 @@ _FRAME = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 """Channel id, sequence, log time and publish time at the start of a message record; the data follow."""
 _CHECKSUM = 4
+_INDEX_HEADER, _INDEX_ENTRY = 6, 16
+"""Sizes of the beginning of a message index, and of its entry for a message, bytes."""
 
 # The start of a chunk, an attachment or an end of data with a length below 2^40.
 _CANDIDATE = re.compile(rb"(?=[\x06\x09\x0f].{5}\x00{3})", re.DOTALL)
@@ -41,7 +43,6 @@ _KINDS: dict[int, Any] = {
     Opcode.SCHEMA: kinds.Schema,
     Opcode.CHANNEL: kinds.Channel,
     Opcode.CHUNK: kinds.Chunk,
-    Opcode.MESSAGE_INDEX: kinds.MessageIndex,
     Opcode.CHUNK_INDEX: kinds.ChunkIndex,
     Opcode.ATTACHMENT: kinds.Attachment,
     Opcode.ATTACHMENT_INDEX: kinds.AttachmentIndex,
@@ -53,7 +54,7 @@ _KINDS: dict[int, Any] = {
 }
 
 Found = tuple[int, kinds.McapRecord | None, int]
-"""Start, record and end; the record is None for a private kind."""
+"""Start, record and end; the record is None for a message index or a private kind."""
 
 
 @dataclass(frozen=True)
@@ -118,8 +119,8 @@ class Scan:
                             if following is not None and following < end:
                                 position = following
                                 break
-                    case kinds.MessageIndex():
-                        self.indexed += new * len(record.records)
+                    case None if data[start] == Opcode.MESSAGE_INDEX:
+                        self.indexed += new * ((end - start - _FRAME.size - _INDEX_HEADER) // _INDEX_ENTRY)
                     case kinds.Attachment() if not _fits_checksum(data[start + _FRAME.size : end]):
                         self.damages.append(Damage(start, "an attachment"))
                     case kinds.DataEnd():
@@ -163,9 +164,11 @@ class Scan:
 
 def _walk(data: memoryview, position: int) -> Iterator[Found]:
     """Yield the consistent records from ``position`` on: known kinds are filled exactly by their fields."""
-    while position < len(data) and _may_begin(data, position):
-        opcode, length = _FRAME.unpack_from(data, position) if position + _FRAME.size <= len(data) else (0, 0)
+    while position + _FRAME.size <= len(data):
+        opcode, length = _FRAME.unpack_from(data, position)
         start, end = position + _FRAME.size, position + _FRAME.size + length
+        if not opcode or end > len(data):
+            return
         record = None
         if opcode in _KINDS:
             stream = ReadDataStream(BytesIO(data[start:end]))
@@ -175,7 +178,7 @@ def _walk(data: memoryview, position: int) -> Iterator[Found]:
                 return
             if stream.count != length:
                 return
-        elif not opcode or not _may_begin(data, end):
+        elif not _may_begin(data, end):
             return
         elif opcode == Opcode.MESSAGE:
             if length < _MESSAGE.size:
