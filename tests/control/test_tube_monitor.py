@@ -76,12 +76,6 @@ def test_the_set_is_not_that_of_another_notch_filter(design):
     assert step(TubeLaw(design, notch=other * 2), design, np.zeros(5), np.zeros(4)).status is TubeStatusCode.NO_SET
 
 
-def test_the_set_survives_the_parameter_file(design):
-    checked = ControlDesign.from_parameters(design.to_parameters())
-    assert not checked.modified
-    assert_allclose(checked.tube.shape, design.tube.shape)
-
-
 def test_a_shape_that_is_not_positive_definite_is_refused(design):
     values = design.to_parameters()
     values["tube.shape"] = [-v for v in values["tube.shape"]]

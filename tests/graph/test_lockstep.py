@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from marking import long
 from node_processes import Processes, short_scenario
-from waiting import exit_code_of
+from waiting import exit_code_of, wait_until
 
 from hsv.bags.description import TOPICS
 from hsv.bags.flight import flight_data, input_columns, state_columns
@@ -84,6 +84,7 @@ def test_composed_and_started_paused_equals_separate_processes_in_every_byte(
     path = shared_processes.folder / "composed"
     words = (short_scenario(shared_processes.folder), "--composed", "--paused", "--no-report", "--bag", path)
     run = shared_processes.start("hsv", "run", *words)
+    wait_until(lambda: (path / "composed_0.mcap").exists() or run.poll() is not None, [run.pid])
     released = shared_processes.run("hsv", "set", "paused", "false")
     assert "from step 1 on" in released.stdout, released.stdout
     assert exit_code_of(run) == 0

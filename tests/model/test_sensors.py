@@ -11,7 +11,7 @@ from hsv.base.errors import ParameterError
 from hsv.base.units import FOOT
 from hsv.model.faults.schedule import fault_rows
 from hsv.model.faults.table import SENSOR, Fault
-from hsv.model.sensors import SENSOR_PARAMETERS, SENSOR_SETS, sensor_data, sensor_state
+from hsv.model.sensors import SENSOR_SETS, sensor_data, sensor_state
 from hsv.model.signals import STATE_NAMES
 
 T = 0.02
@@ -177,7 +177,3 @@ def test_fault_of_noise_and_drop_out():
 def test_what_is_no_sensor_is_refused(values, message):
     with pytest.raises(ParameterError, match=message):
         sensor_data(values, T)
-
-
-def test_parameters_are_described():
-    assert all(parameter.description for parameter in SENSOR_PARAMETERS)
