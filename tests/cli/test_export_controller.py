@@ -38,7 +38,8 @@ def test_a_design_by_its_path_takes_the_place_of_one_written_before(hsv, tmp_pat
         (("baseline", "--out", "full"), "out = 'full': holds notes.txt, expected a new folder"),
         (("baseline", "--out", "full/notes.txt"), "out = 'full/notes.txt': cannot be written"),
         (("baseline", "--out", "full/controller.c"), "out = 'full/controller.c': cannot be written"),
-        (("baseline",), "Missing option '--out'"),
+        (("baseline",), "out, fmu: missing, expected --out FOLDER, --fmu FILE or both"),
+        (("baseline", "--fmu", "full/notes.txt"), "fmu = 'full/notes.txt': exists, expected a new file"),
     ],
 )
 def test_wrong_input_is_one_line(hsv, tmp_path, words, expected):

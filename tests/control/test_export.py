@@ -38,7 +38,7 @@ from hsv.flight.scenario import load_scenario
 from hsv.model.vehicle import load_vehicle
 
 DESIGNS = {name: read_design(find_design(name)) for name in ("baseline", "adjustable", "smooth")}
-BLOCKS = ("notch_filter", "nominal_trajectory", "tube_law")
+BLOCKS = ("notch_filter", "nominal_trajectory", "tube_law", "controller")
 REFERENCE = ReferenceTrajectory([0.0, 20.0], [26060.4, 26243.28], [2407.92, 2484.12], 0.02, load_vehicle().decoupled)
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -94,10 +94,10 @@ def test_the_blocks_describe_themselves(built):
         "notch_filter": [1, 1, states],
         "nominal_trajectory": [9, 9, 9, 9, 2, 1, 1],
         "tube_law": [9, 1, 9, 2, 9, 2, *([states] if design.filtered else []), 2],
+        "controller": [9, 9, 9, 2, 2, 2, 1, states, 9, 2, 1, 1],
     }
-    assert {name: block.state_size for name, block in blocks.items()} == {
-        name: bound.state_size for name, bound in step_bounds(design).items()
-    }
+    kept = {name: bound.state_size for name, bound in step_bounds(design).items()}
+    assert {name: block.state_size for name, block in blocks.items()} == kept | {"controller": sum(kept.values())}
     tau, rate = blocks["tube_law"].parameters
     assert_array_equal(tau.default, design.tau)
     assert (tau.minimum, tau.maximum) == (design.tau_minimum.min(), 1.0)

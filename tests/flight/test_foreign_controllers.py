@@ -238,7 +238,10 @@ def test_flights_in_threads_share_no_state():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"controller": "7"}, r"controller = '7': expected one of .*package.module:Class or path/lib.so:symbol"),
+        (
+            {"controller": "7"},
+            r"controller = '7': expected one of .*package.module:Class, path/lib.so:symbol or path/name.fmu",
+        ),
         ({"controller": "7:lqr"}, r"controller = '7:lqr': '7' is no module, expected package.module:Class or path/"),
         ({"controller": ":lqr"}, r"controller = ':lqr': '' is no module, expected package.module:Class or path/"),
         ({"controller": "./build/lqr"}, r"controller = './build/lqr': no symbol, expected path/lib.so:symbol"),

@@ -15,7 +15,7 @@ TREE = (
     ("Look at flights", "hsv.cli.look", "report plot info view"),
     ("In flight", "hsv.cli.in_flight", "fault set command watch topic"),
     ("Bags", "hsv.cli.bags", "replay diff export recover play"),
-    ("Design", "hsv.cli.design", "trim linearise design verify certify govern export-controller"),
+    ("Design", "hsv.cli.design", "trim linearise design verify certify govern export-controller export-vehicle"),
     ("Know", "hsv.cli.know", "list check bench"),
     ("", "hsv.cli.fly", "prepare conclude"),
     ("", "hsv.cli.design", "include"),

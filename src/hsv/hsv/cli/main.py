@@ -42,6 +42,7 @@ EXTRAS = {
     "control": "notebook",
     "cvxpy": "design",
     "distributed": "campaign",
+    "fmpy": "fmi",
     "foxglove": "live",
     "jinja2": "report",
     "markupsafe": "report",

@@ -7,7 +7,7 @@ A package registers its controllers as entry points of the group ``hsv.controlle
 
 A scenario then says ``controller = "lqr"``; where nothing is registered, ``controller = "package.module:Class"``.
 The class is described in :mod:`hsv.control.controller`. A controller in C is ``controller = "path/lib.so:symbol"``, see
-:mod:`hsv.control.library`.
+:mod:`hsv.control.library`, and one in an FMU ``controller = "path/controller.fmu"``, see :mod:`hsv.control.fmu`.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from hsv.control.controller import (
     StepKernel,
     failure_words,
 )
+from hsv.control.fmu import FmuClass
 from hsv.control.library import LibraryClass, library_place
 from hsv.model.vehicle import Vehicle
 
@@ -55,7 +56,8 @@ CONTROLLER_PARAMETERS = (
     Parameter(
         "controller",
         _DEFAULT,
-        "controller: a registered name, package.module:Class, path/lib.so:symbol or node:package/executable",
+        "controller: a registered name, package.module:Class, path/lib.so:symbol, path/name.fmu or "
+        "node:package/executable",
     ),
 )
 
@@ -69,7 +71,7 @@ def controller_names() -> list[str]:
 
 def names_code(controller: str) -> bool:
     """Return whether a controller is named by its class or library: neither registered nor a node."""
-    return ":" in controller and not controller.startswith(NODE)
+    return library_place(controller) is not None or (":" in controller and not controller.startswith(NODE))
 
 
 def controller_class(name: str) -> ControllerClass:
@@ -79,7 +81,8 @@ def controller_class(name: str) -> ControllerClass:
         ParameterError: There is none of that name, or it cannot be loaded.
     """
     if library := library_place(name):
-        return LibraryClass(name, *library)
+        path, symbol = library
+        return LibraryClass(name, path, symbol) if symbol else FmuClass(name, path, symbol)
     place = class_place(name)
     module, _, attribute = place.partition(":")
     try:
@@ -120,7 +123,7 @@ def class_place(name: str) -> str:
             return entry.value
     if "/" in name or name.endswith(".so"):
         raise ParameterError(f"controller = {name!r}: no symbol, expected path/lib.so:symbol, the path of a library")
-    choices = one_of(controller_names(), name, ", package.module:Class or path/lib.so:symbol")
+    choices = one_of(controller_names(), name, ", package.module:Class, path/lib.so:symbol or path/name.fmu")
     raise ParameterError(f"controller = {name!r}: expected {choices}")
 
 

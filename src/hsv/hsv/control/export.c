@@ -7,12 +7,15 @@
  *   nominal_trajectory  x, x_r, d_r -> x_n and u_n (eq. 11, eq. 20, eq. 32 to eq. 35)
  *   tube_law            x, q_f, x_r, u_r, x_n, u_n, and s where the plan is filtered -> u (eq. 36, eq. 48, eq. 54)
  *
+ * The block "controller" steps the three in this order: x, x_r, d_r, u_r -> u before and after the limits, and the
+ * outputs of the other two.
+ *
  * The equations are those of X. Yang, W. Lv, H. Mi, C. Hu, Y. Hu, "Tube-MPC Control via Notch Filter for Flexible
- * Air-Breathing Hypersonic Vehicle with Actuator Fault", 2022. They are in the headers, which are those of the bench. x
- * is the measured state; x_r and u_r are the reference of the step, and d_r is its defect: the state to which x_r(k)
- * and u_r(k) lead in a period, less x_r(k + 1), zero where the reference stands still. The caller limits u to U
- * (eq. 29), tube_data.minimum to tube_data.maximum. Of core.h and real.h, which are those of the bench, only the types
- * hsv_notch, hsv_polytope, hsv_nominal and hsv_tube and the number type double are used here.
+ * Air-Breathing Hypersonic Vehicle with Actuator Fault", 2022. They are in the headers, which are those of the bench. x is
+ * the measured state; x_r and u_r are the reference of the step, and d_r is its defect: the state to which x_r(k) and
+ * u_r(k) lead in a period, less x_r(k + 1), zero where the reference stands still. The caller of tube_law limits u to
+ * U (eq. 29), tube_data.minimum to tube_data.maximum. Of core.h and real.h, which are those of the bench, only the
+ * types hsv_notch, hsv_polytope, hsv_nominal and hsv_tube and the number type double are used here.
  *
  *   cc -std=c99 -O3 -ffp-contract=off -shared -fPIC -o controller.so controller.c
  *
@@ -129,4 +132,53 @@ const hsv_block tube_law = {
     .step = step_tube_law, .state_size = INTEGRATED + PLANNED_STATES,
     .input_count = HSV_COUNT(tube_inputs) - (FILTERED ? 0 : 1), .inputs = tube_inputs,
     .output_count = HSV_COUNT(tube_outputs), .outputs = tube_outputs,
+    .parameter_count = HSV_COUNT(tube_parameters), .parameters = tube_parameters};
+
+/* Controller: the three blocks, and the limits of u; its state and parameters are theirs */
+
+static int32_t step_controller(int64_t k, const double *in, double *out, double *state, const double *par)
+{
+    const double *x = in, *x_r = x + HSV_STATES, *u_r = x_r + 2 * HSV_STATES;
+    double *wanted = out, *command = wanted + HSV_INPUTS, *filtered = command + HSV_INPUTS;
+    double *filter_state = filtered + 1, *plan = filter_state + FILTER_STATES;
+    double law[HSV_FILTER_STATE + FILTER_STATES];
+    step_notch_filter(k, x + HSV_PITCH_RATE, filtered, state, 0);
+    step_nominal_trajectory(k, in, plan, state + FILTER_STATES, 0);
+    for (int i = 0; i < HSV_STATES; i++) {
+        law[HSV_ESTIMATE + i] = x[i];
+        law[HSV_REFERENCE + i] = x_r[i];
+    }
+    law[HSV_FILTERED_PITCH_RATE] = filtered[0];
+    for (int i = 0; i < HSV_INPUTS; i++)
+        law[HSV_REFERENCE_INPUT + i] = u_r[i];
+    for (int i = 0; i < HSV_STATES + HSV_INPUTS; i++)
+        law[HSV_DEVIATION + i] = plan[i];
+    for (int i = 0; i < FILTER_STATES; i++)
+        law[HSV_FILTER_STATE + i] = filter_state[i];
+    step_tube_law(k, law, wanted, state + FILTER_STATES + HSV_STATES, par);
+    for (int i = 0; i < HSV_INPUTS; i++)
+        command[i] = limited(wanted[i], tube_data.minimum[i], tube_data.maximum[i]);
+    return 0;
+}
+
+static const hsv_signal controller_inputs[] = {
+    {"measurement", HSV_STATE_UNITS, HSV_STATES},
+    {"reference", HSV_STATE_UNITS, HSV_STATES},
+    {"defect", HSV_STATE_UNITS, HSV_STATES},
+    {"reference_input", HSV_INPUT_UNITS, HSV_INPUTS}};
+static const hsv_signal controller_outputs[] = {
+    HSV_CONTROLLER_OUTPUTS,
+    {"command", HSV_INPUT_UNITS, HSV_INPUTS},
+    {"filtered_pitch_rate", "rad/s", 1},
+    HSV_FILTER_STATE_INPUT(FILTER_STATES),
+    {"deviation", HSV_STATE_UNITS, HSV_STATES},
+    {"nominal_input", HSV_INPUT_UNITS, HSV_INPUTS},
+    {"gain_index", "1", 1},
+    {"nominal_status", "1", 1}};
+
+const hsv_block controller = {
+    .abi_version = HSV_BLOCK_ABI_VERSION, .name = "controller", .source = "design.h",
+    .step = step_controller, .state_size = FILTER_STATES + HSV_STATES + INTEGRATED + PLANNED_STATES,
+    .input_count = HSV_COUNT(controller_inputs), .inputs = controller_inputs,
+    .output_count = HSV_COUNT(controller_outputs), .outputs = controller_outputs,
     .parameter_count = HSV_COUNT(tube_parameters), .parameters = tube_parameters};

@@ -12,6 +12,7 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
+from hsv.control.fmu_export import ExportedBlock
 from hsv.control.library import include_folder
 from hsv.control.nominal_trajectory import nominal_data
 from hsv.control.tube_law import TubeLaw
@@ -54,6 +55,16 @@ def controller_files(design: ControlDesign) -> dict[str, str]:
     }
 
 
+def exported_controller(design: ControlDesign) -> ExportedBlock:
+    """Return the controller that flies ``design``, for an FMU.
+
+    Raises:
+        DesignError: The design carries no tube.
+    """
+    description = f"Notch filter, nominal trajectory and tube law of the design {design.name}"
+    return ExportedBlock("controller", description, SOURCE, controller_files(design), design.period)
+
+
 def design_header(design: ControlDesign) -> str:
     """Return the header with the numbers of ``design``, as structs of core.h."""
     about = (
@@ -79,9 +90,9 @@ def design_header(design: ControlDesign) -> str:
         "",
         f"enum {{ SECTIONS = {len(design.notch)}, FILTERED = {int(design.filtered)} }};",
         f"#define TAU_MINIMUM {_number(design.tau_minimum.min())}",
-        _array("designed_tau", "double", design.tau),
-        *_constant("hsv_nominal", "nominal_data", nominal_data(design)),
-        *_constant("hsv_tube", "tube_data", tube),
+        constant_array("designed_tau", "double", design.tau),
+        *constant("hsv_nominal", "nominal_data", nominal_data(design)),
+        *constant("hsv_tube", "tube_data", tube),
     ]
     return "\n".join(lines) + "\n"
 
@@ -120,8 +131,11 @@ def step_bounds(design: ControlDesign) -> dict[str, StepBound]:
     }
 
 
-def _constant(kind: str, name: str, source: Any) -> list[str]:
-    """Return a struct of core.h with the numbers of ``source``, after the arrays that it points to."""
+def constant(kind: str, name: str, source: Any) -> list[str]:
+    """Return a struct of core.h with the numbers of ``source``, after the arrays that it points to.
+
+    The array of a field is called like the path of the field: ``tube_data_notch_A``.
+    """
     arrays: list[str] = []
 
     def fields(struct: Any, name: str, source: Any, indent: str) -> str:
@@ -131,11 +145,11 @@ def _constant(kind: str, name: str, source: Any) -> list[str]:
             if declared.type.kind == "struct":
                 text = fields(value, own, getattr(source, field), indent + "    ")
             elif declared.type.kind == "pointer":
-                text = own if value else "0"
+                text = f"({declared.type.item.cname} *){own}" if value else "0"
                 if value:
-                    arrays.append(_array(own, declared.type.item.cname, getattr(source, field)))
+                    arrays.append(constant_array(own, declared.type.item.cname, getattr(source, field)))
             elif declared.type.kind == "array":
-                text = f"{{{', '.join(map(_number, value))}}}"
+                text = _number(np.asarray(getattr(source, field)))
             else:
                 text = _number(value)
             lines.append(f"\n{indent}.{field} = {text}")
@@ -145,17 +159,24 @@ def _constant(kind: str, name: str, source: Any) -> list[str]:
     return [*arrays, f"static const {kind} {name} = {text};"]
 
 
-def _array(name: str, element: str, numbers: np.ndarray) -> str:
+def constant_array(name: str, element: str, numbers: np.ndarray) -> str:
+    """Return an array of numbers, or of structs of numbers; C has no empty arrays, so that one has an element."""
     shape = ", ".join(map(str, numbers.shape))
     values = textwrap.fill(
-        ", ".join(map(_number, numbers.ravel())), 120, initial_indent="    ", subsequent_indent="    "
+        ", ".join(map(_number, numbers.ravel())) or "0", 120, initial_indent="    ", subsequent_indent="    "
     )
     return f"static const {element} {name}[] = {{ /* ({shape}) */\n{values}}};"
 
 
 def _number(value: Any) -> str:
-    """Return a number in C; hexadecimal ones are exact."""
-    return str(int(value)) if isinstance(value, int | np.integer) else float(value).hex()
+    """Return a number in C, or a struct of numbers; hexadecimal ones are exact."""
+    if isinstance(value, np.void | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return f"{{{', '.join(map(_number, value))}}}"
+    if isinstance(value, int | np.integer | np.bool_):
+        return str(int(value))
+    return float(value).hex().replace("inf", "INFINITY").replace("nan", "NAN")
 
 
 def _plain(text: str) -> str:

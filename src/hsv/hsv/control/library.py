@@ -192,7 +192,9 @@ def _text(value: bytes | None, field: str) -> str:
 
 
 def library_place(controller: str) -> tuple[Path, str] | None:
-    """Return path and symbol of a controller in a shared library, or None for other controllers."""
+    """Return path and symbol of a controller in a shared library or, without a symbol, in an FMU; None for others."""
+    if controller.endswith(".fmu"):
+        return Path(controller), ""
     path, _, symbol = controller.rpartition(":")
     return (Path(path), symbol) if "/" in path or path.endswith(".so") else None
 
@@ -210,7 +212,7 @@ def inside(controller: str, folder: Path) -> str:
     found = (folder / path).resolve()
     if not found.is_relative_to(folder.resolve()):
         raise ParameterError(f"controller = {controller!r}: expected a path inside the scenario's folder")
-    return f"{found}:{symbol}"
+    return f"{found}:{symbol}" if symbol else str(found)
 
 
 def seen_from(controller: str, folder: Path) -> str:
@@ -218,7 +220,7 @@ def seen_from(controller: str, folder: Path) -> str:
     place = library_place(controller)
     if place is None or not place[0].is_relative_to(folder.resolve()):
         return controller
-    return f"./{place[0].relative_to(folder.resolve())}:{place[1]}"
+    return f"./{controller.removeprefix(f'{folder.resolve()}/')}"
 
 
 @dataclass(frozen=True)
@@ -242,7 +244,7 @@ def library_record(controller: str) -> LibraryRecord | None:
     if place is None:
         return None
     path, symbol = place
-    name, source = LibraryClass(controller, path, symbol).block.source, b""
+    name, source = LibraryClass(controller, path, symbol).block.source if symbol else "", b""
     if name:
         try:
             source = (path.parent / name).read_bytes()
@@ -278,10 +280,7 @@ class LibraryClass:
         self._name, self._path, self._symbol = name, path, symbol
         try:
             self.block: CBlock = library_user(path).describe(symbol)
-            # The size of the last input is that of the notch filter.
-            size = self.block.inputs[-1].size if self.block.inputs else 0
-            _check_signals("inputs", self.block.inputs, _inputs(size)[: len(self.block.inputs)])
-            _check_signals("outputs", self.block.outputs, CONTROLLER_OUTPUTS)
+            self._check()
         except OSError as error:
             raise ParameterError(
                 f"controller = {name!r}: cannot be read ({reason(error)}), expected a shared library"
@@ -290,6 +289,13 @@ class LibraryClass:
             raise ParameterError(f"controller = {name!r}: {error} while it was loaded") from error
         except HsvError as error:
             raise ParameterError(f"controller = {name!r}: {error}") from error
+
+    def _check(self) -> None:
+        """Refuse a block that is not a controller, and take its parameters."""
+        # The size of the last input is that of the notch filter.
+        size = self.block.inputs[-1].size if self.block.inputs else 0
+        _check_signals("inputs", self.block.inputs, _inputs(size)[: len(self.block.inputs)])
+        _check_signals("outputs", self.block.outputs, CONTROLLER_OUTPUTS)
         self.PARAMETERS = self.block.parameters
 
     def from_parameters(self, values: Mapping[str, Any], design: object) -> LibraryController:

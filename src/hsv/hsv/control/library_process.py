@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -128,6 +129,7 @@ class LibraryProcess:
                 os.killpg(self._child.pid, signal.SIGKILL)
             self._child.wait()
             self._connection.close()
+            self._folder.cleanup()
             self._child = None
 
     def _renew(self) -> None:
@@ -141,12 +143,15 @@ class LibraryProcess:
     def _start(self) -> None:
         self._connection, theirs = Pipe()
         descriptors = (theirs.fileno(), self._memory.descriptor)
+        # An FMU is unpacked there; this process removes what a killed child cannot.
+        self._folder = TemporaryDirectory(prefix="hsv_library_")
         # Output of the library goes to stderr, not into the output of a command.
         self._child = subprocess.Popen(
             [sys.executable, "-P", "-m", "hsv.flight.library_child", self._path, *map(str, descriptors)],
             stdin=subprocess.DEVNULL,
             stdout=2,
             pass_fds=descriptors,
+            env={**os.environ, "TMPDIR": self._folder.name},
             process_group=0,
         )
         theirs.close()

@@ -23,8 +23,9 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hsv.base.errors import HsvError, ProcessError
+from hsv.base.errors import HsvError, ProcessError, RunError
 from hsv.control.controller import call_step_function
+from hsv.control.fmu import LoadedFmu
 from hsv.control.library import CBlock, LibraryController, load_block
 from hsv.control.library_process import SharedMemory, use_in_this_process
 from hsv.flight.closed_loop import Components, fly_into
@@ -39,6 +40,7 @@ class LoadedLibrary:
         self._path = path
         self._memory = memory
         self._load = cache(load_block)
+        self._fmu: LoadedFmu | None = None
 
     @contextmanager
     def sharing(self, numbers: int) -> Iterator[np.ndarray]:
@@ -50,7 +52,10 @@ class LoadedLibrary:
         return getattr(self, name)(*arguments, **(kept or {}))
 
     def describe(self, symbol: str) -> CBlock:
-        """Load the library on first use and return its block ``symbol``."""
+        """Load the library on first use and return its block ``symbol``, which is empty for an FMU."""
+        if not symbol:
+            self._fmu = self._fmu or LoadedFmu(self._path)
+            return self._fmu.block
         return self._load(self._path, symbol)
 
     def fly(self, rows: int, **parts: Any) -> int:
@@ -63,14 +68,26 @@ class LoadedLibrary:
         components = Components(**parts)
         assert isinstance(components.controller, LibraryController)
         components.controller = components.controller.loaded(self.describe(components.controller.symbol).address)
-        return fly_into(History.over(self._memory.numbers(rows * History.numbers()), rows), components)[0]
+        with self._reason():
+            return fly_into(History.over(self._memory.numbers(rows * History.numbers()), rows), components)[0]
 
     def step(
         self, symbol: str, k: int, inputs: np.ndarray, state: np.ndarray, parameters: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Call the step function of the library; return the unsaturated input (2) and the state after the step."""
-        u_unsaturated = call_step_function(self.describe(symbol).address, k, inputs, state, parameters)
+        with self._reason():
+            u_unsaturated = call_step_function(self.describe(symbol).address, k, inputs, state, parameters)
         return u_unsaturated, state
+
+    @contextmanager
+    def _reason(self) -> Iterator[None]:
+        """Replace the return value in an error by the reason why the FMU failed."""
+        try:
+            yield
+        except RunError as error:
+            if self._fmu and self._fmu.failure:
+                raise type(error)(str(error).partition("returned ")[0] + self._fmu.failure) from error
+            raise
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Return the result of a function that uses the library."""

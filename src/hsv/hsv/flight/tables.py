@@ -61,6 +61,8 @@ class Reading:
             return [self.custom_value(name, entry) for entry in value]
         if not isinstance(value, dict):
             return value
+        if value and all(isinstance(entry, str) for entry in value.values()):
+            return value  # names, no numbers
         pair = next(iter(value.values()), None)
         first = pair[0] if isinstance(pair, list) and pair else None
         drawn = self.distribution(value, si_unit_of(first), name)

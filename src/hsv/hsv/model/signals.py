@@ -80,6 +80,24 @@ DIAGNOSTICS = SignalType("diagnostics", "", VARYING)
 ACTUATOR = _input("actuator")
 ACTIVE_FAULTS = SignalType("active_faults", "", VARYING)
 
+_COMPONENTS = {
+    **dict.fromkeys(("state", "measurement", "estimate", "reference", "defect", "deviation"), STATE_NAMES),
+    **dict.fromkeys(
+        ("effector", "reference_input", "nominal_input", "wanted_input", "command", "actuator"), INPUT_NAMES
+    ),
+    "forces": ("lift", "drag", "thrust", "pitching_moment", "dynamic_pressure"),
+    "air": ("wind_forward", "wind_up", "relative_density"),
+}
+
+
+def numbers_of(signal: SignalType) -> list[tuple[str, str]]:
+    """Return name and unit of every number of a signal: ``measurement.altitude`` in m, ``filter_state[1]`` in rad."""
+    units = signal.unit.split(", ")
+    if signal.size == 1 and signal.name not in _COMPONENTS:
+        return [(signal.name, units[0])]
+    names = [f".{name}" for name in _COMPONENTS.get(signal.name, ())] or [f"[{i + 1}]" for i in range(signal.size)]
+    return [(f"{signal.name}{name}", units[i % len(units)]) for i, name in enumerate(names)]
+
 
 def first_step(time: float, period: float) -> int:
     """Return the first step k with k * ``period`` >= ``time`` (s), rounding of the division allowed for."""

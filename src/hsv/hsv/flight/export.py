@@ -1,0 +1,65 @@
+"""The vehicle of a scenario, with its equipment, faults and reference, as a block of ``hsv_block.h`` in C."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+from hsv.control.export import HEADER, constant, constant_array
+from hsv.control.fmu_export import ExportedBlock
+from hsv.control.library import include_folder
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import Components
+from hsv.flight.scenario import Scenario
+from hsv.model.faults.table import COMMAND as COMMAND_SIDE
+from hsv.model.plant import PlantFaults
+from hsv.model.signals import COMMAND, numbers_of
+
+SOURCE = "vehicle.c"
+NUMBERS = "scenario.h"
+_HEADERS = (
+    *("core.h", "vehicle_fields.h", "real.h", "elementary.h", "noise.h", "vehicle.h", "plant.h"),
+    *("actuators.h", "atmosphere.h", "faults.h", "links.h", "sensors.h"),
+)
+
+
+def exported_vehicle(scenario: Scenario) -> ExportedBlock:
+    """Return the vehicle of ``scenario``, for an FMU.
+
+    Raises:
+        ScenarioError: The scenario cannot be flown.
+    """
+    components, core = assemble_flight(scenario), files("hsv.core")
+    plant = components.plant
+    texts = {
+        SOURCE: files("hsv.flight").joinpath("export.c").read_text(encoding="utf-8"),
+        NUMBERS: scenario_header(components),
+        HEADER: (include_folder() / HEADER).read_text(encoding="utf-8"),
+        **{name: core.joinpath(name).read_text(encoding="utf-8") for name in _HEADERS},
+    }
+    names = [name for name, _ in numbers_of(COMMAND)]
+    start = dict(zip(names, plant.initial.input.tolist(), strict=True))
+    stop = plant.steps * plant.period
+    return ExportedBlock("vehicle", scenario.title, SOURCE, texts, plant.period, start, steps_at_start=True, stop=stop)
+
+
+def scenario_header(components: Components) -> str:
+    """Return the header with the numbers of a scenario, as structs of core.h."""
+    plant, injector = components.plant, components.fault_injector
+    payloads = injector.link_state()
+    lines = [
+        "/* Numbers of a scenario, written by hsv export-vehicle; SI units and radians, see core.h. */",
+        "#pragma once",
+        '#include "core.h"',
+        "#include <math.h>",
+        "",
+        f"enum {{ FINAL_STEP = {plant.steps}, COMMAND_LINK_PAYLOADS = {len(payloads)} }};",
+        constant_array("initial_state", "double", plant.initial.state),
+        constant_array("command_link_memory", "double", payloads),
+        *constant("hsv_plant", "plant_data", plant.data),
+        *constant("hsv_plant_memory", "memory_data", plant.memory()),
+        *constant("hsv_plant_faults", "faults_data", PlantFaults.of(injector.known, plant.period)),
+        *constant("hsv_faults", "command_faults", injector.rows((COMMAND_SIDE,))),
+        *constant("hsv_link", "command_link_data", injector.link),
+        *constant("hsv_reference", "reference_data", components.nominal_trajectory.reference.data),
+    ]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,54 @@
+"""FMUs made of FMPy's own templates, whose outputs keep their start values, and faulty ones."""
+
+from __future__ import annotations
+
+import subprocess
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import fmpy
+from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
+from fmpy.template import create_fmu
+
+Edit = Callable[[str], str]
+
+
+def template_fmu(
+    path: Path,
+    inputs: list[str],
+    outputs: dict[str, float],
+    description: Edit = str,
+    model: Edit = str,
+) -> None:
+    """Write an FMI 3.0 FMU of FMPy's template; the edits change its description and its source."""
+    made = ModelDescription()
+    made.fmiVersion, made.modelName, made.description, made.generationTool = "3.0", "model", "", "FMPy"
+    made.generationDateAndTime, made.instantiationToken = "2026-01-01T00:00:00Z", "template"
+    made.coSimulation = CoSimulation(modelIdentifier="model")
+    rows = [("time", "independent", None), *((name, "input", "0") for name in inputs)]
+    rows += [(name, "output", repr(value)) for name, value in outputs.items()]
+    for i, (name, causality, start) in enumerate(rows):
+        variable = ModelVariable(
+            name=name,
+            valueReference=i,
+            type="Float64",
+            start=start,
+            causality=causality,
+            variability="continuous",
+            description="",
+        )
+        made.modelVariables.append(variable)
+        if causality == "output":
+            made.outputs.append(Unknown(variable=variable))
+    create_fmu(made, path)
+    with zipfile.ZipFile(path) as archive:
+        xml, source = (archive.read(name).decode() for name in ("modelDescription.xml", "sources/model.c"))
+    code, library = path.with_suffix(".c"), path.with_suffix(".so")
+    code.write_text(model(source))
+    include = Path(fmpy.__file__).parent / "c-code"
+    subprocess.run(["cc", "-O0", "-shared", "-fPIC", f"-I{include}", "-o", library, code], check=True)
+    with zipfile.ZipFile(path, "w") as archive:
+        exact = xml.replace('causality="output"', 'causality="output" initial="exact"')  # the template forgets it
+        archive.writestr("modelDescription.xml", description(exact))
+        archive.write(library, "binaries/x86_64-linux/model.so")
