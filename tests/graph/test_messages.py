@@ -207,6 +207,15 @@ def test_the_interface_version_is_that_of_the_messages():
     assert msg.Run.INTERFACE_VERSION == INTERFACE_VERSION
 
 
+@pytest.mark.parametrize(
+    ("codes", "message"),
+    [(TubeStatusCode, msg.TubeStatus), (NominalStatus, msg.NominalState), (FlightStatus, msg.VehicleState)],
+)
+def test_codes_are_the_constants_of_the_messages(codes, message):
+    values = {name: code.value for name, code in codes.__members__.items()}
+    assert values == {name: getattr(message, name) for name in values}
+
+
 @pytest.mark.parametrize("topic", TOPICS)
 def test_packed_bytes_are_those_of_rclpy(topic):
     messages = StepMessages(topic)  # one for all: nothing of one message may remain in the next
