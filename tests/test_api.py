@@ -43,6 +43,7 @@ def test_flights_are_compared_and_swept():
 
 def test_a_flight_is_a_table_with_units():
     flight = hsv.fly(hsv.load("case1", SHORT))
+    assert repr(flight).startswith("<Flight of ") and "\n" not in repr(flight)
     frame = flight.to_frame()
     np.testing.assert_array_equal(frame["command.elevator_deflection"], flight.history.command[:, 1])
     np.testing.assert_array_equal(frame.index, flight.time)

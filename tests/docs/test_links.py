@@ -58,3 +58,11 @@ def test_every_page_of_the_documentation_is_in_a_table_of_contents():
             for entry in [re.sub(r".*<(.*)>", r"\1", line) for line in entries]:
                 listed |= {str(p.relative_to(ROOT / "docs")) for p in index.parent.glob(f"{entry}.md")}
     assert listed >= {str(page.relative_to(ROOT / "docs")) for page in PAGES if page.is_relative_to(ROOT / "docs")}
+
+
+def test_what_the_commands_of_the_readme_write_is_ignored_by_git() -> None:
+    written = re.findall(r"--(?:bag|out) ((?!docs/)\w+/[^\s`]+)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    written += ["bags/case1_20260101T000000Z", "campaigns/case1.parquet", "tutorial/first", "resilience/report.html"]
+    names = [path if Path(path).suffix else f"{path}/" for path in written]
+    ignored = subprocess.run(["git", "check-ignore", *names], cwd=ROOT, capture_output=True, text=True).stdout
+    assert ignored.splitlines() == names
