@@ -3,7 +3,7 @@ import json
 import pytest
 
 from hsv.base.errors import RunError
-from hsv.bench.figure import Figure
+from hsv.cli.bench.figure import Figure
 
 
 @pytest.mark.long
@@ -45,7 +45,7 @@ def small_groups(monkeypatch):
         raise RunError("domain 7: in use")
 
     quick = Figure("quick", "ours", "theirs", (1.0,), (2.0,), 1.0)
-    monkeypatch.setattr("hsv.bench.measure.groups", lambda scale: {"quick": lambda: [quick], "graph": fails})
+    monkeypatch.setattr("hsv.cli.bench.measure.groups", lambda scale: {"quick": lambda: [quick], "graph": fails})
 
 
 @pytest.mark.parametrize("json_output", [(), ("--json",)])

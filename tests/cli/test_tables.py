@@ -8,7 +8,7 @@ import pytest
 from node_processes import short_scenario
 
 from hsv.base.units import UnitSystem
-from hsv.bench.figure import Figure
+from hsv.cli.bench.figure import Figure
 from hsv.cli.design import HALF_WIDTHS, _steps
 from hsv.cli.know import _print_figures
 from hsv.cli.output import console, quantity_table

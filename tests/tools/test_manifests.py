@@ -17,7 +17,7 @@ from packaging.specifiers import SpecifierSet
 import hsv
 
 ROOT = Path(__file__).parents[2]
-MANIFESTS = sorted([*ROOT.glob("src/*/package.xml"), *ROOT.glob("ros_ws/src/*/package.xml")])
+MANIFESTS = sorted([*ROOT.glob("src/*/package.xml"), *ROOT.glob("ros_ws/src/hsv_*/package.xml")])
 DISTRIBUTION = {"cffi": "1.16.0", "jinja2": "3.1.2", "numpy": "1.26.4", "rich": "13.7.1", "yaml": "6.0.1"}
 """Versions of Ubuntu 24.04 by imported module; a module that is too old there has no rosdep key in the manifests."""
 
@@ -30,6 +30,7 @@ WITHOUT_KEY = {
     "cvxpy",
     "distributed",
     "foxglove",
+    "gymnasium",
     "lz4",
     "markupsafe",
     "matplotlib",

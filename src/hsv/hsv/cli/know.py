@@ -30,8 +30,8 @@ from hsv.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from hsv.bench.figure import Figure
-    from hsv.bench.record import Change
+    from hsv.cli.bench.figure import Figure
+    from hsv.cli.bench.record import Change
 
 
 class Kind(StrEnum):
@@ -265,8 +265,8 @@ def bench(
 
     Example: hsv bench --only in_process --only startup
     """
-    from hsv.bench.measure import groups
-    from hsv.bench.record import as_json, changes, not_measured, read_run
+    from hsv.cli.bench.measure import groups
+    from hsv.cli.bench.record import as_json, changes, not_measured, read_run
 
     if not 0.0 < scale <= 100.0:
         raise QuantityError(f"scale = {scale}: expected above 0, at most 100")
@@ -308,7 +308,7 @@ def bench(
 
 def _print_figures(figures: list[Figure]) -> None:
     """Print one paragraph per figure: a table of all figures is wider than a terminal."""
-    from hsv.bench.figure import readable
+    from hsv.cli.bench.figure import readable
 
     for figure in figures:
         ours, theirs = (readable(sorted(times)[len(times) // 2]) for times in (figure.ours, figure.theirs))

@@ -44,6 +44,7 @@ EXTRAS = {
     "distributed": "campaign",
     "fmpy": "fmi",
     "foxglove": "live",
+    "gymnasium": "gym",
     "jinja2": "report",
     "markupsafe": "report",
     "matplotlib": "report",

@@ -163,7 +163,7 @@ def lanes() -> int:
     return _LANES[instruction_set()]
 
 
-def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int) -> int:
+def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int, halves: int = lib.SENSE | lib.ACT) -> int:
     """Simulate the steps ``start`` ... ``stop`` - 1 of one flight, or of :func:`lanes` flights at a time.
 
     Args:
@@ -171,6 +171,7 @@ def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int) ->
         memory: What the core keeps between pieces, see :func:`loop_memory`; step 0 begins it.
         start: First step.
         stop: Step after the last one.
+        halves: The halves of each step that are simulated, ``lib.SENSE``, ``lib.ACT`` or both.
 
     Returns:
         The step after the last one flown; -1 - k where a block from outside failed in step k.
@@ -184,7 +185,7 @@ def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int) ->
         raise ValueError(f"{stop - start} steps, expected at most the rows of each history")
     instructions = [*_LANES].index(instruction_set())
     pointers = ffi.new("hsv_flight *[]", [flight.pointer for flight in flights])
-    return int(lib.hsv_fly(instructions, len(flights), pointers, ffi.from_buffer(memory), start, stop))
+    return int(lib.hsv_fly(instructions, len(flights), pointers, ffi.from_buffer(memory), start, stop, halves))
 
 
 def loop_memory(flights: int) -> np.ndarray:

@@ -11,6 +11,8 @@ typedef double number;
 enum { STATES = 9, INPUTS = 2, RIGID = 5, CONDITIONS = 7, MAX_SECTIONS = 4, MAX_DELAY = 50, INTEGRATED = 2 };
 /* Columns of the history and of the auxiliary history, see hsv.flight.history; entries summed at a time. */
 enum { HISTORY = 25, AUXILIARY = 3, SUMS = 12 };
+enum { ACTED = 21 };         /* column of the history from which on the second half of a step writes */
+enum { SENSE = 1, ACT = 2 }; /* halves of a step, see loop.h */
 enum { ALTITUDE, VELOCITY, ALPHA, PITCH, PITCH_RATE, ETA_1, ETA_1_RATE, ETA_2, ETA_2_RATE };
 enum { FUEL, ELEVATOR };
 
@@ -239,6 +241,7 @@ typedef struct {
     int64_t payloads;
     hsv_faults *faults; /* of the command */
     hsv_call nominal_law, controller;
+    const double *commanded; /* (2) input from outside before the limits, or NULL; the same choice in a group */
     const hsv_tube_set *set; /* NULL: the level is not computed */
     double *history;         /* (rows, 25) */
     double *auxiliary;       /* (rows, 3) */
@@ -325,7 +328,8 @@ double hsv_level(const double *P, int64_t size, const double *x);
 /* Flights: one, or one per lane of a register, over a range of steps. */
 int hsv_widest(void);
 int64_t hsv_memory_size(int64_t flights);
-int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop);
+int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop,
+                int halves);
 /* Sequences of steps for design, governor and metrics. */
 int hsv_schedule(const hsv_polytope *polytope, double altitude, double velocity, double *S);
 int hsv_plan(const hsv_nominal *nominal, const hsv_reference *reference, int64_t first, int64_t steps,

@@ -1,7 +1,7 @@
 /* Selection of the instance of the loop by the instruction set of the processor. */
 #include "core.h"
 
-typedef int64_t Fly(hsv_flight *const *flights, void *memory, int64_t start, int64_t stop);
+typedef int64_t Fly(hsv_flight *const *flights, void *memory, int64_t start, int64_t stop, int halves);
 extern Fly hsv_fly_single;
 extern const int64_t hsv_memory_single;
 #ifdef __x86_64__
@@ -28,12 +28,13 @@ int64_t hsv_memory_size(int64_t flights)
     return flights > 0 ? hsv_memory_single : 0;
 }
 
-int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop)
+int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop,
+                int halves)
 {
     Fly *fly = count == 1 ? hsv_fly_single : 0;
 #ifdef __x86_64__
     if (instructions >= AVX2) fly = count == 1 ? hsv_fly_avx2_single : count == 4 ? hsv_fly_avx2 : 0;
     if (instructions >= AVX512 && count == 8) fly = hsv_fly_avx512;
 #endif
-    return fly && instructions >= SSE2 ? fly(flights, memory, start, stop) : start;
+    return fly && instructions >= SSE2 ? fly(flights, memory, start, stop, halves) : start;
 }

@@ -11,7 +11,10 @@
  *   actuator(k)       u(k) after link and faults of the command (loss of effectiveness: eq. 14, eq. 15)
  *   x(k+1)            state of the plant with actuator(k) held over [k T, (k+1) T)
  *
- * x_n(0) = y(0) - x_r(0). A flight ends when its state leaves the range of the model. */
+ * x_n(0) = y(0) - x_r(0). A flight ends when its state leaves the range of the model.
+ *
+ * A step has two halves: "sense" ends with the nominal law, "act" begins with the input u(k). A program that computes
+ * the input itself calls one half at a time. */
 #pragma once
 #include "effectiveness.h"
 #include "estimator.h"
@@ -29,6 +32,7 @@ typedef struct {
     real x[STATES], measurement[STATES], estimator[ESTIMATED], notch[2 * MAX_SECTIONS];
     real x_n[STATES], u_n[INPUTS], gain_index, gain[INPUTS * STATES], u[INPUTS], actuator[INPUTS];
     real x_r[STATES], u_r[INPUTS], d_r[STATES];
+    real feedback_state[STATES], s[2 * MAX_SECTIONS], q_f; /* of the current step, for its second half */
     int64_t row[LANES], active[LANES]; /* index of reference row and gain in each lane */
 } Loop;
 
@@ -87,50 +91,34 @@ static inline void begin(hsv_flight *const *flights, Loop *f)
 }
 
 #if LANES == 1
-/* Call the external nominal law and controller, if any; return 1 if the controller answered, -1 on failure, else 0. */
-static inline int call_blocks(hsv_flight *flight, Loop *f, int64_t k, const double *feedback_state, double q_f,
-                              const double *s, double *u_unsaturated)
+/* Call the external nominal law; return -1 on failure, else 0. */
+static inline int call_nominal_law(hsv_flight *flight, Loop *f, int64_t k)
 {
-    const hsv_call *law = &flight->nominal_law, *controller = &flight->controller;
+    const hsv_call *law = &flight->nominal_law;
     double found[INPUTS + 1];
-    if (law->function) {
-        if (law->function(k, f->x_n, found, law->state, law->par)) return -1;
-        f->u_n[0] = found[0], f->u_n[1] = found[1], f->gain_index = found[INPUTS];
-    } else if (flight->nominal->count > 0)
-        nominal_input(flight->nominal, f->x_n, f->u_n, &f->gain_index);
-    if (!controller->function) return 0;
+    if (law->function(k, f->x_n, found, law->state, law->par)) return -1;
+    f->u_n[0] = found[0], f->u_n[1] = found[1], f->gain_index = found[INPUTS];
+    return 0;
+}
+
+/* Call the external controller; return -1 on failure, else 0. */
+static inline int call_controller(hsv_flight *flight, const Loop *f, int64_t k, double *u_unsaturated)
+{
+    const hsv_call *controller = &flight->controller;
     double in[3 * STATES + 1 + 2 * INPUTS + 2 * MAX_SECTIONS], *next = in; /* the order of hsv_block.h */
-    memcpy(next, feedback_state, sizeof f->x), next += STATES;
-    *next++ = q_f;
+    memcpy(next, f->feedback_state, sizeof f->feedback_state), next += STATES;
+    *next++ = f->q_f;
     memcpy(next, f->x_r, sizeof f->x_r), next += STATES;
     memcpy(next, f->u_r, sizeof f->u_r), next += INPUTS;
     memcpy(next, f->x_n, sizeof f->x_n), next += STATES;
     memcpy(next, f->u_n, sizeof f->u_n), next += INPUTS;
-    memcpy(next, s, 2 * (size_t)flight->notch->sections * sizeof *s);
+    memcpy(next, f->s, 2 * (size_t)flight->notch->sections * sizeof *f->s);
     u_unsaturated[0] = u_unsaturated[1] = NAN; /* so that an output that the controller does not set is noticed */
     flight->returned = controller->function(k, in, u_unsaturated, controller->state, controller->par);
     memcpy(flight->answer, u_unsaturated, sizeof flight->answer);
-    return flight->returned == 0 && is_finite(u_unsaturated[0]) && is_finite(u_unsaturated[1]) ? 1 : -1;
+    return flight->returned == 0 && is_finite(u_unsaturated[0]) && is_finite(u_unsaturated[1]) ? 0 : -1;
 }
 #endif
-
-/* Write row "line" of the histories of all lanes. */
-static inline void write_rows(hsv_flight *const *flights, const Loop *f, int64_t line, const real *feedback_state,
-                              real q_f, const real *x_n, const real *u_unsaturated)
-{
-    for (int i = 0; i < LANES; i++) {
-        double *row = flights[i]->history + HISTORY * line, *auxiliary = flights[i]->auxiliary + AUXILIARY * line;
-        read_lane(f->x, STATES, i, row), row += STATES;
-        *row++ = lane(q_f, i);
-        read_lane(x_n, STATES, i, row), row += STATES;
-        read_lane(f->u_n, INPUTS, i, row), row += INPUTS;
-        read_lane(f->u, INPUTS, i, row), row += INPUTS;
-        read_lane(f->actuator, INPUTS, i, row);
-        auxiliary[0] = lane(f->gain_index, i);
-        read_lane(u_unsaturated, INPUTS, i, auxiliary + 1);
-        if (flights[i]->estimated) read_lane(feedback_state, STATES, i, flights[i]->estimated + STATES * line);
-    }
-}
 
 /* End the flights that have left the range of the model in step k; return whether all have ended. */
 static inline int end_flights(hsv_flight *const *flights, const Loop *f, int64_t k)
@@ -148,77 +136,112 @@ static inline int end_flights(hsv_flight *const *flights, const Loop *f, int64_t
     return flying == 0;
 }
 
-/* Simulate the steps start ... stop - 1 of a group of flights, which may differ in vehicle, seed, faults, reference,
- * gains of the tube law and parameters of the equipment only. Return the step after the last one, or -1 - k if an
- * external block failed in step k. */
-static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t stop)
+/* The first half of step k: advance the plants to x(k), measure, filter, and compute the nominal input. Write x, q_f, x_n
+ * and u_n to row "line" of the histories. Return -1 if an external nominal law failed, else 0. */
+static inline int sense(hsv_flight *const *flights, Loop *f, int64_t k, int64_t line)
 {
     const hsv_flight *first = flights[0];
-    const hsv_notch *notch = first->notch;
     const hsv_plant *plant = first->plant;
-    if (start == 0) begin(flights, f);
-    for (int64_t k = start; k < stop; k++) {
-        real feedback_state[STATES], s[2 * MAX_SECTIONS], x_n[STATES], u_feedback[INPUTS], u_unsaturated[INPUTS];
-        if (k > 0) {
-            if (f->equipped)
-                advance_plants(flights, &f->vehicle, k - 1, f->actuator, f->x);
-            else {
-                real effector[INPUTS];
-                for (int j = 0; j < INPUTS; j++)
-                    effector[j] = limited(f->actuator[j], plant->actuators.minimum[j], plant->actuators.maximum[j]);
-                advance(f->x, effector, &f->vehicle, NULL, all(plant->period), plant->substeps);
-            }
-            measure_lanes(flights, f, k);
-            schedule_lanes(flights, f, k);
-        }
-        memcpy(feedback_state, f->measurement, sizeof feedback_state);
-        if (first->estimator) {
-            estimate_step(first->estimator, &f->estimator_vehicle, f->estimator, k, f->measurement, f->u,
-                          feedback_state);
-            if (k == 0) notch_rest(notch, feedback_state[PITCH_RATE], f->notch);
-        }
-        memcpy(s, f->notch, sizeof s);
-        const real q_f = notch_step(notch, f->notch, feedback_state[PITCH_RATE]);
-        int answered = 0;
-#if LANES == 1
-        flights[0]->history[HISTORY * (k - start) + STATES] =
-            q_f; /* shows a monitoring process the current step */
-        answered = call_blocks(flights[0], f, k, feedback_state, q_f, s, u_unsaturated);
-        if (answered < 0) return -1 - k;
-#else
-        if (first->nominal->count > 0) nominal_input(first->nominal, f->x_n, f->u_n, &f->gain_index);
-#endif
-        if (answered)
-            for (int j = 0; j < INPUTS; j++)
-                f->u[j] = limited(u_unsaturated[j], first->tube->minimum[j], first->tube->maximum[j]);
+    if (k == 0)
+        begin(flights, f);
+    else {
+        if (f->equipped)
+            advance_plants(flights, &f->vehicle, k - 1, f->actuator, f->x);
         else {
-            real effectiveness = all(1.0);
-            if (first->tube->effectiveness)
-                effectiveness = effectiveness_step(first->tube->effectiveness, &f->tube_vehicle, f->predicted, f->u,
-                                                   f->known, k, feedback_state);
-            tube_step(first->tube, &f->tube, f->gain, effectiveness, k, 0, 2 * notch->sections, feedback_state, q_f,
-                      f->x_r, f->u_r, f->x_n, f->u_n, s, u_feedback, u_unsaturated, f->u);
+            real effector[INPUTS];
+            for (int j = 0; j < INPUTS; j++)
+                effector[j] = limited(f->actuator[j], plant->actuators.minimum[j], plant->actuators.maximum[j]);
+            advance(f->x, effector, &f->vehicle, NULL, all(plant->period), plant->substeps);
         }
-        memcpy(x_n, f->x_n, sizeof x_n);
-        if (first->set) level_step(first->set, &f->levels, k, f->x, f->x_r, x_n);
+        measure_lanes(flights, f, k);
+        schedule_lanes(flights, f, k);
+    }
+    memcpy(f->feedback_state, f->measurement, sizeof f->feedback_state);
+    if (first->estimator) {
+        estimate_step(first->estimator, &f->estimator_vehicle, f->estimator, k, f->measurement, f->u,
+                      f->feedback_state);
+        if (k == 0) notch_rest(first->notch, f->feedback_state[PITCH_RATE], f->notch);
+    }
+    memcpy(f->s, f->notch, sizeof f->s);
+    f->q_f = notch_step(first->notch, f->notch, f->feedback_state[PITCH_RATE]);
+#if LANES == 1
+    if (first->nominal_law.function) {
+        if (call_nominal_law(flights[0], f, k)) return -1;
+    } else
+#endif
         if (first->nominal->count > 0)
-            nominal_advance(&first->nominal->polytope, f->measurement[ALTITUDE], f->measurement[VELOCITY], f->x_n,
-                            f->u_n, f->d_r);
-        memcpy(f->actuator, f->u, sizeof f->u);
-        for (int i = 0; i < LANES; i++) {
-            hsv_flight *own = flights[i];
-            if (own->link->ideal && own->faults->count == 0) continue;
+        nominal_input(first->nominal, f->x_n, f->u_n, &f->gain_index);
+    for (int i = 0; i < LANES; i++) {
+        double *row = flights[i]->history + HISTORY * line;
+        read_lane(f->x, STATES, i, row), row += STATES;
+        *row++ = lane(f->q_f, i); /* shows a monitoring process the current step */
+        read_lane(f->x_n, STATES, i, row), row += STATES;
+        read_lane(f->u_n, INPUTS, i, row);
+        if (flights[i]->estimated) read_lane(f->feedback_state, STATES, i, flights[i]->estimated + STATES * line);
+    }
+    return 0;
+}
+
+/* The second half of step k: the input u(k) by the tube law, an external controller or from outside, the next nominal
+ * state, link and faults of the command. Write the rest of row "line". Return -1 if an external controller failed, 1 if
+ * all flights have ended, else 0. */
+static inline int act(hsv_flight *const *flights, Loop *f, int64_t k, int64_t line)
+{
+    const hsv_flight *first = flights[0];
+    real u_unsaturated[INPUTS];
+    int external = first->commanded != NULL;
+    for (int i = 0; external && i < LANES; i++) write_lane(flights[i]->commanded, INPUTS, i, u_unsaturated);
+#if LANES == 1
+    if (first->controller.function) {
+        if (call_controller(flights[0], f, k, u_unsaturated)) return -1;
+        external = 1;
+    }
+#endif
+    if (external)
+        for (int j = 0; j < INPUTS; j++)
+            f->u[j] = limited(u_unsaturated[j], first->tube->minimum[j], first->tube->maximum[j]);
+    else {
+        real u_feedback[INPUTS], effectiveness = all(1.0);
+        if (first->tube->effectiveness)
+            effectiveness = effectiveness_step(first->tube->effectiveness, &f->tube_vehicle, f->predicted, f->u,
+                                               f->known, k, f->feedback_state);
+        tube_step(first->tube, &f->tube, f->gain, effectiveness, k, 0, 2 * first->notch->sections, f->feedback_state,
+                  f->q_f, f->x_r, f->u_r, f->x_n, f->u_n, f->s, u_feedback, u_unsaturated, f->u);
+    }
+    if (first->set) level_step(first->set, &f->levels, k, f->x, f->x_r, f->x_n);
+    if (first->nominal->count > 0)
+        nominal_advance(&first->nominal->polytope, f->measurement[ALTITUDE], f->measurement[VELOCITY], f->x_n, f->u_n,
+                        f->d_r);
+    memcpy(f->actuator, f->u, sizeof f->u);
+    for (int i = 0; i < LANES; i++) {
+        hsv_flight *own = flights[i];
+        double *row = own->history + HISTORY * line + ACTED, *auxiliary = own->auxiliary + AUXILIARY * line;
+        if (!own->link->ideal || own->faults->count > 0) {
             double actuator[INPUTS];
             read_lane(f->actuator, INPUTS, i, actuator);
             hsv_receive(own->link, own->link_memory, own->payloads, k, own->plant->seed, actuator, INPUTS);
             hsv_apply_command_faults(own->faults, k, own->plant->seed, actuator);
             write_lane(actuator, INPUTS, i, f->actuator);
         }
-        write_rows(flights, f, k - start, feedback_state, q_f, x_n, u_unsaturated);
-        if (first->set)
-            for (int i = 0; i < LANES; i++)
-                if (flights[i]->ended > k) flights[i]->worst = lane(f->levels.worst, i);
-        if (end_flights(flights, f, k)) return k + 1;
+        read_lane(f->u, INPUTS, i, row);
+        read_lane(f->actuator, INPUTS, i, row + INPUTS);
+        auxiliary[0] = lane(f->gain_index, i);
+        read_lane(u_unsaturated, INPUTS, i, auxiliary + 1);
+        if (first->set && own->ended > k) own->worst = lane(f->levels.worst, i);
+    }
+    return end_flights(flights, f, k);
+}
+
+/* Simulate the steps start ... stop - 1, or one half of each, of a group of flights, which may differ in vehicle, seed,
+ * faults, reference, gains of the tube law and parameters of the equipment only. Return the step after the last one, or
+ * -1 - k if an external block failed in step k. */
+static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t stop, int halves)
+{
+    for (int64_t k = start; k < stop; k++) {
+        if (halves & SENSE && sense(flights, f, k, k - start) < 0) return -1 - k;
+        const int ended = halves & ACT ? act(flights, f, k, k - start) : 0;
+        if (ended < 0) return -1 - k;
+        if (ended) return k + 1;
     }
     return stop;
 }

@@ -140,7 +140,8 @@ def flight_struct(components: Components, history: History, **others: Any) -> St
     Args:
         components: Components of the loop; they are not changed.
         history: Output of the flight.
-        others: Calls of an external nominal law or controller, and the invariant set whose level is computed.
+        others: Calls of an external nominal law or controller, the array of commands from outside, and the invariant
+            set whose level is computed.
     """
     plant, notch, injector = components.plant, components.notch_filter, components.fault_injector
     nominal, controller = components.nominal_trajectory, components.controller
@@ -160,6 +161,7 @@ def flight_struct(components: Components, history: History, **others: Any) -> St
         "faults": Struct("hsv_faults", injector.rows((COMMAND,))),
         "nominal_law": NO_CALL,
         "controller": NO_CALL,
+        "commanded": None,
         "set": None,
         "history": history.signals,
         "auxiliary": history.auxiliary,

@@ -13,7 +13,7 @@ import pydantic
 
 from hsv.base.errors import DocumentError, QuantityError
 from hsv.base.files import parse_json, read_text
-from hsv.bench.figure import Figure
+from hsv.cli.bench.figure import Figure
 from hsv.graph.preparation import commit
 
 RESOLUTION = 0.05

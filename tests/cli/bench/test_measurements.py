@@ -8,7 +8,7 @@ from flights import components
 from ros_domain import own_domain
 
 from hsv.base.errors import RunError
-from hsv.bench.measure import against_imports, c_flight, graph_lap, ring_lap
+from hsv.cli.bench.measure import against_imports, c_flight, graph_lap, ring_lap
 
 
 @pytest.mark.long

@@ -6,8 +6,8 @@ import time
 import pytest
 
 from hsv.base.errors import QuantityError
-from hsv.bench.figure import Figure, interleaved
-from hsv.bench.record import as_json, changes, not_measured, read_run
+from hsv.cli.bench.figure import Figure, interleaved
+from hsv.cli.bench.record import as_json, changes, not_measured, read_run
 
 
 def figure(*ours, theirs=None, name="graph"):

@@ -18,8 +18,8 @@ from pathlib import Path
 from hsv.bags.description import PLANT, NodeDescription, graph
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.base.errors import RunError
-from hsv.bench.figure import Figure, interleaved
-from hsv.core import ffi, lanes, loop_memory
+from hsv.cli.bench.figure import Figure, interleaved
+from hsv.core import ffi, lanes, lib, loop_memory
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.campaign.campaign import plan
 from hsv.flight.campaign.executors import make_executor
@@ -69,13 +69,13 @@ def c_flight(components: Components) -> Callable[[], History]:
         command = [compiler, "-std=gnu99", *FLAGS, "-shared", "-fPIC", "-o", str(library)]
         _run(*command, str(core / "scalar.c"), str(core / "complex.c"))
         loop = ctypes.CDLL(str(library)).hsv_fly_single
-    loop.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64]
+    loop.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_int]
     history = History.empty(components.plant.steps + 1, estimated=False)
     flight, memory = flight_struct(components, history), loop_memory(1)
 
     def fly() -> History:
         flights = ffi.new("hsv_flight *[]", [flight.pointer])
-        loop(int(ffi.cast("intptr_t", flights)), memory.ctypes.data, 0, len(history.signals))
+        loop(int(ffi.cast("intptr_t", flights)), memory.ctypes.data, 0, len(history.signals), lib.SENSE | lib.ACT)
         return history
 
     return fly

@@ -1,0 +1,303 @@
+"""Environments of Gymnasium; importing this module registers ``hsv/Track-v0``, alone and as a vector.
+
+An agent takes the place of the controller. In step k it sees
+
+    [x^(k); x^_f(k) - x_r(k)]    measurement or estimate (9) and its error (9), SI; the error has q_f in place of q,
+
+and its action a gives the input u(k) = u_r(k) + u_n(k) + diag(:data:`SCALE`) a, which the loop limits to U. Values of a
+outside [-1, 1] are admitted. The reward of a step is, with the true state x that follows,
+
+    T / (1 + ((h - h_r) / 100 m)^2 + ((V - V_r) / 20 m/s)^2 + |a|^2),
+
+so that the sum over an episode is at most its duration in seconds. An episode is a flight of the scenario and has as
+many steps as that has commands: the last state is answered, too, and is returned once more. It terminates when the
+answered state is outside the range of the model, and is truncated at the end of the flight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box
+from gymnasium.utils.seeding import np_random
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from hsv import core
+from hsv.base.errors import ControllerError, ScenarioError
+from hsv.control.reference_trajectory import ReferenceData
+from hsv.control.tube_law import no_tube
+from hsv.core import Struct, lanes, lib
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.campaign.campaign import MAX_SAMPLES, plan
+from hsv.flight.campaign.variants import FlightVariants
+from hsv.flight.closed_loop import Components, flight_struct
+from hsv.flight.flight import Flight, flight_of
+from hsv.flight.history import History
+from hsv.flight.scenario import load_scenario, scenario_at_means, scenario_table, scenario_text
+from hsv.flight.side_by_side import FlightGroup
+from hsv.model.dynamics import in_model_range
+from hsv.model.signals import N_INPUTS, N_STATES, PITCH_RATE
+
+__all__ = ["SCALE", "TrackEnv", "TrackVectorEnv"]
+
+SCALE = np.array([0.5, 0.25])
+"""Change of fuel equivalence ratio and elevator deflection (rad) for an action of 1; powers of two, which keep bits"""
+
+_TOLERATED = np.array([100.0, 20.0])
+"""Errors of altitude (m) and velocity (m/s) that halve the reward"""
+
+_OBSERVATION = Box(-np.inf, np.inf, (2 * N_STATES,), np.float64)
+_ACTION = Box(-1.0, 1.0, (N_INPUTS,), np.float64)
+
+Factors = Mapping[str, tuple[object, object]]
+Info = dict[str, Any]
+
+
+class _Draws:
+    """The flights of a scenario from which an episode is drawn."""
+
+    def __init__(self, scenario: str, scale: float, factors: Factors | None) -> None:
+        """Read the scenario; the arguments are those of :class:`TrackEnv`."""
+        name = Path(scenario).stem
+        _, distributions = scenario_at_means(scenario_table(scenario_text(scenario), name), name)
+        drawn = scale or factors or distributions
+        self._campaign = plan(scenario, samples=MAX_SAMPLES, scale=scale, factors=factors) if drawn else None
+        if self._campaign:
+            self._variants = FlightVariants(self._campaign.scenario, self._campaign.design)
+            components = self._variants.unchanged
+        else:
+            components = assemble_flight(load_scenario(scenario))
+        if not components.nominal_trajectory.law.in_core:
+            raise ScenarioError(f"scenario {name!r}: a nominal law that is solved in flight, expected one of the core")
+        limits: Any = SimpleNamespace(in_core=True, kernel=no_tube(components.plant.vehicle), library=None)
+        self._controller = limits
+        self.unchanged = replace(components, controller=limits)
+
+    def draw(self, random: np.random.Generator) -> tuple[Components, int]:
+        """Return the components of a flight, and its number in the campaign; 0 if nothing is drawn."""
+        if self._campaign is None:
+            return self.unchanged, 0
+        flight = int(random.integers(MAX_SAMPLES))
+        [sample], _ = self._campaign.draw(range(flight, flight + 1))
+        components = self._variants.components(self._campaign.flown(flight, sample.tolist()))
+        return replace(components, controller=self._controller), flight
+
+
+@dataclass
+class _Group:
+    """Flights of the consecutive ``rows`` that share a register, and their step."""
+
+    rows: range
+    flights: list[Struct]
+    """One per lane; spare lanes repeat the last flight"""
+    memory: np.ndarray
+    references: list[ReferenceData]
+    step: int = 0
+    over: bool = False
+
+    def fly(self, half: int) -> None:
+        """Simulate a half of the current step."""
+        core.fly(self.flights, self.memory, self.step, self.step + 1, half)
+
+
+class _Episodes:
+    """The current episodes of some rows, in groups of as many as there are lanes."""
+
+    def __init__(self, draws: _Draws, randoms: Sequence[np.random.Generator], *, recorded: bool = False) -> None:
+        """Begin an episode for each row, drawn with its own random numbers; steps are kept if ``recorded``."""
+        self._draws, self._randoms = draws, randoms
+        self.recorded: list[History] | None = [] if recorded else None
+        self._count = count = len(randoms)
+        width = lanes() if count > 1 else 1
+        self._memory = np.zeros((-(-count // width) * width, History.numbers()))
+        self._commands = np.zeros((len(self._memory), N_INPUTS))
+        parts: list[Any] = [part[:count, 0] for part in History.over(self._memory, 1) if part is not None]
+        self.history = History(*parts)
+        self.components: list[Components] = [draws.unchanged] * count
+        self.numbers = np.zeros(count, np.int64)
+        self._x_r, self._u_r = np.zeros((count, N_STATES)), np.zeros((count, N_INPUTS))
+        chunks = [range(start, min(start + width, count)) for start in range(0, count, width)]
+        self._groups = [group for rows in chunks for group in self._begun(rows)]
+
+    @property
+    def nominal_input(self) -> np.ndarray:
+        """u_r + u_n (n, 2), the input of an action of zero."""
+        return self._u_r + self.history.nominal_input
+
+    @property
+    def observation(self) -> np.ndarray:
+        """Observations (n, 18)."""
+        error = self.history.estimate - self._x_r
+        error[:, PITCH_RATE] = self.history.filtered_pitch_rate - self._x_r[:, PITCH_RATE]
+        return np.concatenate((self.history.estimate, error), 1)
+
+    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Fly a step with ``actions`` (n, 2), or begin anew where an episode is over.
+
+        Returns:
+            Reward, whether the episode terminates, and whether it is truncated (n each).
+
+        Raises:
+            ControllerError: An action is not finite.
+        """
+        if not np.isfinite(actions).all():
+            raise ControllerError(f"action = {actions.tolist()}: expected finite numbers")
+        self._commands[: self._count] = self.nominal_input + SCALE * actions
+        self._commands[self._count :] = self._commands[self._count - 1]
+        period = self.components[0].plant.period
+        terminated, truncated, begun = np.zeros((3, self._count), bool)
+        groups = []
+        for group in self._groups:
+            if group.over:
+                groups += self._begun(group.rows)
+                begun[group.rows] = True
+                continue
+            groups.append(group)
+            group.fly(lib.ACT)
+            if self.recorded is not None:
+                self.recorded.append(self.history.copy())
+            if any(flight.pointer.ended == group.step + 1 for flight in group.flights):
+                group.over = True
+                for i in group.rows:
+                    plant = self.components[i].plant
+                    terminated[i] = not in_model_range(self.history.state[i], plant.vehicle.angle_limit)
+                    truncated[i] = not terminated[i]
+            else:
+                self._sense(group, group.step + 1)
+        self._groups = groups
+        errors = (self.history.state - self._x_r)[:, : len(_TOLERATED)] / _TOLERATED
+        rewards = period / (1.0 + (errors * errors).sum(1) + (actions * actions).sum(1))
+        return np.where(begun, 0.0, rewards), terminated, truncated
+
+    def _begun(self, rows: range) -> list[_Group]:
+        for i in rows:
+            self.components[i], self.numbers[i] = self._draws.draw(self._randoms[i])
+        components = [self.components[i] for i in rows]
+        parts = [rows] if FlightGroup.takes(components) else [range(i, i + 1) for i in rows]
+        groups = []
+        for part in parts:
+            width = lanes() if len(part) > 1 else 1
+            steps = components[0].plant.steps + 1
+            flights = [self._flight(min(i, part[-1]), i, steps) for i in range(part.start, part.start + width)]
+            references = [self.components[i].nominal_trajectory.reference.along(steps) for i in part]
+            group = _Group(part, flights, core.loop_memory(width), references)
+            self._sense(group, 0)
+            groups.append(group)
+        return groups
+
+    def _flight(self, row: int, lane: int, steps: int) -> Struct:
+        history, commands = History.over(self._memory[lane], 1), self._commands[lane]
+        return flight_struct(self.components[row], history, commanded=commands, ended=steps)
+
+    def _sense(self, group: _Group, k: int) -> None:
+        group.step = k
+        group.fly(lib.SENSE)
+        for i, reference in zip(group.rows, group.references, strict=True):
+            self._x_r[i], self._u_r[i] = reference.state[k], reference.input[k]
+
+
+class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
+    """Track the reference of a scenario with fuel equivalence ratio and elevator, see :mod:`hsv.gym`.
+
+    ``info`` has ``nominal_input``, u_r + u_n (2), and ``flight``, the number of the flight drawn.
+    """
+
+    metadata = {"render_modes": []}  # noqa: RUF012 (as in the base class)
+    observation_space, action_space = _OBSERVATION, _ACTION
+
+    def __init__(self, scenario: str = "case1", scale: float = 0.0, factors: Factors | None = None) -> None:
+        """Read a scenario; its controller does not fly.
+
+        Without distributions in the scenario, ``scale`` and ``factors``, every episode is the flight of ``hsv
+        simulate``. Otherwise each is a flight of the campaign :func:`hsv.montecarlo` with these arguments.
+
+        Args:
+            scenario: Name of a shipped scenario, or path.
+            scale: Factor on the bounds of the vehicle's uncertain parameters; 0 leaves them alone.
+            factors: Least and largest value, as a file has them, by field, such as ``fault[0].effectiveness``.
+
+        Raises:
+            CampaignError, ScenarioError: Names the setting that is wrong.
+        """
+        self._draws = _Draws(scenario, scale, factors)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, Info]:
+        """Begin an episode; ``options`` are not used."""
+        super().reset(seed=seed)
+        self._episodes = _Episodes(self._draws, [self.np_random], recorded=True)
+        return self._episodes.observation[0], self._info
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, Info]:
+        """Fly a control period with ``action`` (2).
+
+        Raises:
+            ControllerError: The action is not finite.
+        """
+        [reward], [terminated], [truncated] = self._episodes.step(np.asarray(action, float)[None])
+        return self._episodes.observation[0], float(reward), bool(terminated), bool(truncated), self._info
+
+    @property
+    def flight(self) -> Flight:
+        """The flight of the steps taken so far, with history, metrics and fingerprint."""
+        parts: list[Any] = [np.concatenate(part) for part in zip(*self._episodes.recorded or (), strict=True)]
+        return flight_of(self._episodes.components[0], History(*parts))
+
+    @property
+    def _info(self) -> Info:
+        return {"nominal_input": self._episodes.nominal_input[0], "flight": int(self._episodes.numbers[0])}
+
+
+class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
+    """Several :class:`TrackEnv`, flown in the lanes of the core; each row has the bits of a single environment.
+
+    Row i has the seed of the reset plus i. Flights that share a register also share the step: when one of them
+    diverges, the others are truncated, and at the next step all of them begin anew. Flights that the core cannot fly
+    side by side, for example because the engine of one fails, fly alone.
+    """
+
+    metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 (as in the base class)
+
+    def __init__(
+        self, num_envs: int = 1, scenario: str = "case1", scale: float = 0.0, factors: Factors | None = None
+    ) -> None:
+        """Read a scenario for ``num_envs`` flights; other arguments and errors as :class:`TrackEnv`."""
+        self.num_envs = num_envs
+        self.single_observation_space, self.single_action_space = _OBSERVATION, _ACTION
+        self.observation_space, self.action_space = (batch_space(space, num_envs) for space in (_OBSERVATION, _ACTION))
+        self._draws = _Draws(scenario, scale, factors)
+        self._randoms = [np_random()[0] for _ in range(num_envs)]
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, Info]:
+        """Begin all episodes with a ``seed``, or one for each row; ``options`` are not used."""
+        rows = range(self.num_envs)
+        seeds = [seed + i for i in rows] if isinstance(seed, int) else seed or [None for _ in rows]
+        self._randoms = [self._randoms[i] if each is None else np_random(each)[0] for i, each in enumerate(seeds)]
+        self._episodes = _Episodes(self._draws, self._randoms)
+        return self._episodes.observation, self._infos
+
+    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, Info]:
+        """Fly a control period with ``actions`` (n, 2); episodes that are over begin anew instead.
+
+        Raises:
+            ControllerError: An action is not finite.
+        """
+        found = self._episodes.step(np.asarray(actions, float))
+        return self._episodes.observation, *found, self._infos
+
+    @property
+    def _infos(self) -> Info:
+        every = np.ones(self.num_envs, bool)
+        infos = {"nominal_input": self._episodes.nominal_input, "flight": self._episodes.numbers.copy()}
+        return infos | {f"_{name}": every for name in infos}
+
+
+gymnasium.register("hsv/Track-v0", "hsv.gym:TrackEnv", vector_entry_point="hsv.gym:TrackVectorEnv")

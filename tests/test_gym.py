@@ -1,0 +1,106 @@
+"""The environments of Gymnasium: their interface, and the bits of their flights."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from page_blocks import blocks, indented
+
+import hsv.gym
+from hsv.base.errors import CampaignError, ControllerError, ScenarioError
+from hsv.core import lanes
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
+
+ROOT = Path(__file__).parents[1]
+LQR = ROOT / "examples" / "lqr"
+DRAWN = {"scale": 1.0, "factors": {"fault[0].effectiveness": (0.5, 1.0)}}
+
+
+@pytest.mark.filterwarnings("ignore:.*Box observation space m")
+@pytest.mark.parametrize("options", [{}, DRAWN, {"scenario": "case1_realistic"}], ids=["case1", "drawn", "realistic"])
+def test_gymnasium_finds_no_fault(options):
+    check_env(gymnasium.make("hsv/Track-v0", **options).unwrapped, skip_render_check=True)
+
+
+def test_the_example_of_the_page_flies_the_flight_of_its_controller(tmp_path, monkeypatch):
+    scenario = tmp_path / "lqr.toml"
+    scenario.write_text((LQR / "lqr.toml").read_text().replace('controller = "lqr"', 'controller = "hsv_lqr:Lqr"'))
+    [program] = [block.text for block in blocks("docs/gymnasium.md", "python") if "hsv_lqr" in block.text]
+    program = program.replace("examples/lqr/lqr.toml", str(scenario))
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(LQR), os.environ.get("PYTHONPATH", "")])}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+    monkeypatch.syspath_prepend(LQR)
+    assert done.stdout.split() == [fly(assemble_flight(load_scenario(str(scenario)))).fingerprint], done.stderr
+
+
+def test_the_commands_of_the_page_that_measure_run():
+    [commands] = [block.text for block in indented("docs/gymnasium.md") if "timeit" in block.text]
+    script = commands.replace("timeit", "timeit -n 20 -r 1")
+    done = subprocess.run(["bash", "-e", "-c", script], capture_output=True, text=True)
+    assert done.stdout.count("20 loops, best of 1") == 2, done.stderr
+
+
+@pytest.mark.parametrize("options", [{}, DRAWN], ids=["alike", "drawn"])
+def test_rows_of_the_vector_have_the_bits_of_single_environments(options):
+    count = lanes() + 3
+    vector = gymnasium.make_vec("hsv/Track-v0", num_envs=count, **options)
+    singles = [hsv.gym.TrackEnv(**options) for _ in range(count)]
+    observations, infos = vector.reset(seed=7)
+    alone = [single.reset(seed=7 + i) for i, single in enumerate(singles)]
+    assert np.array_equal(observations, [first for first, _ in alone])
+    assert infos["flight"].tolist() == [info["flight"] for _, info in alone]
+    random, over, ends = np.random.default_rng(1), np.zeros(count, bool), 0
+    for _ in range(300):
+        actions = random.uniform(-0.3, 0.3, (count, 2))
+        observations, rewards, terminated, truncated, infos = vector.step(actions)
+        # A flight that shares its register may end that of a row: then the single one is begun anew with it, too.
+        alone = [singles[i].reset() if over[i] else singles[i].step(actions[i]) for i in range(count)]
+        alike = np.flatnonzero(~truncated)
+        assert np.array_equal(observations[alike], [alone[i][0] for i in alike])
+        assert np.array_equal(infos["nominal_input"][alike], [alone[i][-1]["nominal_input"] for i in alike])
+        assert rewards[alike].tolist() == [0.0 if over[i] else alone[i][1] for i in alike]
+        assert terminated[alike].tolist() == [False if over[i] else alone[i][2] for i in alike]
+        over = terminated | truncated
+        ends += over.sum()
+    assert ends >= count
+
+
+def test_an_episode_is_the_whole_flight_and_its_return_is_bounded():
+    env = gymnasium.make("hsv/Track-v0", scenario="case1").unwrapped
+    env.reset(seed=1)
+    total, steps, terminated = 0.0, 0, False
+    while not terminated:
+        observation, reward, terminated, truncated, _ = env.step(np.zeros(2))
+        total, steps = total + reward, steps + 1
+        assert not truncated and 0.0 < reward <= 0.02
+    assert env.flight.status.name == "DIVERGED" and len(env.flight.time) == steps
+    assert 0.0 < total < steps * 0.02
+    assert np.array_equal(observation[:9], env.flight.history.state[-1])
+
+
+def test_a_seed_draws_the_same_flights_and_another_seed_others():
+    env = hsv.gym.TrackEnv(**DRAWN)
+    draws = [[env.reset(seed=seed)[1]["flight"], env.reset()[1]["flight"]] for seed in (1, 1, 2)]
+    assert draws[0] == draws[1] and len({*draws[0], *draws[2]}) == 4
+
+
+def test_what_is_wrong_is_named():
+    with pytest.raises(CampaignError, match="scale = -1"):
+        hsv.gym.TrackEnv(scale=-1.0)
+    with pytest.raises(ScenarioError, match="absent"):
+        hsv.gym.TrackEnv("absent")
+    with pytest.raises(ScenarioError, match="a nominal law that is solved in flight, expected one of the core"):
+        hsv.gym.TrackEnv("case1_qp")
+    env = hsv.gym.TrackEnv()
+    env.reset()
+    with pytest.raises(ControllerError, match=r"action = \[\[nan, 0.0\]\]: expected finite numbers"):
+        env.step(np.array([np.nan, 0.0]))
