@@ -28,7 +28,7 @@ def released(root: Path, version: str, date: str) -> dict[Path, str]:
         root / "CHANGELOG.md": (r"^## Unreleased\n(?=\n*###)", f"## Unreleased\n\n## {version} - {date}\n"),
         root / "CITATION.cff": (r"^version: \S+\ndate-released: \S+$", citation),
     }
-    for manifest in sorted([*root.glob("src/*/package.xml"), *root.glob("ros_ws/src/*/package.xml")]):
+    for manifest in sorted([*root.glob("src/*/package.xml"), *root.glob("ros_ws/src/hsv_*/package.xml")]):
         changes[manifest] = (r"(?<=<version>)\d+\.\d+\.\d+(?=</version>)", version)
         changes[manifest.with_name("CHANGELOG.rst")] = (
             r"^Forthcoming\n-+\n(?=\* )",

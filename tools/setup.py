@@ -194,6 +194,9 @@ def set_up(route: str, env: dict[str, str]) -> None:
     contents = "\n".join([identity, pins, *(re.sub(r"\s*#.*", "", (ROOT / name).read_text()) for name in files)])
     installed = read(VENV / "hsv-setup") == contents
     folders = [path.parent for base in ("src", "ros_ws/src") for path in (ROOT / base).glob("*/package.xml")]
+    prefixes = filter(None, env.get("AMENT_PREFIX_PATH", "").split(":"))
+    if any(Path(prefix, "share/simulation_interfaces").is_dir() for prefix in prefixes):
+        folders = [folder for folder in folders if folder.name != "simulation_interfaces"]  # the whole package is there
     keys = {folder.name: package_key(folder, identity, pins) for folder in sorted(folders)}
     outdated = [name for name, key in keys.items() if read(INSTALL / name / "hsv-setup") != key]
     if (outdated or not installed) and (lacking := missing(route, env)):

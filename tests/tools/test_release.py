@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 
 def manifests(root: Path) -> list[Path]:
     """Return the manifest of every package of a checkout."""
-    return sorted([*root.glob("src/*/package.xml"), *root.glob("ros_ws/src/*/package.xml")])
+    return sorted([*root.glob("src/*/package.xml"), *root.glob("ros_ws/src/hsv_*/package.xml")])
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import mimetypes
 import time
 from collections.abc import Callable
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from hsv.bags.description import (
     OTHER_TOPICS,
     RECORDER,
     RECORDER_PROGRESS,
+    RUN,
     STATE,
     TOPICS,
     TRANSIENT_LOCAL,
@@ -59,7 +61,7 @@ class RecorderNode(PeerNode):
         super().__init__(RECORDER, "bag")
         values = declare(self, RECORDER_PARAMETERS)
         utc = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%SZ")
-        directory = Path(values["bag.directory"] or f"bags/run_{utc}")
+        self._directory = Path(values["bag.directory"] or f"bags/run_{utc}")
         self._tells = values["progress"]
         self._told = 0.0
         """Wall time (s) at which the last numbers of the flight were printed."""
@@ -68,24 +70,21 @@ class RecorderNode(PeerNode):
         self._complete = -1
         self._nanoseconds_per_step = 0
         self._pending: dict[int, dict[str, bytes]] = {}
-        attachments = [Path(name) for name in values["bag.attachments"] if name]
-        for path in attachments:
+        self._attachments = [Path(name) for name in values["bag.attachments"] if name]
+        for path in self._attachments:
             if not path.is_file():
                 raise ParameterError(f"parameter bag.attachments = {str(path)!r}: expected an existing file")
-        custom_data = dict(pair.split("=", 1) for pair in values["bag.custom_data"] if "=" in pair)
+        self._custom_data = dict(pair.split("=", 1) for pair in values["bag.custom_data"] if "=" in pair)
         recorded = {topic: TOPICS[topic] for topic in step_topics(self.controller)}
-        self._names = {topic: self.resolve_topic_name(topic) for topic in (recorded | OTHER_TOPICS)}
-        self.bag = BagWriter(directory, custom_data=custom_data | naming(self._names, self.get_namespace()))
-        for path in attachments:
-            self._attach(path.name, path.read_bytes())
-        self._asks = not {"design.yaml", "scenario.yaml"} <= {path.name for path in attachments}
+        self._kinds = recorded | OTHER_TOPICS
+        self._names = {topic: self.resolve_topic_name(topic) for topic in self._kinds}
+        self._begin_bag()
+        self._asks = not {"design.yaml", "scenario.yaml"} <= {path.name for path in self._attachments}
         """Whether to request the parameters of the nodes, because they are not attached."""
         self._peers: PeerParameters | None = None
-        for topic, kind in (recorded | OTHER_TOPICS).items():
-            latched = topic in TRANSIENT_LOCAL
-            qos = Qos(depth=LATCHED.depth, durability="transient_local") if latched else Qos(depth=STEP.depth)
-            self.bag.add_topic(Topic(self._names[topic], kind, definition(kind), type_hash(kind), qos))
         self._order = tuple(self._names[topic] for topic in recorded)
+        self._stale: set[str] = set()
+        """Topics whose next messages belong to a run that was reset."""
         self._state_messages, self._signals = StepMessages(STATE), Signals()
         for topic, name in zip(recorded, self._order, strict=True):
             self.create_step_subscription(topic, partial(self._on_step_message, name))
@@ -95,11 +94,34 @@ class RecorderNode(PeerNode):
             self.create_subscription(message_class(kind), topic, callback, profile, raw=True)
         self._progress_message = RecorderProgress()
         self._progress = self.create_publisher(RecorderProgress, RECORDER_PROGRESS, STEP)
+
+    def _begin_bag(self) -> None:
+        custom_data = self._custom_data | naming(self._names, self.get_namespace())
+        self.bag = BagWriter(self._directory, custom_data=custom_data)
+        for path in self._attachments:
+            self._attach(path.name, path.read_bytes())
+        for topic, kind in self._kinds.items():
+            latched = topic in TRANSIENT_LOCAL
+            qos = Qos(depth=LATCHED.depth, durability="transient_local") if latched else Qos(depth=STEP.depth)
+            self.bag.add_topic(Topic(self._names[topic], kind, definition(kind), type_hash(kind), qos))
         self.get_logger().info(f"recording to {self.bag.directory}")
 
+    def _keep_reset_run(self) -> None:
+        """Close the bag of a run that was reset under another name, and begin that of the run which replaces it."""
+        self.close()
+        numbered = (self._directory.with_name(f"{self._directory.name}_reset_{number}") for number in count(1))
+        kept = next(path for path in numbered if not path.exists())
+        self._directory.rename(kept)
+        self.get_logger().info(f"the run was reset; its bag is now {kept}")
+        self._pending.clear()
+        self._now, self._complete, self._stale = 0, -1, {*self._order}
+        self._begin_bag()
+
     def start_run(self, run: Run) -> None:
-        """Store the number of steps to expect; a second run would need a second bag."""
-        if self._complete >= 0:
+        """Store the number of steps to expect; a run that replaces one that was reset has a bag of its own."""
+        if self._complete >= 0 and self._runs_of_one_plant():
+            self._keep_reset_run()
+        elif self._complete >= 0:
             self.get_logger().fatal(
                 "a new run was announced: expected one recorder per run, "
                 "and a separate ROS_DOMAIN_ID or namespace for simultaneous runs"
@@ -111,6 +133,9 @@ class RecorderNode(PeerNode):
         self._peers = None
         self._last_step = run.last_step
         self._nanoseconds_per_step = round(run.period * 1e9)
+
+    def _runs_of_one_plant(self) -> bool:
+        return not self.over and len(self.publishers_of(RUN)) == 1
 
     def end_run(self, how: str) -> None:
         """Log how the run ended, and the next action of the user."""
@@ -158,6 +183,10 @@ class RecorderNode(PeerNode):
 
     def _on_step_message(self, topic: str, data: bytes) -> None:
         stamp = stamp_in(data)
+        if topic in self._stale:
+            if stamp:
+                return
+            self._stale.discard(topic)
         if stamp <= self._now and self._complete >= 0:
             # Each topic keeps its order: whoever sends this is not of the graph.
             self.get_logger().error(

@@ -256,7 +256,9 @@ class PeerNode(LockstepNode):
     def __init__(self, role: NodeDescription, task: str = "") -> None:
         super().__init__(role, task)
         self._run: Run | None = None
-        self._announced = self._over = False
+        self._announced = False
+        self.over = False
+        """Whether the announced run has ended."""
         self._ready = self.create_publisher(Ready, description.READY, LATCHED)
         # Subscribe before /hsv/run, so that the end of a run is received before the start of the next.
         self.create_subscription(VehicleState, description.LAST_STATE, self._on_last_state, LATCHED)
@@ -307,9 +309,9 @@ class PeerNode(LockstepNode):
             self.get_logger().fatal(refusal)
             self.finish(2)
             return
-        self._run = run
-        self._announced = self._over = False
         self.start_run(run)
+        self._run = run
+        self._announced = self.over = False
 
     def _on_last_state(self, state: VehicleState) -> None:
         if state.status == VehicleState.RUNNING:
@@ -324,8 +326,8 @@ class PeerNode(LockstepNode):
 
     def _end(self, how: str) -> None:
         """Handle the end of the run once, whether the plant announces it or disappears."""
-        if self._run is not None and self._announced and not self._over:
-            self._over = True
+        if self._run is not None and self._announced and not self.over:
+            self.over = True
             self.end_run(f"run {short_id(self._run)} {how}")
 
 

@@ -19,6 +19,7 @@ from rclpy.parameter import Parameter as RosParameter
 from hsv.bags.description import (
     ACTUATOR,
     EXIT_DIVERGED,
+    EXIT_INTERRUPTED,
     FAULT_INJECTOR,
     LAST_STATE,
     PLANT,
@@ -44,6 +45,7 @@ from hsv_node.lockstep import LINK_CHECK, LockstepNode, run_in_words, short_id, 
 from hsv_node.main import run_node
 from hsv_node.middleware import LATCHED, STEP, ServiceCall
 from hsv_node.parameters import declare, declare_vehicle, refuse_sim_time
+from hsv_plant.simulation_control import SimulationControl
 
 MAX_AHEAD = 100
 """Maximum number of steps that the plant may be ahead of the recorder."""
@@ -77,6 +79,18 @@ class PlantNode(LockstepNode):
         self._references = self.create_subscription(Reference, REFERENCE, self._on_reference, LATCHED)
         self._planning = False
         """Whether nominal_trajectory is computing the plan of a command."""
+        self._announcer = self.create_publisher(Run, RUN, LATCHED)
+        self._last_state = self.create_publisher(VehicleState, LAST_STATE, LATCHED)
+        self._broken_off = ""
+        """Reason why the run was aborted; empty otherwise."""
+        self._messages = 0
+        """Number of answers of the nodes so far, which must increase."""
+        self._begin()
+        self.add_on_set_parameters_callback(self._on_change)
+        self._control = SimulationControl(self)
+
+    def _begin(self) -> None:
+        """Announce a run, which starts when all nodes are ready for it."""
         self._run = Run(
             run_id=uuid.uuid4().hex,
             period=self.plant.period,
@@ -84,11 +98,7 @@ class PlantNode(LockstepNode):
             seed=self.values[SEED_PARAMETER.name],
             interface_version=Run.INTERFACE_VERSION,
         )
-        self._announcer = self.create_publisher(Run, RUN, LATCHED)
-        self._announcer.publish(self._run)
-        self._last_state = self.create_publisher(VehicleState, LAST_STATE, LATCHED)
-        self._broken_off = ""
-        """Reason why the run was aborted; empty otherwise."""
+        self._ready.clear()
         self._signals = Signals()
         self._advance()
         self._started = False
@@ -96,13 +106,42 @@ class PlantNode(LockstepNode):
         self._answered = False
         """Whether the input of the actuators for this step has arrived."""
         self._flown = False
+        self._stepping_to = 0
+        """Step up to which the flight goes on although it is paused."""
+        self._resets = False
+        """Whether the run is to be reset as soon as no message of it is on its way."""
         self._begun = time.monotonic()
         self._paced_from = self._begun, 0
         """Wall time (s) and step at the start of the current pace."""
-        self.add_on_set_parameters_callback(self._on_change)
-        self._messages = 0
-        """Number of answers of the nodes so far, which must increase."""
         self._standstill = Standstill()
+        self._announcer.publish(self._run)
+
+    @property
+    def step(self) -> int:
+        """The current step."""
+        return int(self._signals.step)
+
+    @property
+    def paused(self) -> bool:
+        """Whether the flight is paused; it is not while requested steps are flown."""
+        return bool(self.values["paused"]) and self.step >= self._stepping_to
+
+    def fly_on(self, steps: int) -> None:
+        """Fly ``steps`` of a paused flight."""
+        self._paced_from = time.monotonic(), self.step
+        self._stepping_to = self.step + steps
+        self._continue()
+
+    def reset(self) -> bool:
+        """Begin the flight anew, as soon as the current step is answered; return whether it is still in the air."""
+        self._resets = self._signals.status is FlightStatus.RUNNING
+        self._continue()
+        return self._resets or self.step == 0
+
+    def quit(self, reason: str) -> None:
+        """End the run, as Ctrl-C does."""
+        self._broken_off = reason
+        self.finish(EXIT_INTERRUPTED)
 
     def _on_ready(self, ready: Ready) -> None:
         if ready.run_id == self._run.run_id:
@@ -117,6 +156,8 @@ class PlantNode(LockstepNode):
         for parameter in parameters:
             if parameter.name in _IN_FLIGHT:
                 self.values[parameter.name] = parameter.value
+                if parameter.name == "paused":
+                    self._stepping_to = 0
                 self._paced_from = time.monotonic(), step
                 said = str(parameter.value).lower()  # as it is written in files: true, not True
                 self.log_change(f"{parameter.name} = {said} from step {step + 1} on")
@@ -158,9 +199,13 @@ class PlantNode(LockstepNode):
 
     def _continue(self) -> None:
         """Execute the next step, unless the plant must wait for its input, the recorder or the wall clock."""
-        if self._flown and (not self.recorded or self._recorded_step >= self._signals.step):
+        if self._resets and (self._answered or not self._started):
+            # The answer to a step is the last message of that step which a node waits for.
+            self.get_logger().info(f"run {short_id(self._run)} reset at {step_in_words(self.step, self.plant.period)}")
+            self._begin()
+        elif self._flown and (not self.recorded or self._recorded_step >= self._signals.step):
             self._land()
-        elif self._answered and not self.values["paused"] and self._delay() <= 0.0 and self._room():
+        elif self._answered and not self.paused and self._delay() <= 0.0 and self._room():
             self._answered = False
             self._advance()
             self._publish()
@@ -199,7 +244,7 @@ class PlantNode(LockstepNode):
             self._continue()
             # While the run is paused, a command is planned, or the pace delays the next step, no node can be late.
             planning = self._planning and self._references.get_publisher_count() > 0
-            waits = self.values["paused"] or planning or (self._answered and self._delay() > 0.0)
+            waits = self.paused or planning or (self._answered and self._delay() > 0.0)
             waited = self._standstill.look(time.monotonic() if waits else self._messages)
             if waited > self._limit():
                 self._give_up(waited)
@@ -216,7 +261,7 @@ class PlantNode(LockstepNode):
         """Return the time (s) to the next poll, or to the next state in a paced flight."""
         if not self._started:
             return LINK_CHECK
-        due = self._answered and self._room() and not self.values["paused"]
+        due = self._answered and self._room() and not self.paused
         return min(max(self._delay(), 0.0), 0.25) if due else 0.25
 
     def stopped(self, signal_number: int) -> int:

@@ -42,6 +42,14 @@ WIRE_ALIGNMENT = 4
 INJECT_FAULT = "hsv/inject_fault"
 CLEAR_FAULT = "hsv/clear_fault"
 SET_COMMAND = "hsv/set_command"
+SIMULATION_CONTROL = {
+    "GetSimulatorFeatures": "hsv/get_simulator_features",
+    "GetSimulationState": "hsv/get_simulation_state",
+    "SetSimulationState": "hsv/set_simulation_state",
+    "StepSimulation": "hsv/step_simulation",
+    "ResetSimulation": "hsv/reset_simulation",
+}
+"""Services of the plant by their types in the ROS 2 standard ``simulation_interfaces``."""
 
 TOPICS = {
     CLOCK: "rosgraph_msgs/msg/Clock",
@@ -117,6 +125,9 @@ INTERFACE_VERSION = 3
 
 EXIT_DIVERGED = 3
 """Exit code of the plant after a flight that left the range of the model."""
+
+EXIT_INTERRUPTED = 130
+"""Exit code of the plant after a flight that a client of the simulation control ended."""
 
 LANDED = (0, EXIT_DIVERGED)
 """Exit codes of the process that ends the run, after a flight that finished or diverged."""

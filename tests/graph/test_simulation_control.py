@@ -1,0 +1,65 @@
+"""A flight under the ROS 2 standard for simulators: a client that knows nothing else pauses, steps and resets it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from marking import long
+from node_processes import Processes, short_scenario
+from waiting import exit_code_of, output_of
+
+from hsv.bags.flight import flight_fingerprint
+from hsv.bags.reader import Bag
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.fingerprint import as_published
+from hsv.flight.scenario import load_scenario
+
+pytestmark = pytest.mark.graph
+
+CLIENT = Path(__file__).parents[1] / "support" / "simulation_client.py"
+STOPPED, OK, FAILED, UNSUPPORTED, ALREADY, INCORRECT = 0, 1, 4, 0, 101, 103
+
+
+@pytest.mark.parametrize(("scenario", "pace"), [("short", 0.2), long("case1", 1)])
+def test_pause_steps_reset_and_the_whole_flight_again(processes: Processes, scenario: str, pace: float) -> None:
+    flown = short_scenario(processes.folder) if scenario == "short" else scenario
+    bag = processes.folder / "flown"
+    words = ("--bag", bag, "--paused", "--real-time-factor", str(pace), "--no-report")
+    run = processes.start("hsv", "run", flown, *words)
+    client = processes.start(sys.executable, CLIENT)
+    answers = output_of(client)
+    assert client.returncode == 0, answers
+    told = json.loads(answers.splitlines()[-1])
+    assert {20, 21, 22, 24, 25, 26, 31, 32} == {*told["features"]}
+    assert (told["at first"], told["pause while stopped"], told["play"]) == (STOPPED, INCORRECT, OK)
+    assert told["step while playing"] == FAILED and told["pause"] == [OK, ALREADY]
+    assert told["steps"] == OK and told["to"] == told["from"] + 50
+    assert told["scope"] == UNSUPPORTED and told["reset"] == OK and told["after reset"] == STOPPED
+    assert told["play again"] == OK
+
+    assert exit_code_of(run) == 0, run.communicate()[0]
+    same = fly(assemble_flight(load_scenario(str(flown))))
+    assert np.array_equal(same.history.state[told["to"]], told["state"])
+    assert flight_fingerprint(Bag(bag)) == same.fingerprint
+    if scenario == "case1":
+        assert as_published(same.fingerprint, None, "")
+    before = Bag(processes.folder / "flown_reset_1")
+    states = before.columns("hsv/state")
+    assert len(states["step"]) == told["to"] + 1 and "design.yaml" in before.attachments
+
+
+def test_quitting_ends_the_run_as_an_interruption_does(processes: Processes) -> None:
+    program = (
+        "import rclpy; from simulation_interfaces.srv import SetSimulationState as S; rclpy.init();"
+        "n = rclpy.create_node('c'); c = n.create_client(S, 'hsv/set_simulation_state'); c.wait_for_service();"
+        "r = S.Request(); r.state.state = 3; rclpy.spin_until_future_complete(n, c.call_async(r), timeout_sec=5.0)"
+    )
+    run = processes.start("hsv", "run", "case1", "--no-report", "--real-time-factor", "1")
+    processes.run(sys.executable, "-c", program)
+    text = output_of(run)
+    assert run.returncode == 1 and "plant ended with exit code 130" in text, text
