@@ -140,6 +140,18 @@ def test_wall_clock_log_times_change_nothing(hsv: Hsv, tmp_path: Path, form: dic
 
 
 @pytest.mark.long
+@pytest.mark.filterwarnings("error")
+def test_log_times_that_roll_over_are_out_of_order_and_change_no_metric(hsv: Hsv, tmp_path: Path) -> None:
+    path = recorded(REFERENCE, tmp_path / "rolled", begin=2**64 - 10**10)
+    ran = hsv("info", str(path), "--json")
+    assert ran.code == 0
+    assert (
+        ran.err.startswith(f"hsv: warning: {path / 'rolled_0.mcap'}: /clock is out of order")
+        and ran.err.count("\n") == 1
+    )
+    assert ran.json["metrics"] == hsv("info", str(REFERENCE), "--json").json["metrics"]
+
+
 def test_a_fifth_of_the_steps_is_missing(hsv: Hsv, tmp_path: Path) -> None:
     lost = {int(step) for step in np.random.default_rng(3).choice(2001, 400, replace=False)}
     period = 20_000_000
