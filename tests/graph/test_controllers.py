@@ -108,8 +108,13 @@ def test_the_lmi_in_flight_depends_on_the_flight_alone(processes: Processes) -> 
 @pytest.mark.long
 def test_a_vehicle_outside_the_certified_set_is_told(processes: Processes) -> None:
     scenario = short_scenario(processes.folder, duration=1, fault=0.5, coupling="derived")
-    bag = _flown(processes, scenario, "uncertified", "--composed")
+    # Warnings of nodes are shown whatever form of the log the user has chosen.
+    processes.environment["RCUTILS_CONSOLE_OUTPUT_FORMAT"] = "[{severity}]: {message}"
+    path = processes.folder / "uncertified"
+    flown = processes.run("hsv", "run", scenario, "--no-report", "--bag", path, "--composed")
+    assert flown.returncode == 0 and "[tube_mpc]: outside certified vehicle set: " in flown.stdout, flown.stdout
+    bag = Bag(path)
     status = bag.columns("/hsv/tube_status")
     assert set(status["status"]) == {TubeStatusCode.UNCERTIFIED_VEHICLE} and status["inside"].all()
-    told = processes.run("hsv", "info", processes.folder / "uncertified").stdout
+    told = processes.run("hsv", "info", path).stdout
     assert "vehicle that the design is not certified for" in " ".join(told.split())
