@@ -12,10 +12,10 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from marking import long
 from page_blocks import blocks
-from template_fmus import template_fmu
+from template_fmus import container_fmu, template_fmu
 
 from hsv.base.errors import ControllerError, HsvError, ParameterError
-from hsv.control.controllers import names_code
+from hsv.control.controllers import class_place, names_code
 from hsv.control.design import find_design, read_design
 from hsv.control.export import exported_controller
 from hsv.control.fmu_export import write_fmu
@@ -145,7 +145,14 @@ def test_an_fmu_of_fmpys_own_template_flies_as_controller_as_the_page_says(tmp_p
     changes = {"duration": "2 s", "fault": []}
     flown = fly(assemble_flight(load_scenario(str(tmp_path / mapped.file), changes)))
     assert flown.history.command.tolist() == [[*TRIM.values()]] * 101
-    assert names_code("pid.fmu")
+    assert names_code("pid.fmu") and class_place("pid.fmu") == "pid.fmu"
+
+
+@pytest.mark.long
+def test_a_container_of_fmi_2_that_fmpy_makes_flies_as_controller(tmp_path):
+    template_fmu(tmp_path / "inner.fmu", ["h"], TRIM)
+    container_fmu(tmp_path / "model.fmu", tmp_path / "inner.fmu")
+    assert fly(flight(tmp_path, MAPPED)).history.command.tolist() == [[*TRIM.values()]] * 101
 
 
 @pytest.mark.long

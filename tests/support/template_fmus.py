@@ -8,6 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
+from fmpy import read_model_description
+from fmpy.container_fmu.cli import create_container_fmu
+from fmpy.container_fmu.config import Component, Configuration
 from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
 from fmpy.template import create_fmu
 
@@ -52,3 +55,33 @@ def template_fmu(
         exact = xml.replace('causality="output"', 'causality="output" initial="exact"')  # the template forgets it
         archive.writestr("modelDescription.xml", description(exact))
         archive.write(library, "binaries/x86_64-linux/model.so")
+
+
+def container_fmu(path: Path, inner: Path) -> None:
+    """Write an FMI 2.0 FMU of FMPy's own binary that contains ``inner``, with the same inputs and outputs."""
+    described = read_model_description(str(inner))
+    component = Component(inner.stem, inner, described)
+    made = ModelDescription()
+    made.fmiVersion, made.modelName, made.instantiationToken, made.guid = "2.0", "container", "container", "container"
+    made.coSimulation = CoSimulation(modelIdentifier="container_fmu")
+    made.coSimulation.fixedInternalStepSize = 0.02
+    mappings = {}
+    for inside in described.modelVariables:
+        exact = "exact" if inside.causality == "output" else None
+        outside = ModelVariable(
+            name=inside.name,
+            valueReference=0,
+            type="Real",
+            causality=inside.causality,
+            variability="continuous",
+            start=inside.start,
+            initial=exact,
+        )
+        made.modelVariables.append(outside)
+        if inside.causality != "independent":
+            mappings[outside] = [(component, inside)]
+        if exact:
+            made.outputs.append(Unknown(variable=outside))
+    folder = path.with_suffix("")
+    folder.mkdir()
+    create_container_fmu(Configuration(False, made, [component], [], mappings), folder, path)

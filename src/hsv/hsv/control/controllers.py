@@ -109,9 +109,11 @@ def class_place(name: str) -> str:
         ParameterError: There is none of that name.
     """
     place = SHIPPED_CONTROLLERS.get(name, name)
+    if library_place(place):
+        return place
     module, colon, _ = place.partition(":")
     if colon:
-        if not (library_place(place) or all(map(str.isidentifier, module.split(".")))):
+        if not all(map(str.isidentifier, module.split("."))):
             raise ParameterError(
                 f"controller = {name!r}: {module!r} is no module, expected package.module:Class or path/lib.so:symbol"
             )
