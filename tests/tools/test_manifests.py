@@ -29,6 +29,7 @@ WITHOUT_KEY = {
     "control",
     "cvxpy",
     "distributed",
+    "fmpy",
     "foxglove",
     "gymnasium",
     "lz4",
