@@ -29,7 +29,7 @@ REQUIRED = [
 EXTRAS = {
     "campaign": ["distributed>=2025.1,<2027", "pyarrow>=18,<27"],
     "design": ["clarabel>=0.10,<0.12", "cvxpy>=1.6,<2"],
-    "fmi": ["fmpy>=0.3.26,<0.4"],
+    "fmi": ["fmpy>=0.3.22,<0.4"],
     "gym": ["gymnasium>=1.1,<2"],
     "live": ["foxglove-sdk>=0.20,<0.31", "websockets>=14,<18"],
     "notebook": ["control>=0.10,<0.11", "pandas>=2.2,<4"],

@@ -140,9 +140,12 @@ def test_a_malformed_distribution_is_named_with_what_was_expected(field, given, 
     ("table", "message"),
     [
         ({"title": {"uniform": [0.0, 1.0]}}, "title = .*expected a text"),
-        ({"robust_mpc": {"gain_index": {"uniform": [0.0, 1.0]}}}, "robust_mpc.gain_index = .*expected a whole number"),
-        ({"notch": {"enabled": {"uniform": [0.0, 1.0]}}}, "notch.enabled = .*expected a valid boolean"),
-        ({"reference": {"uniform": ["1 m", "2 m"]}}, "reference.uniform: unknown key, expected one of trim"),
+        (
+            {"robust_mpc": {"gain_index": {"uniform": [0.0, 1.0]}}},
+            "robust_mpc.gain_index = .*expected integer from 0 to 63",
+        ),
+        ({"notch": {"enabled": {"uniform": [0.0, 1.0]}}}, "notch.enabled = .*expected bool"),
+        ({"reference": {"uniform": ["1 m", "2 m"]}}, "reference.uniform: unknown key, expected one of blend, trim"),
         (
             {"limits": {"altitude_end_error": {"uniform": ["1 m", "2 m"]}}},
             "limits.altitude_end_error = .*expected a finite",

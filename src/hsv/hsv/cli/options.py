@@ -15,7 +15,6 @@ DesignArgument = Annotated[
 ]
 ScenarioArgument = Annotated[str, Argument(help="Name of a shipped scenario, or path of a TOML file.")]
 
-FlightsOption = Annotated[Path, Option(help="Folder in which the study's flights are stored and reused.")]
 ForceOption = Annotated[bool, Option("--force", help="Overwrite existing files.")]
 GraphNamespaceOption = Annotated[str, Option("--namespace", help="Namespace of the graph, such as /veh1.")]
 JsonOption = Annotated[bool, Option("--json", help="Print JSON, with the unit in every key.")]

@@ -1,8 +1,9 @@
 """Independent verification of a design: recompute every statement of its certificate with numpy.
 
-This module shares no code with the design computation. It reads the numbers in flight (vertices A_i, B_i, gains F and
-K) from the design file, and the statements about them from the certificate. It recomputes the vertices from the
-parameters of the vehicle, and every inequality from its matrices; :mod:`hsv.flight.verification` repeats the flights.
+This module imports nothing of :mod:`hsv.design`; only the model of the vehicle, :mod:`hsv.model`, is common to both. It
+reads the numbers in flight (vertices A_i, B_i, gains F and K) from the design file, and the statements about them from
+the certificate. It recomputes the vertices from the parameters of the vehicle, and every inequality from its matrices;
+:mod:`hsv.flight.verification` repeats the flights.
 The parts follow the paper: model (10)-(12), gain F (24), gains K (31)-(35), error system (22), (23), invariant set
 (25)-(28), tightened inputs (30), adjustable factor (47)-(54).
 
@@ -718,6 +719,7 @@ def adjustable_checks(subject: Subject) -> Checks:
     incomplete = Tube(subject, design, "adjustable.incomplete")
     yield from _tube_checks(subject, complete)
     yield from _tube_checks(subject, incomplete)
+    # The paper states Z' = tau Z (47); the certificate keeps it for comparison with the Z' that was computed.
     scaled = np.append(tau, np.full(len(complete.c) - N_RIGID, tau[-1])) * complete.half_width
     yield recomputed(subject, "adjustable.scaled_half_width", scaled, "half-widths")
     # (52): the bound of |u_n| grows with the room at the target trim, by the ratio of U minus F' Z' to U minus F Z.

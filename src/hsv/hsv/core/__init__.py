@@ -146,7 +146,7 @@ def records(kind: str, array: np.ndarray) -> Any:
 def instruction_set() -> str:
     """Return the instruction set of the core: the widest of this processor, or the one in ``HSV_CORE``.
 
-    Elsewhere than on x86-64 there is one set, called as the first one.
+    Other processors than x86-64 have only one set, with the name of the first set of x86-64.
 
     Raises:
         ParameterError: ``HSV_CORE`` names none, or one that this processor does not have.

@@ -183,7 +183,9 @@ class CommonLyapunov:
 
 
 def common_lyapunov(closed_loop: np.ndarray, scale: np.ndarray, name: str) -> CommonLyapunov:
-    """Return the function with the largest margin, verified after solving.
+    """Return the Lyapunov function e' N^-1 e common to all closed loops whose inequality (24) has the largest margin.
+
+    The margin is recomputed after solving.
 
     Args:
         closed_loop: (r, n, n) discrete-time state matrices.

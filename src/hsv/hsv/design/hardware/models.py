@@ -72,8 +72,8 @@ Model = Callable[[ErrorSystem], Effect]
 class Measured:
     """Sensors of the rigid states: largest ``error`` (5), SI, and how many steps ``late`` (5) each is.
 
-    ``inertial``: the angle of attack has the error of the pitch angle, too. ``plan``: without one the nominal model is
-    scheduled with the truth.
+    ``inertial``: the angle of attack has the error of the pitch angle, too. ``plan``: the nominal plan, by
+    whose changes a late measurement is wrong; None: the nominal model is scheduled with the true altitude and velocity.
     """
 
     error: np.ndarray
