@@ -194,13 +194,16 @@ def test_json_has_no_numbers_that_json_lacks(hsv, tmp_path, capsys):
         (("trim", "--coupling", "strong"), "coupling = 'strong': expected one of paper_like, derived"),
         (
             ("trim", "--vehicle", "parkr"),
-            "vehicle 'parkr': expected one of parker, stiffened or the path of a TOML file",
+            "vehicle 'parkr': expected one of parker, stiffened, winged_cone or the path of a TOML file",
         ),
         (
             ("linearise", "--vehicle", "absent.toml"),
             "vehicle 'absent.toml': cannot be read (No such file or directory)",
         ),
-        (("list", "vehicles", "absent"), "vehicle 'absent': expected one of parker, stiffened or the path of a TOML"),
+        (
+            ("list", "vehicles", "absent"),
+            "vehicle 'absent': expected one of parker, stiffened, winged_cone or the path of a TOML",
+        ),
         (("linearise", "--model", "ecm"), "model = 'ecm': expected one of CM, DM, ECM (did you mean 'ECM'?)"),
         (
             ("linearise", "--model", "ECM", "--reading", "print"),

@@ -130,7 +130,11 @@ def test_a_centre_the_samples_cannot_show_is_refused(frequency):
     [
         ("notch.zero_frequency", [15], "parameter notch.zero_frequency[0] = 15: expected double array"),
         ("notch.zero_frequency", [-15.0], "parameter notch.zero_frequency[0] = -15.0: expected"),
-        ("notch.zero_frequency", [], "parameter notch.zero_frequency: 0 values"),
+        (
+            "notch.zero_frequency",
+            [],
+            "parameter notch.zero_damping: 1 values, expected as many as notch.zero_frequency, 0",
+        ),
         ("notch.zero_frequency", [15.0] * (MAX_SECTIONS + 1), "parameter notch.zero_frequency: 5 values, expected"),
         ("notch.pole_damping", [0.0], "parameter notch.pole_damping[0] = 0.0: expected"),
         ("notch.pole_damping", [float("nan")], "parameter notch.pole_damping[0] = nan: expected"),

@@ -55,7 +55,6 @@ def test_two_designs_differ_only_in_name_description_and_scales():
         ("feedback.method", "lucky", "feedback.method = 'lucky': input should be 'guaranteed_cost' or"),
         ("nominal.scales", [1.0, float("nan")], "nominal.scales.1 = nan"),
         ("nominal.input_bound.elevator", "5 deg", "nominal.input_bound.elevator: unknown field"),
-        ("notch", [], "notch = []"),
     ],
 )
 def test_a_wrong_field_is_named(table, path, value, message):

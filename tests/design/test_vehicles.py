@@ -128,7 +128,7 @@ def test_the_default_vehicle_by_name_changes_nothing(folder):
 @pytest.mark.parametrize(
     ("own", "message"),
     [
-        ('vehicle = "parkr"', "vehicle 'parkr': expected one of parker, stiffened"),
+        ('vehicle = "parkr"', "vehicle 'parkr': expected one of parker, stiffened, winged_cone"),
         ('vehicle = "gone.toml"', "gone.toml': cannot be read (No such file or directory), expected a TOML file"),
         ("vehicle = 3", "vehicle = 3: expected a name or a path"),
         (

@@ -145,7 +145,10 @@ def test_input_limits_are_those_of_the_vehicle(folder):
 @pytest.mark.parametrize(
     ("vehicle", "message"),
     [
-        ('vehicle = "parkr"', "vehicle 'parkr': expected one of parker, stiffened or the path of a TOML file (did you"),
+        (
+            'vehicle = "parkr"',
+            "vehicle 'parkr': expected one of parker, stiffened, winged_cone or the path of a TOML file (did you",
+        ),
         ("vehicle = 3", "vehicle = 3: expected a name, a path, or a table"),
         ("[vehicle]\nname = 3", "vehicle.name = 3: expected a name or a path"),
         ("[vehicle]\ndefinition = 3", "vehicle.definition = 3: expected the tables of a vehicle file"),

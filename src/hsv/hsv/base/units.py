@@ -315,7 +315,7 @@ def _composed(unit: str) -> tuple[Fraction, dict[str, int]]:
         exponents = {name: base.get(name, 0) + sign * more.get(name, 0) for name in {**base, **more}}
         return square * other**sign, exponents
     symbol, _, power = unit.partition("^")
-    if not power.isdigit():
+    if not power.removeprefix("-").isdigit():
         raise KeyError(unit)
     square, base = _composed(symbol)
     return square ** int(power), {name: int(power) * exponent for name, exponent in base.items()}

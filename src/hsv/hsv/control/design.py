@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -327,7 +327,7 @@ class ControlDesign:
         values: dict[str, Any] = {
             "design.name": self.name,
             "period": self.period,
-            **{f"notch.{name}": np.array([getattr(s, name) for s in self.notch]) for name in vars(self.notch[0])},
+            **{f"notch.{f.name}": np.array([getattr(s, f.name) for s in self.notch]) for f in fields(NotchSection)},
             "model.a": self.polytope.A,
             "model.b": self.polytope.B,
             "scheduling.interpolation": self.interpolation,

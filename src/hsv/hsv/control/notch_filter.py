@@ -194,10 +194,10 @@ def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
     standard = next((p for p in chosen if p in DESIGN_NOTCH_PARAMETERS), chosen[0])
     n = len(v[standard.name])
     for parameter, column in zip(chosen, columns, strict=True):
-        if len(column) != n or not 1 <= n <= MAX_SECTIONS:
+        if len(column) != n or n > MAX_SECTIONS:
             raise ParameterError(
                 f"parameter {parameter.name}: {len(column)} values, "
-                f"expected as many as {standard.name}, {n} (1 to {MAX_SECTIONS})"
+                f"expected as many as {standard.name}, {n} (at most {MAX_SECTIONS})"
             )
     return tuple(NotchSection(*row) for row in zip(*columns, strict=True))
 

@@ -38,9 +38,6 @@ enum {
 
 typedef struct {
 #include "vehicle_fields.h"
-    number fuel_equivalence_ratio_minimum, fuel_equivalence_ratio_maximum;
-    number elevator_deflection_minimum, elevator_deflection_maximum;
-    number angle_limit;
 } hsv_vehicle;
 
 /* Second-order sections in series. */

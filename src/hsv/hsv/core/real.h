@@ -36,6 +36,7 @@ static inline plain real_part(real x) { return x; }
 #endif
 static inline plain all(double x) { return x; }
 static inline plain choose(mask m, plain a, plain b) { return m ? a : b; }
+static inline real select_real(mask m, real a, real b) { return m ? a : b; }
 static inline mask opposite(mask m) { return !m; }
 static inline int every(mask m) { return m; }
 static inline int any(mask m) { return m; }
@@ -66,6 +67,7 @@ static inline real real_part(real x) { return x; }
 /* x + {} would turn -0.0 into 0.0. */
 static inline real all(double x) { return x - (real){0.0}; }
 static inline real choose(mask m, real a, real b) { return (real)((m & (mask)a) | (~m & (mask)b)); }
+static inline real select_real(mask m, real a, real b) { return choose(m, a, b); }
 static inline mask opposite(mask m) { return ~m; }
 static inline real magnitude(real x) { return (real)((mask)x & INT64_MAX); }
 static inline real power_of_two(real n) { return (real)(((word)(n + 0x1.8p52) << 52) + (UINT64_C(1023) << 52)); }

@@ -20,7 +20,7 @@ void hsv_forces(const double *x, const double *u, const hsv_vehicle *p, const do
 {
     double alpha = x[ALPHA];
     const Forces f = conditions ? forces_in(conditions, x, u, vehicle_of(p), &alpha)
-                                : forces(x[ALTITUDE], x[VELOCITY], alpha, u, vehicle_of(p));
+                                : forces(x[ALTITUDE], x[VELOCITY], alpha, x[PITCH_RATE], u, vehicle_of(p));
     out[0] = f.lift, out[1] = f.drag, out[2] = f.thrust, out[3] = f.moment, out[4] = f.pressure, out[5] = alpha;
 }
 

@@ -1,4 +1,4 @@
-/* Equations of motion of the vehicle (paper eq. 1 to eq. 4) and their integration over a control period.
+/* Equations of motion of a vehicle (paper eq. 1 and eq. 4) and their integration over a control period.
  *
  *   dh/dt     = V sin(theta - alpha)
  *   dV/dt     = (T cos alpha - D) / m - g sin(theta - alpha)
@@ -8,13 +8,8 @@
  *   k_i eta_i'' = -2 zeta_i omega_i eta_i' - omega_i^2 eta_i + N_i - psi_i M / I_yy - psi_1 psi_2 eta_j'' / I_yy
  *
  * with k_i = 1 + psi_i^2 / I_yy (eq. 1); without inertial coupling, psi_1 = psi_2 = 0, it is the decoupled model
- * (eq. 4). Forces and moment are the curve fits of Parker et al. (2007) (eq. 2, eq. 3):
- *
- *   L = q_bar S C_L(alpha, delta_e), D = q_bar S C_D(alpha, delta_e), M = z_T T + q_bar S c C_M(alpha, delta_e),
- *   T = C_T3 alpha^3 + C_T2 alpha^2 + C_T1 alpha + C_T0, each affine in the equivalence ratio phi (beta_1 ... beta_8),
- *   N_i(alpha, delta_e), dynamic pressure q_bar = rho V^2 / 2, density rho = rho_0 exp(-(h - h_0) / h_s).
- *
- * The thrust term of the moment and the exponent of the density differ from the printed equations; see docs/errata.md.
+ * (eq. 4). Lift L, drag D, thrust T and moment M follow from the structure of the vehicle: parker.h or winged_cone.h. On
+ * the round earth of the latter, V^2 / r is subtracted from g in dalpha/dt. A rigid vehicle has N_i = psi_i = 0.
  *
  * State x: altitude h (m), velocity V (m/s), angle of attack alpha (rad), pitch angle theta (rad), pitch rate q
  * (rad/s), eta_1 (kg^0.5 m) and its rate, eta_2 and its rate. Input u: equivalence ratio phi (1), elevator delta_e
@@ -36,26 +31,31 @@ typedef struct {
     real lift, drag, thrust, moment, pressure; /* N, N, N, N m, Pa */
 } Forces;
 
-static inline Forces forces(real altitude, real velocity, real alpha, const real *u, const Vehicle *p)
+/* The structures, each a header with its equations. A further one has a number here, a case in the functions below and
+ * an entry in hsv.model.dynamics.STRUCTURES. */
+enum { PARKER, WINGED_CONE };
+#include "parker.h"
+#include "winged_cone.h"
+
+/* All flights of a group of lanes have one structure. */
+static inline int structure(const Vehicle *p) { return (int)lane(p->structure, 0); }
+
+/* Return the forces at an altitude (m), a speed (m/s) and an angle of attack (rad) relative to still air, a pitch rate
+ * (rad/s) and the inputs. */
+static inline Forces forces(real altitude, real velocity, real alpha, real rate, const real *u, const Vehicle *p)
 {
-    const real fuel = u[FUEL], elevator = u[ELEVATOR];
-    const real density =
-        p->reference_density * exponential(-(altitude - p->reference_altitude) / p->density_scale_height);
-    const real pressure = 0.5 * density * velocity * velocity;
-    const real alpha2 = alpha * alpha;
-    Forces f;
-    f.pressure = pressure;
-    f.lift = pressure * p->reference_area * (p->lift_alpha * alpha + p->lift_elevator * elevator + p->lift_zero);
-    f.drag = pressure * p->reference_area *
-             (p->drag_alpha_squared * alpha2 + p->drag_alpha * alpha + p->drag_elevator_squared * elevator * elevator +
-              p->drag_elevator * elevator + p->drag_zero);
-    f.thrust = (p->thrust_beta_1 * fuel + p->thrust_beta_2) * alpha2 * alpha +
-               (p->thrust_beta_3 * fuel + p->thrust_beta_4) * alpha2 +
-               (p->thrust_beta_5 * fuel + p->thrust_beta_6) * alpha + (p->thrust_beta_7 * fuel + p->thrust_beta_8);
-    f.moment = p->thrust_moment_arm * f.thrust + pressure * p->reference_area * p->mean_aerodynamic_chord *
-                                                     (p->moment_alpha_squared * alpha2 + p->moment_alpha * alpha +
-                                                      p->moment_zero + p->moment_elevator * elevator);
-    return f;
+    switch (structure(p)) {
+        case WINGED_CONE: return winged_cone_forces(altitude, velocity, alpha, rate, u, p);
+        default: return parker_forces(altitude, velocity, alpha, u, p);
+    }
+}
+
+/* Return the acceleration of gravity (m/s^2); write its part that a circular path around the planet takes up. */
+static inline real gravity(real altitude, real velocity, const Vehicle *p, real *relief)
+{
+    if (structure(p) == WINGED_CONE) return winged_cone_gravity(altitude, velocity, p, relief);
+    *relief = all(0.0);
+    return p->gravity;
 }
 
 #ifndef COMPLEX
@@ -84,11 +84,12 @@ static inline Forces forces_in(const real *conditions, const real *x, const real
     const AirRelative air =
         air_relative(x[VELOCITY], x[PITCH] - x[ALPHA], conditions[WIND_FORWARD], conditions[WIND_UP]);
     *alpha = x[ALPHA] - air.turn;
-    Forces f = forces(x[ALTITUDE], air.speed, *alpha, u, p);
+    Forces f = forces(x[ALTITUDE], air.speed, *alpha, x[PITCH_RATE], u, p);
     const real moment = conditions[DENSITY] *
                         (f.moment - p->thrust_moment_arm * f.thrust +
                          f.pressure * p->reference_area * p->mean_aerodynamic_chord * conditions[MOMENT_INCREMENT]);
-    f.thrust *= conditions[THRUST_FACTOR]; /* in the model thrust does not depend on density */
+    f.thrust *= conditions[THRUST_FACTOR];
+    if (structure(p) != PARKER) f.thrust *= conditions[DENSITY]; /* Parker's thrust does not depend on density */
     const real lift = f.lift * (conditions[DENSITY] * conditions[LIFT_FACTOR]);
     const real drag = f.drag * (conditions[DENSITY] * conditions[DRAG_FACTOR]);
     f.lift = lift * air.cosine - drag * air.sine;
@@ -103,12 +104,13 @@ static inline Forces forces_in(const real *conditions, const real *x, const real
 static inline void derivative(const real *x, const real *u, const Vehicle *p, const real *conditions, real *out)
 {
     const real velocity = x[VELOCITY], elevator = u[ELEVATOR];
-    real alpha = x[ALPHA];
+    real alpha = x[ALPHA], relief;
 #ifdef COMPLEX
     (void)conditions;
-    const Forces f = forces(x[ALTITUDE], velocity, alpha, u, p);
+    const Forces f = forces(x[ALTITUDE], velocity, alpha, x[PITCH_RATE], u, p);
 #else
-    const Forces f = conditions ? forces_in(conditions, x, u, p, &alpha) : forces(x[ALTITUDE], velocity, alpha, u, p);
+    const Forces f = conditions ? forces_in(conditions, x, u, p, &alpha)
+                                : forces(x[ALTITUDE], velocity, alpha, x[PITCH_RATE], u, p);
 #endif
     const real alpha2 = alpha * alpha;
     const real force_1 =
@@ -133,9 +135,10 @@ static inline void derivative(const real *x, const real *u, const Vehicle *p, co
     sine_cosine(x[ALPHA], &sin_alpha, &cos_alpha);
     sine_cosine(x[PITCH] - x[ALPHA], &sin_path, &cos_path);
     out[ALTITUDE] = velocity * sin_path;
-    out[VELOCITY] = (f.thrust * cos_alpha - f.drag) / p->mass - p->gravity * sin_path;
+    const real weight = gravity(x[ALTITUDE], velocity, p, &relief);
+    out[VELOCITY] = (f.thrust * cos_alpha - f.drag) / p->mass - weight * sin_path;
     out[ALPHA] =
-        (-f.thrust * sin_alpha - f.lift) / (p->mass * velocity) + x[PITCH_RATE] + p->gravity / velocity * cos_path;
+        (-f.thrust * sin_alpha - f.lift) / (p->mass * velocity) + x[PITCH_RATE] + (weight - relief) / velocity * cos_path;
     out[PITCH] = x[PITCH_RATE];
     out[PITCH_RATE] = angular + c_1 * acceleration_1 + c_2 * acceleration_2;
     out[ETA_1] = x[ETA_1_RATE];

@@ -56,5 +56,7 @@ def _largest(parameter: str, given: float | list[float], written: float | list[f
         value, expected = value.reshape(shape), expected.reshape(shape)
     size = np.maximum(np.abs(expected), size if expected.ndim else size[0])
     scaled = np.nan_to_num(np.abs(value - expected) / size, nan=np.inf, posinf=np.inf)
+    if not scaled.size:
+        return Deviation(parameter, 0.0, (), 0.0, 0.0)
     index = tuple(map(int, np.unravel_index(int(np.argmax(scaled)), scaled.shape)))
     return Deviation(parameter, float(scaled[index]), index, float(value[index]), float(expected[index]))

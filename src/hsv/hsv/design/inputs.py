@@ -306,7 +306,7 @@ class DesignInputs(_Table):
     """Registered name, or the path of a file; none: the default one"""
     model: ModelInputs
     actuator: ActuatorInputs | None = None
-    notch: list[NotchInputs] = Field(min_length=1, max_length=4)
+    notch: list[NotchInputs] = Field(default=[], max_length=4)
     feedback: FeedbackInputs
     nominal: NominalInputs
     disturbance: DisturbanceInputs

@@ -201,9 +201,10 @@ def flight_metrics(given: FlightData | FlightCurves) -> dict[str, float]:
             mean = np.ascontiguousarray(curves[2:4, window].T).mean(axis=0)  # summed row by row, in a fixed order
             values["post_fault_attitude_deviation"] = float(np.max(np.abs(curves[2:4, after] - mean[:, None])))
         values["post_fault_attitude_from_nominal"] = float(np.max(tube_error[:, after]))
-        for mode, rate in enumerate(curves[4:6], 1):
-            values[f"elastic_rate_{mode}_decay_time"] = _decay_time(time[after], np.abs(rate[after]))
-        values["elastic_decay_time"] = max(values["elastic_rate_1_decay_time"], values["elastic_rate_2_decay_time"])
+        if curves[4:6].any():  # a rigid vehicle has no elastic states
+            first, second = (_decay_time(time[after], np.abs(rate[after])) for rate in curves[4:6])
+            values["elastic_rate_1_decay_time"], values["elastic_rate_2_decay_time"] = first, second
+            values["elastic_decay_time"] = max(first, second)
     for name, command in zip(("fuel_equivalence_ratio", "elevator_deflection"), curves[6:8], strict=True):
         values[f"{name}_minimum"] = float(np.min(command))
         values[f"{name}_maximum"] = float(np.max(command))

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import islice
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
@@ -27,57 +29,79 @@ _COMPLEX_STEP = 1e-40
 class VehicleParameters(NamedTuple):
     """All constants of the equations of motion and the limits of inputs and angles, SI (kg, m, s, N, rad).
 
-    Coefficients are annotated with their table in a vehicle file, :mod:`hsv.model.vehicle`, and their unit. The shipped
-    vehicles are slices 0.3048 m deep.
+    Coefficients are annotated with their table in a vehicle file, :mod:`hsv.model.vehicle`, and their unit. Those that
+    the structure of a vehicle does not have are zero. Parker's vehicle is a slice 0.3048 m deep.
     """
 
-    mass: Annotated[float, "rigid_body", "kg"]
-    moment_of_inertia: Annotated[float, "rigid_body", "kg m^2"]
-    gravity: Annotated[float, "rigid_body", "m/s^2"]
-    reference_area: Annotated[float, "geometry", "m^2"]
-    mean_aerodynamic_chord: Annotated[float, "geometry", "m"]
-    thrust_moment_arm: Annotated[float, "geometry", "m"]
-    reference_density: Annotated[float, "atmosphere", "kg/m^3"]
-    reference_altitude: Annotated[float, "atmosphere", "m"]
-    density_scale_height: Annotated[float, "atmosphere", "m"]
-    lift_alpha: Annotated[float, "lift", "1"]
-    lift_elevator: Annotated[float, "lift", "1"]
-    lift_zero: Annotated[float, "lift", "1"]
-    drag_alpha_squared: Annotated[float, "drag", "1"]
-    drag_alpha: Annotated[float, "drag", "1"]
-    drag_elevator_squared: Annotated[float, "drag", "1"]
-    drag_elevator: Annotated[float, "drag", "1"]
-    drag_zero: Annotated[float, "drag", "1"]
-    moment_alpha_squared: Annotated[float, "pitching_moment", "1"]
-    moment_alpha: Annotated[float, "pitching_moment", "1"]
-    moment_zero: Annotated[float, "pitching_moment", "1"]
-    moment_elevator: Annotated[float, "pitching_moment", "1"]
-    thrust_beta_1: Annotated[float, "thrust", "N"]
-    thrust_beta_2: Annotated[float, "thrust", "N"]
-    thrust_beta_3: Annotated[float, "thrust", "N"]
-    thrust_beta_4: Annotated[float, "thrust", "N"]
-    thrust_beta_5: Annotated[float, "thrust", "N"]
-    thrust_beta_6: Annotated[float, "thrust", "N"]
-    thrust_beta_7: Annotated[float, "thrust", "N"]
-    thrust_beta_8: Annotated[float, "thrust", "N"]
-    elastic_force_1_alpha_squared: Annotated[float, "elastic_modes", "N/kg^0.5"]
-    elastic_force_1_alpha: Annotated[float, "elastic_modes", "N/kg^0.5"]
-    elastic_force_1_zero: Annotated[float, "elastic_modes", "N/kg^0.5"]
-    elastic_force_2_alpha_squared: Annotated[float, "elastic_modes", "N/kg^0.5"]
-    elastic_force_2_alpha: Annotated[float, "elastic_modes", "N/kg^0.5"]
-    elastic_force_2_elevator: Annotated[float, "elastic_modes", "N/kg^0.5"]
-    elastic_force_2_zero: Annotated[float, "elastic_modes", "N/kg^0.5"]
-    damping_ratio_1: Annotated[float, "elastic_modes", "1"]
-    damping_ratio_2: Annotated[float, "elastic_modes", "1"]
-    natural_frequency_1: Annotated[float, "elastic_modes", "rad/s"]
-    natural_frequency_2: Annotated[float, "elastic_modes", "rad/s"]
-    inertial_coupling_1: float
-    inertial_coupling_2: float
-    fuel_equivalence_ratio_minimum: float
-    fuel_equivalence_ratio_maximum: float
-    elevator_deflection_minimum: float
-    elevator_deflection_maximum: float
-    angle_limit: float
+    mass: Annotated[float, "rigid_body", "kg"] = 0.0
+    moment_of_inertia: Annotated[float, "rigid_body", "kg m^2"] = 0.0
+    gravity: Annotated[float, "rigid_body", "m/s^2"] = 0.0
+    reference_area: Annotated[float, "geometry", "m^2"] = 0.0
+    mean_aerodynamic_chord: Annotated[float, "geometry", "m"] = 0.0
+    thrust_moment_arm: Annotated[float, "geometry", "m"] = 0.0
+    reference_density: Annotated[float, "atmosphere", "kg/m^3"] = 0.0
+    reference_altitude: Annotated[float, "atmosphere", "m"] = 0.0
+    density_scale_height: Annotated[float, "atmosphere", "m"] = 0.0
+    lift_alpha: Annotated[float, "lift", "1"] = 0.0
+    lift_elevator: Annotated[float, "lift", "1"] = 0.0
+    lift_zero: Annotated[float, "lift", "1"] = 0.0
+    drag_alpha_squared: Annotated[float, "drag", "1"] = 0.0
+    drag_alpha: Annotated[float, "drag", "1"] = 0.0
+    drag_elevator_squared: Annotated[float, "drag", "1"] = 0.0
+    drag_elevator: Annotated[float, "drag", "1"] = 0.0
+    drag_zero: Annotated[float, "drag", "1"] = 0.0
+    moment_alpha_squared: Annotated[float, "pitching_moment", "1"] = 0.0
+    moment_alpha: Annotated[float, "pitching_moment", "1"] = 0.0
+    moment_zero: Annotated[float, "pitching_moment", "1"] = 0.0
+    moment_elevator: Annotated[float, "pitching_moment", "1"] = 0.0
+    thrust_beta_1: Annotated[float, "thrust", "N"] = 0.0
+    thrust_beta_2: Annotated[float, "thrust", "N"] = 0.0
+    thrust_beta_3: Annotated[float, "thrust", "N"] = 0.0
+    thrust_beta_4: Annotated[float, "thrust", "N"] = 0.0
+    thrust_beta_5: Annotated[float, "thrust", "N"] = 0.0
+    thrust_beta_6: Annotated[float, "thrust", "N"] = 0.0
+    thrust_beta_7: Annotated[float, "thrust", "N"] = 0.0
+    thrust_beta_8: Annotated[float, "thrust", "N"] = 0.0
+    elastic_force_1_alpha_squared: Annotated[float, "elastic_modes", "N/kg^0.5"] = 0.0
+    elastic_force_1_alpha: Annotated[float, "elastic_modes", "N/kg^0.5"] = 0.0
+    elastic_force_1_zero: Annotated[float, "elastic_modes", "N/kg^0.5"] = 0.0
+    elastic_force_2_alpha_squared: Annotated[float, "elastic_modes", "N/kg^0.5"] = 0.0
+    elastic_force_2_alpha: Annotated[float, "elastic_modes", "N/kg^0.5"] = 0.0
+    elastic_force_2_elevator: Annotated[float, "elastic_modes", "N/kg^0.5"] = 0.0
+    elastic_force_2_zero: Annotated[float, "elastic_modes", "N/kg^0.5"] = 0.0
+    damping_ratio_1: Annotated[float, "elastic_modes", "1"] = 0.0
+    damping_ratio_2: Annotated[float, "elastic_modes", "1"] = 0.0
+    natural_frequency_1: Annotated[float, "elastic_modes", "rad/s"] = 0.0
+    natural_frequency_2: Annotated[float, "elastic_modes", "rad/s"] = 0.0
+    inertial_coupling_1: float = 0.0
+    inertial_coupling_2: float = 0.0
+    fuel_equivalence_ratio_minimum: float = 0.0
+    fuel_equivalence_ratio_maximum: float = 0.0
+    elevator_deflection_minimum: float = 0.0
+    elevator_deflection_maximum: float = 0.0
+    angle_limit: float = 0.0
+    gravitational_parameter: Annotated[float, "planet", "m^3/s^2"] = 0.0
+    planet_radius: Annotated[float, "planet", "m"] = 0.0
+    sound_speed_curvature: Annotated[float, "atmosphere", "m^-1 s^-1"] = 0.0
+    sound_speed_slope: Annotated[float, "atmosphere", "s^-1"] = 0.0
+    sound_speed_zero: Annotated[float, "atmosphere", "m/s"] = 0.0
+    lift_alpha_mach: Annotated[float, "lift", "1"] = 0.0
+    drag_scale: Annotated[float, "drag", "1"] = 0.0
+    drag_mach_squared: Annotated[float, "drag", "1"] = 0.0
+    drag_mach: Annotated[float, "drag", "1"] = 0.0
+    thrust_scale: Annotated[float, "thrust", "1"] = 0.0
+    thrust_mach: Annotated[float, "thrust", "1"] = 0.0
+    thrust_fuel: Annotated[float, "thrust", "1"] = 0.0
+    moment_scale: Annotated[float, "pitching_moment", "1"] = 0.0
+    moment_mach: Annotated[float, "pitching_moment", "1"] = 0.0
+    moment_mach_decay: Annotated[float, "pitching_moment", "1"] = 0.0
+    damping_mach: Annotated[float, "pitch_damping", "1"] = 0.0
+    damping_mach_zero: Annotated[float, "pitch_damping", "1"] = 0.0
+    damping_alpha_squared: Annotated[float, "pitch_damping", "1"] = 0.0
+    damping_alpha: Annotated[float, "pitch_damping", "1"] = 0.0
+    damping_zero: Annotated[float, "pitch_damping", "1"] = 0.0
+    structure: float = 0.0
+    """The code of the structure in the core, which is its place in :data:`STRUCTURES`."""
 
     @property
     def input_minimum(self) -> np.ndarray:
@@ -89,6 +113,11 @@ class VehicleParameters(NamedTuple):
         """Largest fuel equivalence ratio and elevator deflection (rad): the upper bounds of U (paper eq. 29)."""
         return np.array([self.fuel_equivalence_ratio_maximum, self.elevator_deflection_maximum])
 
+    @property
+    def form(self) -> Structure:
+        """The structure of the vehicle."""
+        return [*STRUCTURES.values()][int(self.structure)]
+
     def decoupled(self) -> VehicleParameters:
         """Return the decoupled model (paper eq. 4): the coupled one without inertial coupling."""
         return self._replace(inertial_coupling_1=0.0, inertial_coupling_2=0.0)
@@ -99,10 +128,12 @@ class VehicleParameters(NamedTuple):
         Raises:
             QuantityError: An unknown parameter, or a change that is not finite or not above -100 %.
         """
-        changes = {}
+        changes, names = {}, self.form.names
         for name, change in perturbation.items():
-            if name not in COEFFICIENT_UNITS:
-                expected = one_of(COEFFICIENT_UNITS, name)
+            if name not in names and name in COEFFICIENT_UNITS and change == 0.0:
+                continue
+            if name not in names:
+                expected = one_of(names, name)
                 raise QuantityError(f"perturbation.{name} = {change!r}: no such parameter, expected {expected}")
             if not (math.isfinite(change) and change > -1.0):
                 raise QuantityError(f"perturbation.{name} = {change!r}: expected a finite relative change above -1")
@@ -110,27 +141,60 @@ class VehicleParameters(NamedTuple):
         return self._replace(**changes)
 
 
-COEFFICIENTS: dict[str, dict[str, str]] = {}
-"""SI units of the coefficients of the equations of motion, by the tables of a vehicle file."""
-for _name, _hint in get_type_hints(VehicleParameters, include_extras=True).items():
-    if _hint is not float:
-        _table, _unit = _hint.__metadata__
-        COEFFICIENTS.setdefault(_table, {})[_name] = _unit
+_PLACES: dict[str, tuple[str, str]] = {
+    name: hint.__metadata__
+    for name, hint in get_type_hints(VehicleParameters, include_extras=True).items()
+    if hint is not float
+}
+"""Table in a vehicle file, and SI unit, of every coefficient."""
 
-COEFFICIENT_UNITS = {name: unit for table in COEFFICIENTS.values() for name, unit in table.items()}
-"""All of them, in the order of :class:`VehicleParameters`, which ends with inertial coupling and limits."""
+COEFFICIENT_UNITS = {name: unit for name, (_, unit) in _PLACES.items()}
+"""SI units of all coefficients, in the order of :class:`VehicleParameters`."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The form of the equations of motion: its coefficients, and whether the body bends.
+
+    The nine states are those of an elastic vehicle. A rigid one keeps the elastic states in their places, at rest.
+    """
+
+    names: tuple[str, ...]
+    elastic: bool
+
+    @cached_property
+    def tables(self) -> dict[str, dict[str, str]]:
+        """SI units of the coefficients by the tables of a vehicle file."""
+        found: dict[str, dict[str, str]] = {}
+        for name in self.names:
+            table, unit = _PLACES[name]
+            found.setdefault(table, {})[name] = unit
+        return found
+
+
+STRUCTURES = {
+    "parker": Structure((*islice(_PLACES, [*_PLACES].index("gravitational_parameter")),), elastic=True),
+    "winged_cone": Structure(
+        (
+            *("mass", "moment_of_inertia", "reference_area", "mean_aerodynamic_chord"),
+            *("reference_density", "reference_altitude", "density_scale_height", "lift_alpha"),
+            *("drag_alpha_squared", "drag_alpha"),
+            *("moment_alpha_squared", "moment_alpha", "moment_zero", "moment_elevator"),
+            *islice(_PLACES, [*_PLACES].index("gravitational_parameter"), None),
+        ),
+        elastic=False,
+    ),
+}
+"""All structures by name, in the order of their codes in ``core/vehicle.h``; the first is the default."""
+
+AT_REST = {"damping_ratio_1": 1.0, "damping_ratio_2": 1.0, "natural_frequency_1": 20.0, "natural_frequency_2": 20.0}
+"""Modes (1, rad/s) in the places of the elastic states of a rigid vehicle: damped, and excited by nothing."""
 
 POSITIVE = frozenset(
     {
-        "mass",
-        "moment_of_inertia",
-        "gravity",
-        "reference_area",
-        "mean_aerodynamic_chord",
-        "reference_density",
-        "density_scale_height",
-        "natural_frequency_1",
-        "natural_frequency_2",
+        *("mass", "moment_of_inertia", "gravity", "reference_area", "mean_aerodynamic_chord"),
+        *("reference_density", "density_scale_height", "natural_frequency_1", "natural_frequency_2"),
+        *("gravitational_parameter", "planet_radius", "sound_speed_zero", "moment_mach_decay"),
     }
 )
 """Coefficients that are above zero in any vehicle."""

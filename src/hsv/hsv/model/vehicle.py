@@ -1,4 +1,4 @@
-"""Vehicles as files: coefficients, elastic modes, inertial coupling, envelope, uncertainty and limits in one TOML.
+"""Vehicles as files: structure, coefficients, elastic modes, inertial coupling, envelope, uncertainty and limits.
 
 Every quantity carries its unit. A package registers its files as entry points of the group ``hsv.vehicles``; in
 ``pyproject.toml``::
@@ -29,17 +29,20 @@ from hsv.base.errors import DocumentError, HsvError, ParameterError, QuantityErr
 from hsv.base.files import EXTENDS, Tables, follow_extends, is_path, parse_toml, read_text
 from hsv.base.parameters import Parameter, validate
 from hsv.base.units import UnitSystem, parse_quantity, readable
-from hsv.model.dynamics import COEFFICIENT_UNITS, COEFFICIENTS, POSITIVE, VehicleParameters
+from hsv.model.dynamics import AT_REST, COEFFICIENT_UNITS, POSITIVE, STRUCTURES, VehicleParameters
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS
 
 GROUP = "hsv.vehicles"
 """The entry points of vehicles, ``package:file.toml`` each."""
 
-SHIPPED_VEHICLES = {name: f"hsv.model:vehicles/{name}.toml" for name in ("parker", "stiffened")}
+SHIPPED_VEHICLES = {name: f"hsv.model:vehicles/{name}.toml" for name in ("parker", "stiffened", "winged_cone")}
 """Files of this library by name; others are entry points."""
 
 DEFAULT_VEHICLE = "parker"
 """The paper's vehicle, the default."""
+
+DEFAULT_STRUCTURE = next(iter(STRUCTURES))
+"""Structure of the vehicles whose file names none."""
 
 DERIVED = "derived"
 """The set of inertial coupling of which a number is a multiple."""
@@ -64,6 +67,7 @@ COUPLING_PARAMETER = Parameter(
 
 VEHICLE_PARAMETERS = (
     Parameter("vehicle.name", DEFAULT_VEHICLE, "name of the vehicle, which provides the values that are not given"),
+    Parameter("vehicle.structure", DEFAULT_STRUCTURE, "form of the equations of motion", choices=tuple(STRUCTURES)),
     *(
         Parameter(f"vehicle.{name}", 0.0, name.replace("_", " "), "" if unit == "1" else unit)
         for name, unit in COEFFICIENT_UNITS.items()
@@ -110,7 +114,7 @@ class Vehicle:
         """
         p = self.decoupled
         units = {**COEFFICIENT_UNITS, "angle_limit": "rad"}
-        for name in (*POSITIVE, "angle_limit", *_DAMPING):
+        for name in (name for name in (*POSITIVE, "angle_limit", *_DAMPING) if name in (*p.form.names, "angle_limit")):
             value, undamped = getattr(p, name), name in _DAMPING
             if value < 0.0 or (value == 0.0 and not undamped):
                 expected = "at least 0" if undamped else "above zero"
@@ -132,7 +136,7 @@ class Vehicle:
                     f"sum is at most {p.moment_of_inertia:.6g} kg m^2, the moment of inertia"
                 )
         for name, bound in self.uncertainty.items():
-            if name not in COEFFICIENT_UNITS:
+            if name not in p.form.names:
                 raise QuantityError(f"uncertainty.names: {name!r}, expected names of coefficients")
             if not 0.0 <= bound <= MAX_UNCERTAINTY:
                 raise QuantityError(f"{name}: uncertainty = {bound}: expected 0 to {MAX_UNCERTAINTY:g}")
@@ -141,6 +145,11 @@ class Vehicle:
                 f"uncertainty: of {len(self.uncertainty)} coefficients, expected at most {MAX_UNCERTAIN}: a design "
                 "flies every corner of their bounds"
             )
+
+    @property
+    def structure(self) -> str:
+        """Name of the form of the equations of motion."""
+        return [*STRUCTURES][int(self.decoupled.structure)]
 
     @property
     def centre(self) -> tuple[float, float]:
@@ -157,7 +166,7 @@ class Vehicle:
         Raises:
             QuantityError: No such set, or no number from 0 to :data:`MAX_COUPLING`.
         """
-        if coupling == "":
+        if coupling == "" or not self.decoupled.form.elastic:
             return next(iter(self.couplings))
         if isinstance(coupling, str) and coupling in self.couplings:
             return coupling
@@ -204,7 +213,8 @@ class Vehicle:
         p = self.decoupled
         return {
             "vehicle.name": self.name,
-            **{f"vehicle.{name}": getattr(p, name) for name in COEFFICIENT_UNITS},
+            "vehicle.structure": self.structure,
+            **{f"vehicle.{name}": getattr(p, name) for name in p.form.names},
             "vehicle.coupling_sets.names": list(self.couplings),
             "vehicle.coupling_sets.values": [psi for pair in self.couplings.values() for psi in pair],
             "vehicle.altitude_range": list(self.altitude_range),
@@ -224,7 +234,10 @@ class Vehicle:
             ParameterError: A wrong value, named.
             VehicleError: Some are missing, and there is no vehicle of that name.
         """
-        if lacking := [parameter.name for parameter in VEHICLE_PARAMETERS if parameter.name not in values]:
+        form = STRUCTURES.get(str(values.get("vehicle.structure", DEFAULT_STRUCTURE)), STRUCTURES[DEFAULT_STRUCTURE])
+        optional = {"vehicle.structure", *(f"vehicle.{name}" for name in COEFFICIENT_UNITS if name not in form.names)}
+        needed = (parameter.name for parameter in VEHICLE_PARAMETERS if parameter.name not in optional)
+        if lacking := [name for name in needed if name not in values]:
             # Parameters may come from an untrusted bag or certificate: a path in them is not opened.
             if is_path(name := str(values.get("vehicle.name", DEFAULT_VEHICLE))):
                 raise ParameterError(f"parameter {lacking[0]}: missing, expected that of the vehicle {name!r}")
@@ -241,7 +254,13 @@ class Vehicle:
             return cls(
                 name=v["name"],
                 title="",
-                decoupled=_parameters({name: v[name] for name in COEFFICIENT_UNITS}, low, high, v["angle_limit"]),
+                decoupled=_parameters(
+                    v["structure"],
+                    {name: v[name] for name in STRUCTURES[v["structure"]].names},
+                    low,
+                    high,
+                    v["angle_limit"],
+                ),
                 couplings=dict(zip(sets, zip(psi[::2], psi[1::2], strict=True), strict=True)),
                 altitude_range=(float(v["altitude_range"][0]), float(v["altitude_range"][1])),
                 velocity_range=(float(v["velocity_range"][0]), float(v["velocity_range"][1])),
@@ -260,6 +279,8 @@ class Vehicle:
 def _digest(vehicle: Vehicle) -> str:
     values = vehicle.to_parameters()
     del values["vehicle.name"]
+    if vehicle.structure == DEFAULT_STRUCTURE:  # the only one when the first designs were certified
+        del values["vehicle.structure"]
     return hashlib.sha256(json.dumps(values).encode()).hexdigest()
 
 
@@ -358,13 +379,18 @@ def parse_vehicle(tables: Mapping[str, Any], name: str) -> Vehicle:
 
 
 def _parsed(tables: Mapping[str, Any], name: str) -> Vehicle:
-    _refuse_unknown(tables, ("title", *COEFFICIENTS, "inertial_coupling", "envelope", "input_limits"))
+    structure = tables.get("structure", DEFAULT_STRUCTURE)
+    if structure not in STRUCTURES:
+        raise QuantityError(f"structure = {structure!r}: expected {one_of(STRUCTURES, str(structure))}")
+    form = STRUCTURES[structure]
+    elastic = ("inertial_coupling",) if form.elastic else ()
+    _refuse_unknown(tables, ("title", "structure", *form.tables, *elastic, "envelope", "input_limits"))
     title = tables.get("title", "")
     if not isinstance(title, str) or (not title.strip() and "title" in tables):
         raise QuantityError(f"title = {title!r}: expected a text that is not empty")
     coefficients: dict[str, float] = {}
     uncertainty: dict[str, float] = {}
-    for section, units in COEFFICIENTS.items():
+    for section, units in form.tables.items():
         table = _table(tables, section, units)
         for coefficient, unit in units.items():
             field = f"{section}.{coefficient}"
@@ -383,8 +409,8 @@ def _parsed(tables: Mapping[str, Any], name: str) -> Vehicle:
     return Vehicle(
         name=name,
         title=title,
-        decoupled=_parameters(coefficients, low, high, angle_limit),
-        couplings=_couplings(tables),
+        decoupled=_parameters(structure, coefficients, low, high, angle_limit),
+        couplings=_couplings(tables) if form.elastic else {DERIVED: (0.0, 0.0)},
         altitude_range=ranges["altitude"],
         velocity_range=ranges["velocity"],
         uncertainty=uncertainty,
@@ -392,17 +418,13 @@ def _parsed(tables: Mapping[str, Any], name: str) -> Vehicle:
 
 
 def _parameters(
-    coefficients: Mapping[str, float], low: Iterable[float], high: Iterable[float], angle_limit: float
+    structure: str, coefficients: Mapping[str, float], low: Iterable[float], high: Iterable[float], angle_limit: float
 ) -> VehicleParameters:
     ends = {"minimum": low, "maximum": high}
     limits = {f"{name}_{end}": n for end, row in ends.items() for name, n in zip(INPUT_NAMES, row, strict=True)}
-    return VehicleParameters(
-        **coefficients,
-        inertial_coupling_1=0.0,
-        inertial_coupling_2=0.0,
-        **limits,
-        angle_limit=angle_limit,
-    )
+    places = {} if STRUCTURES[structure].elastic else AT_REST
+    code = float([*STRUCTURES].index(structure))
+    return VehicleParameters(**coefficients, **places, **limits, structure=code, angle_limit=angle_limit)
 
 
 def _couplings(tables: Mapping[str, Any]) -> dict[str, tuple[float, float]]:

@@ -215,6 +215,10 @@ def _envelopes(results: Results, flights: Mapping[str, Flight], numbers: Numbers
     windows, time, reached, _ = _windows(results)
     x, flight_x = numbers.add(time[reached]), numbers.add(time)
     for index, (name, unit) in enumerate(SIGNALS):
+        if name.startswith("elastic") and not (
+            envelope.low[reached, index].any() or envelope.high[reached, index].any()
+        ):
+            continue  # a rigid vehicle has no elastic states
         curves = [
             {"kind": kind, "label": label, "run": None, "x": x, "y": numbers.add(values[reached, index])}
             for kind, label, values in (

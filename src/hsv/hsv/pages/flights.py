@@ -41,7 +41,9 @@ class FlightCurves:
     curves: dict[str, list[DrawnCurve]] = field(default_factory=dict)
 
     def add(self, panel: Panel, *curves: DrawnCurve) -> None:
-        """Add a panel with its curves."""
+        """Add a panel with its curves; none of elastic states that rest, which a rigid vehicle has."""
+        if panel.group == "elastic" and not any(curve.y.any() for curve in curves):
+            return
         self.panels[panel.name] = panel
         self.curves[panel.name] = list(curves)
 

@@ -29,17 +29,25 @@ _REMARK_WIDTH = 130
 
 
 def flight_figure(flights: Mapping[str, FlightData], system: UnitSystem, remarks: Sequence[str] = ()) -> Figure:
-    """Return eight panels over time, one curve per flight; dotted: the reference, shaded: from the first fault on.
+    """Return panels over time, one curve per flight; dotted: the reference, shaded: from the first fault on.
+
+    There are eight, or six where every vehicle is rigid, so that its elastic states rest.
 
     Args:
         flights: The flights by label.
         system: Units that are drawn.
         remarks: Remarks on the flights, such as missing steps, printed above the panels.
     """
+    moving = [
+        (title, unit, group, column)
+        for title, unit, group, column in _PANELS
+        if not title.startswith("elastic") or any(flight.state[:, column].any() for flight in flights.values())
+    ]
+    rows = (len(moving) + 1) // 2
     with matplotlib.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
-        figure = Figure(figsize=(10, 9), layout="constrained")
-        axes = figure.subplots(4, 2, sharex=True).ravel()
-        for axis, (title, unit, group, column) in zip(axes, _PANELS, strict=True):
+        figure = Figure(figsize=(10, 2.25 * rows), layout="constrained")
+        axes = figure.subplots(rows, 2, sharex=True).ravel()
+        for axis, (title, unit, group, column) in zip(axes, moving, strict=True):
             factor, shown = in_system(1.0, unit, system)
             for name, flight in flights.items():
                 axis.plot(flight.time, factor * getattr(flight, group)[:, column], linewidth=1.1, label=name)

@@ -1,0 +1,122 @@
+"""The Winged-Cone: the numbers of the literature, and a rigid vehicle in the places of an elastic one."""
+
+import numpy as np
+import pytest
+
+from hsv.base.errors import QuantityError
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
+from hsv.model.dynamics import advance, derivative, forces, jacobian
+from hsv.model.trim import trim
+from hsv.model.vehicle import Vehicle, load_vehicle
+
+FOOT = 0.3048
+CRUISE = 110_000 * FOOT, 15_060 * FOOT
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    """The vehicle's parameters."""
+    return load_vehicle("winged_cone").coupled()
+
+
+def test_it_trims_in_cruise_as_the_equations_say_and_not_as_the_rounded_trim_that_was_printed(vehicle):
+    point = trim(vehicle, *CRUISE)
+    assert point.residual < 1e-12
+    assert np.degrees(point.state[2]) == pytest.approx(1.789, abs=5e-4)
+    assert point.input[0] == pytest.approx(0.1762, abs=5e-5)
+    assert np.degrees(point.input[1]) == pytest.approx(-0.398, abs=5e-4)
+
+
+def test_its_poles_in_cruise_are_those_of_an_unstable_short_period_and_a_slow_phugoid(vehicle):
+    point = trim(vehicle, *CRUISE)
+    A, _ = jacobian(point.state, point.input, vehicle)
+    poles = np.sort_complex(np.linalg.eigvals(A[:5, :5]))
+    expected = np.sort_complex(np.array([-0.827, 0.715, 0.0276j, -0.0276j, 0.0005]))
+    assert poles == pytest.approx(expected, abs=6e-4)
+    assert not A[:5, 5:].any() and not A[5:, :5].any()
+
+
+def test_its_coefficients_at_mach_15_are_the_constant_set_of_the_literature_to_the_printed_digits(vehicle):
+    # Xu, Mirmirani, Ioannou (2004), per dynamic pressure and area. The altitude makes the speed exactly Mach 15.
+    altitude = CRUISE[0]
+    feet = altitude / FOOT
+    speed = 15.0 * FOOT * (8.99e-9 * feet**2 - 9.16e-4 * feet + 996.0)
+
+    def coefficients(alpha, fuel=0.0, elevator=None, rate=0.0):
+        state = np.array([altitude, speed, alpha, alpha, rate, 0.0, 0.0, 0.0, 0.0])
+        lift, drag, thrust, moment, pressure = forces(
+            state, np.array([fuel, alpha if elevator is None else elevator]), vehicle
+        )
+        area = pressure * vehicle.reference_area
+        return lift / area, drag / area, thrust / area, moment / (area * vehicle.mean_aerodynamic_chord)
+
+    polynomial = np.array([coefficients(alpha) for alpha in (-0.05, 0.0, 0.05)])
+    zero, first, second = (
+        polynomial[1],
+        (polynomial[2] - polynomial[0]) / 0.1,
+        (polynomial[2] - 2.0 * polynomial[1] + polynomial[0]) / 0.005,
+    )
+    assert first[0] == pytest.approx(0.6203, abs=5e-5) and zero[0] == 0.0
+    drag, moment = ((second[i], first[i], zero[i]) for i in (1, 3))
+    assert drag == pytest.approx((0.6450, 0.0043378, 0.003772), abs=5e-5)
+    assert moment == pytest.approx((-0.035, 0.036617, 5.3261e-6), abs=5e-5)
+    assert coefficients(0.0, fuel=1.0)[2] == pytest.approx(0.02576, abs=5e-6)
+    assert coefficients(0.0, fuel=2.0)[2] - coefficients(0.0, fuel=1.0)[2] == pytest.approx(0.00336, abs=5e-6)
+    assert coefficients(0.0, elevator=0.1)[3] - zero[3] == pytest.approx(0.00292, abs=1e-12)
+    damping = (coefficients(0.0, rate=0.01)[3] - zero[3]) / (vehicle.mean_aerodynamic_chord * 0.01 / (2.0 * speed))
+    assert damping == pytest.approx(-0.2289, abs=5e-5)
+
+
+def test_its_weight_in_cruise_is_relieved_by_a_third_because_the_earth_is_round(vehicle):
+    h, v = CRUISE
+    lifted = forces(trim(vehicle, h, v).state, trim(vehicle, h, v).input, vehicle)
+    radius = vehicle.planet_radius + h
+    gravity = vehicle.gravitational_parameter / radius**2
+    assert v * v / radius / gravity == pytest.approx(0.34, abs=5e-3)
+    alpha = trim(vehicle, h, v).state[2]
+    assert lifted[0] + lifted[2] * np.sin(alpha) == pytest.approx(vehicle.mass * (gravity - v * v / radius), rel=1e-9)
+
+
+def test_derivatives_by_the_complex_step_agree_with_differences_on_both_sides_of_a_full_fuel_ratio(vehicle):
+    point = trim(vehicle, *CRUISE)
+    for fuel in (0.4, 1.2):
+        u = np.array([fuel, point.input[1]])
+        A, B = jacobian(point.state, u, vehicle)
+        for matrix, at, moved in ((A, point.state, 0), (B, u, 1)):
+            for j in range(5 if moved == 0 else 2):
+                step = 1e-4 * max(abs(at[j]), 1e-2)
+                ends = []
+                for sign in (1.0, -1.0):
+                    x, v = point.state.copy(), u.copy()
+                    (x, v)[moved][j] += sign * step
+                    ends.append(derivative(x, v, vehicle))
+                assert (ends[0] - ends[1]) / (2.0 * step) == pytest.approx(matrix[:, j], rel=1e-5, abs=1e-7)
+
+
+def test_a_rigid_vehicle_keeps_its_elastic_states_at_rest(vehicle):
+    point = trim(vehicle, *CRUISE)
+    assert not point.state[5:].any()
+    x = advance(point.state, point.input + np.array([0.1, 0.02]), vehicle, 0.02, 2)
+    assert x[4] > 0.0 and not x[5:].any()  # a positive elevator deflection raises the nose, as published
+
+
+def test_its_flight_has_no_metric_of_modes_and_stays_in_the_certified_tube():
+    flight = fly(assemble_flight(load_scenario("winged_cone")))
+    assert not any(name.startswith("elastic") for name in flight.metrics)
+    limits = load_scenario("winged_cone").limits
+    assert all(abs(flight.metrics[name]) <= limit for name, limit in limits.items())
+
+
+def test_parameters_of_another_structure_are_refused_and_perturbations_of_it_are_named():
+    named = load_vehicle("winged_cone")
+    values = named.to_parameters()
+    assert "vehicle.thrust_beta_1" not in values and values["vehicle.structure"] == "winged_cone"
+    again = Vehicle.from_parameters(values)
+    assert again.to_parameters() == values and again.digest == named.digest
+    assert Vehicle.from_parameters({"vehicle.name": "winged_cone"}).to_parameters() == values
+    with pytest.raises(
+        QuantityError, match=r"perturbation.thrust_beta_1 = 0.1: no such parameter, expected one of mass"
+    ):
+        named.decoupled.perturbed({"thrust_beta_1": 0.1})
