@@ -65,7 +65,7 @@ EXACT_NUMPY = {
     *("full", "eye", "arange", "broadcast_to", "stack", "concatenate", "column_stack", "reshape", "ravel", "copy"),
     "split",
     *("abs", "sqrt", "floor", "clip", "minimum", "maximum", "max", "min", "argmax", "argmin", "ptp", "round", "diff"),
-    "outer",
+    *("outer", "sort"),
     "iscomplexobj",
     *("all", "any", "isfinite", "isnan", "where", "flatnonzero", "searchsorted", "array_equal", "count_nonzero"),
 }

@@ -130,9 +130,9 @@ class Flight:
 
 def step_statistics(seconds: Sequence[float]) -> dict[str, float]:
     """Return median, 99th percentile and maximum of wall times, in ms, by the nearest rank."""
-    ordered = sorted(seconds)
+    ordered = np.sort(seconds)
     shares = {"median_ms": 0.5, "p99_ms": 0.99, "max_ms": 1.0}
-    return {name: 1e3 * ordered[round(share * (len(ordered) - 1))] for name, share in shares.items()}
+    return {name: 1e3 * float(ordered[round(share * (len(ordered) - 1))]) for name, share in shares.items()}
 
 
 def step_times_in_words(step_times: dict[str, Any]) -> str:
