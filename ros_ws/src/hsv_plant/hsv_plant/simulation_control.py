@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
 _FEATURES = [
     SimulatorFeatures.SIMULATION_RESET,
-    SimulatorFeatures.SIMULATION_RESET_TIME,
-    SimulatorFeatures.SIMULATION_RESET_STATE,
     SimulatorFeatures.SIMULATION_STATE_GETTING,
     SimulatorFeatures.SIMULATION_STATE_SETTING,
     SimulatorFeatures.SIMULATION_STATE_PAUSE,
