@@ -57,6 +57,8 @@ def last_is_new() -> bool:
 told: dict[str, Any] = {"features": list(call(srv.GetSimulatorFeatures).features.features)}
 told["at first"] = call(srv.GetSimulationState).state.state
 told["pause while stopped"] = go(SimulationState.STATE_PAUSED)
+told["steps at first"] = call(srv.StepSimulation, steps=1000).result.result
+told["play while steps are flown"] = go(SimulationState.STATE_PLAYING)
 told["play"] = go(SimulationState.STATE_PLAYING)
 told["step while playing"] = call(srv.StepSimulation, steps=1).result.result
 while not seen or seen[-1].step < 20:

@@ -67,7 +67,8 @@ class SimulationControl:
         if target not in _NAMES:
             expected = ", ".join(f"{number} ({name})" for number, name in _NAMES.items())
             return _answered(response, Result.RESULT_FEATURE_UNSUPPORTED, f"state = {target}: expected {expected}")
-        if target == state:
+        steps_are_flown = target == SimulationState.STATE_PLAYING and self._plant.values["paused"]
+        if target == state and not steps_are_flown:
             return _answered(response, kinds.ALREADY_IN_TARGET_STATE, f"the flight is {_NAMES[state]} already")
         if (state, target) == (SimulationState.STATE_STOPPED, SimulationState.STATE_PAUSED):
             return _answered(response, kinds.INCORRECT_TRANSITION, "a stopped flight cannot be paused, only played")
