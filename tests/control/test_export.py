@@ -25,7 +25,7 @@ import hsv.core
 from hsv.base.errors import DesignError
 from hsv.control.controller import ControllerInput
 from hsv.control.design import find_design, read_design
-from hsv.control.export import CORE_HEADERS, NUMBERS, controller_files, design_header, step_bounds
+from hsv.control.export import NUMBERS, controller_files, design_header, step_bounds
 from hsv.control.library import load_block
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.notch_filter import NotchFilter
@@ -166,7 +166,7 @@ def test_the_law_answers_the_same_bits(built, rate):
 def test_its_headers_are_those_that_the_core_is_built_from():
     written = controller_files(DESIGNS["baseline"])
     core = Path(hsv.core.__file__).parent
-    for name in CORE_HEADERS:
+    for name in {*written} - {"controller.c", NUMBERS, "hsv_block.h"}:
         assert written[name] == (core / name).read_text(encoding="utf-8")
     included = set(re.findall(r'^#include "(.*)"$', "".join(written.values()), re.MULTILINE))
     assert {*written} == included | {"controller.c"}

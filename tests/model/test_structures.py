@@ -41,10 +41,12 @@ elevator_deflection = { minimum = "-25 deg", maximum = "25 deg" }
 FLY = """
 from hsv.model.dynamics import advance
 from hsv.model.trim import trim
-from hsv.model.vehicle import load_vehicle
+from hsv.model.vehicle import load_vehicle, vehicle_names
 vehicle = load_vehicle("glider.toml").coupled()
 point = trim(vehicle, 1000.0, 40.0)
 x = advance(point.state, point.input, vehicle, 1.0, 100)
+for name in vehicle_names():
+    load_vehicle(name)
 print(point.residual, abs(x - point.state)[:2].max(), load_vehicle().digest == "")
 """
 

@@ -18,7 +18,7 @@ from hsv.bags.description import CONTROLLER, CONTROLLERS
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.base.errors import DesignError, ParameterError
 from hsv.base.parameters import Parameter
-from hsv.model.vehicle import VEHICLE_PARAMETERS, named_parameters
+from hsv.model.vehicle import VEHICLE_PARAMETERS, missing_parameters, named_parameters
 
 if TYPE_CHECKING:
     from hsv.control.design import ControlDesign
@@ -79,11 +79,8 @@ def declare_vehicle(node: Node) -> None:
     A parameter that is not given has the value of the vehicle named by ``vehicle.name``.
     """
     # Skip the look-up for a vehicle that is given completely, because importing the units takes time.
-    if all(given(node, parameter.name) for parameter in VEHICLE_PARAMETERS):
-        declare(node, VEHICLE_PARAMETERS)
-        return
-    name = {name: node._parameter_overrides[name].value for name in ("vehicle.name",) if given(node, name)}
-    declare(node, VEHICLE_PARAMETERS, named_parameters(name))
+    overrides = {p.name: node._parameter_overrides[p.name].value for p in VEHICLE_PARAMETERS if given(node, p.name)}
+    declare(node, VEHICLE_PARAMETERS, named_parameters(overrides) if missing_parameters(overrides) else None)
 
 
 def declare_design(node: Node, extra: tuple[Parameter, ...] = ()) -> tuple[dict[str, Any], ControlDesign | None]:

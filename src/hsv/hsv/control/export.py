@@ -22,7 +22,6 @@ from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES
 SOURCE = "controller.c"
 NUMBERS = "design.h"
 HEADER = "hsv_block.h"
-CORE_HEADERS = ("core.h", "vehicle_fields.h", "real.h", "notch_filter.h", "nominal.h", "tube_law.h")
 _COUNTS = ("multiplications", "additions", "comparisons", "numbers of state")
 
 
@@ -46,13 +45,20 @@ def controller_files(design: ControlDesign) -> dict[str, str]:
     """
     if design.tube is None:
         raise DesignError(f"design {design.name!r}: parameter tube.shape: empty, expected a design with a tube")
-    core = files("hsv.core")
-    return {
-        SOURCE: files("hsv.control").joinpath("export.c").read_text(encoding="utf-8"),
-        NUMBERS: design_header(design),
-        HEADER: (include_folder() / HEADER).read_text(encoding="utf-8"),
-        **{name: core.joinpath(name).read_text(encoding="utf-8") for name in CORE_HEADERS},
-    }
+    source = files("hsv.control").joinpath("export.c").read_text(encoding="utf-8")
+    header = (include_folder() / HEADER).read_text(encoding="utf-8")
+    return {SOURCE: source, NUMBERS: design_header(design), HEADER: header, **core_headers(source)}
+
+
+def core_headers(source: str) -> dict[str, str]:
+    """Return the texts, by name, of the headers of the core that ``source`` includes, directly or not."""
+    found: dict[str, str] = {}
+    for name in re.findall(r'^#include "(.+)"$', source, re.MULTILINE):
+        header = files("hsv.core").joinpath(name)
+        if header.is_file():
+            text = header.read_text(encoding="utf-8")
+            found |= {name: text, **core_headers(text)}
+    return found
 
 
 def exported_controller(design: ControlDesign) -> ExportedBlock:

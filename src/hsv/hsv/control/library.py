@@ -128,7 +128,7 @@ def load_block(path: Path, symbol: str) -> CBlock:
 
 def _signals(count: int, signals: Any, kind: str) -> tuple[SignalType, ...]:
     return tuple(
-        SignalType(_name(s.name, f"{field}.name"), _text(s.unit, f"{field}.unit"), _size(s.size, f"{field}.size"))
+        SignalType(_name(s.name, f"{field}.name"), _text(s.unit, f"{field}.unit"), _size(s.size, f"{field}.size", 0))
         for field, s in _entries(count, signals, kind)
     )
 

@@ -73,7 +73,7 @@ static int32_t step_vehicle(int64_t k, const double *in, double *out, double *st
     *status = !in_model_range(m.x, plant_data.vehicle.angle_limit) ? 2.0 : k >= FINAL_STEP ? 1.0 : 0.0;
     const Vehicle *vehicle = (const Vehicle *)&plant_data.vehicle;
     const Forces f = is_calm(&plant_data, &faults)
-                         ? forces(m.x[ALTITUDE], m.x[VELOCITY], alpha, m.effector, vehicle)
+                         ? forces(m.x[ALTITUDE], m.x[VELOCITY], alpha, m.x[PITCH_RATE], m.effector, vehicle)
                          : forces_in(m.conditions, m.x, m.effector, vehicle, &alpha);
     felt[0] = f.lift, felt[1] = f.drag, felt[2] = f.thrust, felt[3] = f.moment, felt[4] = f.pressure;
     memcpy(effector, m.effector, sizeof m.effector);

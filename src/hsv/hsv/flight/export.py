@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-from hsv.control.export import HEADER, constant, constant_array
+from hsv.control.export import HEADER, constant, constant_array, core_headers
 from hsv.control.fmu_export import ExportedBlock
 from hsv.control.library import include_folder
 from hsv.flight.assembly import assemble_flight
@@ -16,10 +16,6 @@ from hsv.model.signals import COMMAND, numbers_of
 
 SOURCE = "vehicle.c"
 NUMBERS = "scenario.h"
-_HEADERS = (
-    *("core.h", "vehicle_fields.h", "real.h", "elementary.h", "noise.h", "vehicle.h", "plant.h"),
-    *("actuators.h", "atmosphere.h", "faults.h", "links.h", "sensors.h"),
-)
 
 
 def exported_vehicle(scenario: Scenario) -> ExportedBlock:
@@ -28,14 +24,11 @@ def exported_vehicle(scenario: Scenario) -> ExportedBlock:
     Raises:
         ScenarioError: The scenario cannot be flown.
     """
-    components, core = assemble_flight(scenario), files("hsv.core")
+    components = assemble_flight(scenario)
     plant = components.plant
-    texts = {
-        SOURCE: files("hsv.flight").joinpath("export.c").read_text(encoding="utf-8"),
-        NUMBERS: scenario_header(components),
-        HEADER: (include_folder() / HEADER).read_text(encoding="utf-8"),
-        **{name: core.joinpath(name).read_text(encoding="utf-8") for name in _HEADERS},
-    }
+    source = files("hsv.flight").joinpath("export.c").read_text(encoding="utf-8")
+    header = (include_folder() / HEADER).read_text(encoding="utf-8")
+    texts = {SOURCE: source, NUMBERS: scenario_header(components), HEADER: header, **core_headers(source)}
     names = [name for name, _ in numbers_of(COMMAND)]
     start = dict(zip(names, plant.initial.input.tolist(), strict=True))
     stop = plant.steps * plant.period

@@ -9,7 +9,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import islice
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
@@ -173,14 +172,21 @@ class Structure:
 
 
 STRUCTURES = {
-    "parker": Structure((*islice(_PLACES, [*_PLACES].index("gravitational_parameter")),), elastic=True),
+    "parker": Structure(
+        VehicleParameters._fields[: VehicleParameters._fields.index("inertial_coupling_1")], elastic=True
+    ),
     "winged_cone": Structure(
         (
             *("mass", "moment_of_inertia", "reference_area", "mean_aerodynamic_chord"),
             *("reference_density", "reference_altitude", "density_scale_height", "lift_alpha"),
             *("drag_alpha_squared", "drag_alpha"),
             *("moment_alpha_squared", "moment_alpha", "moment_zero", "moment_elevator"),
-            *islice(_PLACES, [*_PLACES].index("gravitational_parameter"), None),
+            *("gravitational_parameter", "planet_radius"),
+            *("sound_speed_curvature", "sound_speed_slope", "sound_speed_zero"),
+            *("lift_alpha_mach", "drag_scale", "drag_mach_squared", "drag_mach"),
+            *("thrust_scale", "thrust_mach", "thrust_fuel"),
+            *("moment_scale", "moment_mach", "moment_mach_decay"),
+            *("damping_mach", "damping_mach_zero", "damping_alpha_squared", "damping_alpha", "damping_zero"),
         ),
         elastic=False,
     ),

@@ -166,7 +166,7 @@ class Vehicle:
         Raises:
             QuantityError: No such set, or no number from 0 to :data:`MAX_COUPLING`.
         """
-        if coupling == "" or not self.decoupled.form.elastic:
+        if coupling == "" or (coupling == COUPLING_PARAMETER.default and not self.decoupled.form.elastic):
             return next(iter(self.couplings))
         if isinstance(coupling, str) and coupling in self.couplings:
             return coupling
@@ -234,10 +234,7 @@ class Vehicle:
             ParameterError: A wrong value, named.
             VehicleError: Some are missing, and there is no vehicle of that name.
         """
-        form = STRUCTURES.get(str(values.get("vehicle.structure", DEFAULT_STRUCTURE)), STRUCTURES[DEFAULT_STRUCTURE])
-        optional = {"vehicle.structure", *(f"vehicle.{name}" for name in COEFFICIENT_UNITS if name not in form.names)}
-        needed = (parameter.name for parameter in VEHICLE_PARAMETERS if parameter.name not in optional)
-        if lacking := [name for name in needed if name not in values]:
+        if lacking := missing_parameters(values):
             # Parameters may come from an untrusted bag or certificate: a path in them is not opened.
             if is_path(name := str(values.get("vehicle.name", DEFAULT_VEHICLE))):
                 raise ParameterError(f"parameter {lacking[0]}: missing, expected that of the vehicle {name!r}")
@@ -282,6 +279,14 @@ def _digest(vehicle: Vehicle) -> str:
     if vehicle.structure == DEFAULT_STRUCTURE:  # the only one when the first designs were certified
         del values["vehicle.structure"]
     return hashlib.sha256(json.dumps(values).encode()).hexdigest()
+
+
+def missing_parameters(values: Mapping[str, Any]) -> list[str]:
+    """Return the names of the flat parameters that ``values`` lacks to describe a whole vehicle of its structure."""
+    form = STRUCTURES.get(str(values.get("vehicle.structure", DEFAULT_STRUCTURE)), STRUCTURES[DEFAULT_STRUCTURE])
+    optional = {"vehicle.structure", *(f"vehicle.{name}" for name in COEFFICIENT_UNITS if name not in form.names)}
+    names = (parameter.name for parameter in VEHICLE_PARAMETERS)
+    return [name for name in names if name not in optional and name not in values]
 
 
 def named_parameters(values: Mapping[str, Any]) -> dict[str, Any]:

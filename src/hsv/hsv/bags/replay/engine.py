@@ -114,8 +114,10 @@ def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progre
     require(bag, step_topics(controller))
     processes = processes_of(controller, estimated(values))
     known = any(COMMAND in process.outputs for process in processes.values())
+    commands = {} if known else {COMMAND: bag.track(COMMAND)}
+    limit = complete_steps(bag) if broken_off(bag) else None
     with expecting_fields(bag.path):
-        tracks = fly(bag.types, controller, values, progress, {} if known else {COMMAND: bag.track(COMMAND)})
+        tracks = fly(bag.types, controller, values, progress, commands, limit)
     return [compare_process(bag, process, tracks) for process in processes.values()]
 
 
@@ -125,6 +127,7 @@ def fly(
     values: ParameterSections,
     progress: Progress,
     recorded: Mapping[str, Track] = NOTHING,
+    limit: int | None = None,
 ) -> dict[str, Track]:
     """Fly the loop in this process and return every step topic; see :func:`rerun`.
 
@@ -134,10 +137,12 @@ def fly(
         values: Parameters of the nodes.
         progress: Called with the progress.
         recorded: The recorded commands of a controller that is an external node.
+        limit: Number of steps of a run that was broken off; None: the flight ends as planned.
     """
     replicas = [_Replica(process, values, types) for process in processes_of(controller, estimated(values)).values()]
     plant = next(replica for replica in replicas if replica.process.restarts)
-    return _step(replicas, recorded, plant.component.steps + 1, partial(progress, "rerun"))
+    steps = plant.component.steps + 1 if limit is None else limit
+    return _step(replicas, recorded, steps, partial(progress, "rerun"))
 
 
 def _step(
