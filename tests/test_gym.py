@@ -14,7 +14,7 @@ from gymnasium.utils.env_checker import check_env
 from page_blocks import blocks, indented
 
 import hsv.gym
-from hsv.base.errors import CampaignError, ControllerError, ScenarioError
+from hsv.base.errors import CampaignError, ControllerError, RunError, ScenarioError
 from hsv.core import lanes
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
@@ -91,6 +91,24 @@ def test_a_seed_draws_the_same_flights_and_another_seed_others():
     env = hsv.gym.TrackEnv(**DRAWN)
     draws = [[env.reset(seed=seed)[1]["flight"], env.reset()[1]["flight"]] for seed in (1, 1, 2)]
     assert draws[0] == draws[1] and len({*draws[0], *draws[2]}) == 4
+
+
+def test_a_seed_of_numpy_is_that_number():
+    vector = hsv.gym.TrackVectorEnv(2, **DRAWN)
+    flights = [vector.reset(seed=seed)[1]["flight"].tolist() for seed in (7, np.int64(7))]
+    assert flights[0] == flights[1]
+
+
+def test_a_step_after_the_end_begins_a_flight_of_its_own():
+    env = hsv.gym.TrackEnv()
+    env.reset()
+    while not env.step(np.ones(2))[2]:
+        pass
+    env.step(np.zeros(2))
+    with pytest.raises(RunError, match=r"flight: no step since the episode began, expected step\(\) first"):
+        _ = env.flight
+    env.step(np.zeros(2))
+    assert len(env.flight.time) == 1
 
 
 def test_what_is_wrong_is_named():

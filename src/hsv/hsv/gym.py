@@ -9,9 +9,9 @@ outside [-1, 1] are admitted. The reward of a step is, with the true state x tha
 
     T / (1 + ((h - h_r) / 100 m)^2 + ((V - V_r) / 20 m/s)^2 + |a|^2),
 
-so that the sum over an episode is at most its duration in seconds. An episode is a flight of the scenario and has as
-many steps as that has commands: the last state is answered, too, and is returned once more. It terminates when the
-answered state is outside the range of the model, and is truncated at the end of the flight.
+so that the sum over an episode is at most its duration in seconds. An episode is a flight of the scenario. An
+episode has one step for each command, also for the last state. The last step returns that state again. It terminates
+when the answered state is outside the range of the model, and is truncated at the end of the flight.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from hsv import core
-from hsv.base.errors import ControllerError, ScenarioError
+from hsv.base.errors import ControllerError, RunError, ScenarioError
 from hsv.control.reference_trajectory import ReferenceData
 from hsv.control.tube_law import no_tube
 from hsv.core import Struct, lanes, lib
@@ -158,6 +158,8 @@ class _Episodes:
             if group.over:
                 groups += self._begun(group.rows)
                 begun[group.rows] = True
+                if self.recorded:
+                    self.recorded.clear()
                 continue
             groups.append(group)
             group.fly(lib.ACT)
@@ -180,7 +182,7 @@ class _Episodes:
         for i in rows:
             self.components[i], self.numbers[i] = self._draws.draw(self._randoms[i])
         components = [self.components[i] for i in rows]
-        parts = [rows] if FlightGroup.takes(components) else [range(i, i + 1) for i in rows]
+        parts = [rows] if FlightGroup.takes(components, 1) else [range(i, i + 1) for i in rows]
         groups = []
         for part in parts:
             width = lanes() if len(part) > 1 else 1
@@ -245,8 +247,14 @@ class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     @property
     def flight(self) -> Flight:
-        """The flight of the steps taken so far, with history, metrics and fingerprint."""
-        parts: list[Any] = [np.concatenate(part) for part in zip(*self._episodes.recorded or (), strict=True)]
+        """The flight of the steps of this episode so far, with history, metrics and fingerprint.
+
+        Raises:
+            RunError: There was no step yet.
+        """
+        if not self._episodes.recorded:
+            raise RunError("flight: no step since the episode began, expected step() first")
+        parts: list[Any] = [np.concatenate(part) for part in zip(*self._episodes.recorded, strict=True)]
         return flight_of(self._episodes.components[0], History(*parts))
 
     @property
@@ -279,7 +287,7 @@ class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     ) -> tuple[np.ndarray, Info]:
         """Begin all episodes with a ``seed``, or one for each row; ``options`` are not used."""
         rows = range(self.num_envs)
-        seeds = [seed + i for i in rows] if isinstance(seed, int) else seed or [None for _ in rows]
+        seeds = [int(seed) + i for i in rows] if isinstance(seed, int | np.integer) else seed or [None for _ in rows]
         self._randoms = [self._randoms[i] if each is None else np_random(each)[0] for i, each in enumerate(seeds)]
         self._episodes = _Episodes(self._draws, self._randoms)
         return self._episodes.observation, self._infos

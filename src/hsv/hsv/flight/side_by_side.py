@@ -21,6 +21,9 @@ from hsv.model.faults.table import ENGINE_SIDE
 
 Result = TypeVar("Result")
 
+_MOST_HISTORY = 64 * 2**20
+"""Largest memory (bytes) of the histories of all lanes; longer flights fly one at a time"""
+
 
 class FlightGroup:
     """Up to :func:`hsv.core.lanes` simultaneous flights, and the memory for them."""
@@ -31,13 +34,16 @@ class FlightGroup:
         self._numbers = np.empty((self.lanes, 0))
 
     @staticmethod
-    def takes(components: Sequence[Components]) -> bool:
+    def takes(components: Sequence[Components], rows: int | None = None) -> bool:
         """Return whether flights can be flown side by side.
 
         They can where all blocks are the core's own, and nothing differs but vehicle, seed, beginning, faults,
-        reference, gains, and the numbers of sensors, links and air.
+        reference, gains, and the numbers of sensors, links and air, unless their histories, of ``rows`` steps each (by
+        default all), are too large.
         """
         if not 1 < len(components) <= lanes() or not all(map(_of_the_core, components)):
+            return False
+        if lanes() * (rows or components[0].plant.steps + 1) * History.numbers() * 8 > _MOST_HISTORY:
             return False
         first, *others = map(_shared, components)
         return all(_same(first, other) for other in others)

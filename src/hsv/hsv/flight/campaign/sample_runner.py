@@ -146,7 +146,7 @@ class SampleRunner:
         plant.steps = steps
         pieces = [replace(parts, plant=plant)] * lanes()
         started = time.perf_counter()
-        if FlightGroup.takes(pieces):
+        if FlightGroup.takes([parts] * lanes()):
             for flight, _ in self._group.fly(pieces, self._levels.set):
                 _ = flight.metrics, flight.fingerprint
             seconds = (time.perf_counter() - started) / len(pieces)
