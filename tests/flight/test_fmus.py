@@ -3,7 +3,7 @@
 import shutil
 import subprocess
 import zipfile
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -162,6 +162,16 @@ def test_the_exported_controller_flies_the_published_case_1_in_the_loop(exported
     )
     shutil.copy(exported / "controller.fmu", tmp_path)
     assert fly(assemble_flight(load_scenario(str(tmp_path / "own.toml")))).fingerprint == CASE1
+
+
+@pytest.mark.parametrize(
+    ("name", "pattern", "matches"),
+    [("u[1]", "u[1]", True), long("u[1]", "u[*", True), ("u1", "u[1]", False)],
+)
+def test_unconnected_takes_a_pattern_literally_but_for_the_star(tmp_path, name, pattern, matches):
+    template_fmu(tmp_path / "model.fmu", ["h"], TRIM, lambda text: text.replace('name="h"', f'name="{name}"'))
+    with nullcontext() if matches else refused("not a signal of the bench"):
+        flight(tmp_path, f'{OUTPUTS}unconnected = ["{pattern}"]')
 
 
 @pytest.mark.parametrize(

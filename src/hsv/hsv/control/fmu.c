@@ -191,7 +191,7 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte bytes[]
     return found;
 }
 
-/* Of the other functions of the standard three have nothing to do. The others return an error, or no instance. */
+/* Three further functions do nothing and succeed; all others return an error or no instance. */
 static fmi3Status done(void) { return fmi3OK; }
 static fmi3Status not_supported(fmi3Instance instance) { return fail(instance, "function: not supported by this FMU"); }
 static fmi3Instance no_instance(void) { return NULL; }

@@ -10,11 +10,11 @@ gives the names of the FMU that differ.
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
 from ctypes import c_double, c_void_p, cast
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +84,7 @@ class FmuClass(LibraryClass):
             index, _, unit = sources.get(signal.name, (-1, "", ""))
             if index >= 0:
                 _check_variable("input", signal, unit)
-            elif not any(fnmatchcase(signal.name, pattern) for pattern in own["fmu.unconnected"]):
+            elif not any(_matches(signal.name, pattern) for pattern in own["fmu.unconnected"]):
                 raise ParameterError(
                     f"input {signal.name!r}: not a signal of the bench, such as measurement.altitude, expected its "
                     "name in the table [fmu], under the signal or in unconnected"
@@ -103,6 +103,10 @@ class FmuClass(LibraryClass):
             _check_variable("output", signal, unit)
             routes.append(index)
         return routes
+
+
+def _matches(name: str, pattern: str) -> bool:
+    return re.fullmatch(re.escape(pattern).replace(r"\*", ".*"), name) is not None
 
 
 def _check_variable(kind: str, variable: SignalType, unit: str) -> None:
@@ -129,7 +133,7 @@ class LoadedFmu:
         try:
             self._load(path)
         except ModuleNotFoundError as error:
-            raise ParameterError(f"{failure_words(error)}, expected hsv[fmi]: pip install 'hsv[fmi]'") from error
+            raise ParameterError(f"{failure_words(error)}, expected hsv[fmi]: pip install './src/hsv[fmi]'") from error
         except ParameterError:
             raise
         except Exception as error:
