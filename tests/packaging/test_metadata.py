@@ -112,7 +112,7 @@ def test_flights_and_bags_need_no_extra_and_a_missing_one_is_named(tmp_path: Pat
     expected = []
     for words, extra in WITHOUT.items():
         if extra:
-            expected.append(f"hsv: error: needs hsv[{extra}]: pip install 'hsv[{extra}]'")
+            expected.append(f"hsv: error: needs hsv[{extra}]: pip install './src/hsv[{extra}]'")
         expected.append(f"{words} {2 if extra else 0}")
     assert ran.stderr.splitlines() == expected and ran.returncode == 0
 

@@ -182,7 +182,7 @@ def run(prog: str, commands: Mapping[str, Command], description: str, moved: Map
         extra = EXTRAS.get((error.name or "").partition(".")[0])
         if not extra:
             raise
-        _fail(f"needs hsv[{extra}]: pip install 'hsv[{extra}]'", 2)
+        _fail(f"needs hsv[{extra}]: pip install './src/hsv[{extra}]'", 2)
     except BrokenPipeError:
         _end(1)  # The reader is gone; like click and rich, say nothing.
     except OSError as error:

@@ -139,7 +139,7 @@ def require_trust(controller: str, source: object, trust: bool) -> None:
     """Refuse a ``controller`` whose code the bag or campaign ``source`` names, unless the user passed ``--trust``.
 
     A scenario or class on the command line is the user's own; a bag or a campaign may be anybody's. A controller that
-    is registered here under a name is installed code, which data may choose, not bring.
+    is registered here under a name is installed code; a file may select it but not supply it.
     """
     if names_code(controller) and not trust:
         raise ParameterError(f"{source}: controller = {controller!r}: code that this file names, run only with --trust")
