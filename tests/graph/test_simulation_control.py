@@ -25,11 +25,15 @@ CLIENT = Path(__file__).parents[1] / "support" / "simulation_client.py"
 STOPPED, OK, FAILED, UNSUPPORTED, ALREADY, INCORRECT = 0, 1, 4, 0, 101, 103
 
 
-@pytest.mark.parametrize(("scenario", "pace"), [("short", 0.2), long("case1", 1)])
-def test_pause_steps_reset_and_the_whole_flight_again(processes: Processes, scenario: str, pace: float) -> None:
+@pytest.mark.parametrize(
+    ("scenario", "pace", "how"), [("short", 0.2, ["--composed"]), long("short", 0.2, []), long("case1", 1, [])]
+)
+def test_pause_steps_reset_and_the_whole_flight_again(
+    processes: Processes, scenario: str, pace: float, how: list[str]
+) -> None:
     flown = short_scenario(processes.folder) if scenario == "short" else scenario
     bag = processes.folder / "flown"
-    words = ("--bag", bag, "--paused", "--real-time-factor", str(pace), "--no-report")
+    words = (*how, "--bag", bag, "--paused", "--real-time-factor", str(pace), "--no-report")
     run = processes.start("hsv", "run", flown, *words)
     client = processes.start(sys.executable, CLIENT)
     answers = output_of(client)
@@ -52,6 +56,18 @@ def test_pause_steps_reset_and_the_whole_flight_again(processes: Processes, scen
     before = Bag(processes.folder / "flown_reset_1")
     states = before.columns("hsv/state")
     assert len(states["step"]) == told["to"] + 1 and "design.yaml" in before.attachments
+    assert_each_has_its_own(before, Bag(bag))
+
+
+def assert_each_has_its_own(*bags: Bag) -> None:
+    """Assert that every bag has one run, announced before its reference, and the nodes that were ready for it."""
+    runs = [list(bag.decode("/hsv/run")) for bag in bags]
+    assert [len(run) for run in runs] == [1] * len(bags)
+    for bag, [(_, run)] in zip(bags, runs, strict=True):
+        assert [(time, reference.step) for time, reference in bag.decode("/hsv/reference")] == [(0, 0)]
+        ready = [message for _, message in bag.decode("/hsv/ready")]
+        assert len(ready) == 5 and {message.run_id for message in ready} == {run.run_id}
+    assert len({run.run_id for [(_, run)] in runs}) == len(bags)
 
 
 def test_quitting_ends_the_run_as_an_interruption_does(processes: Processes) -> None:

@@ -11,7 +11,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from hsv_msgs.msg import RecorderProgress, Run, VehicleState
+from hsv_msgs.msg import Ready, RecorderProgress, Reference, Run, VehicleState
 from rclpy.serialization import deserialize_message
 
 from hsv.bags.definitions import definition, type_hash
@@ -21,8 +21,10 @@ from hsv.bags.description import (
     NOMINAL,
     NOMINAL_TRAJECTORY,
     OTHER_TOPICS,
+    READY,
     RECORDER,
     RECORDER_PROGRESS,
+    REFERENCE,
     RUN,
     STATE,
     TOPICS,
@@ -58,7 +60,7 @@ class RecorderNode(PeerNode):
     """A node that writes the messages of a step in a fixed order once all have arrived: equal runs give equal bags."""
 
     def __init__(self) -> None:
-        super().__init__(RECORDER, "bag")
+        super().__init__(RECORDER, "bag", hears_runs=False)
         values = declare(self, RECORDER_PARAMETERS)
         utc = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%SZ")
         self._directory = Path(values["bag.directory"] or f"bags/run_{utc}")
@@ -85,13 +87,21 @@ class RecorderNode(PeerNode):
         self._order = tuple(self._names[topic] for topic in recorded)
         self._stale: set[str] = set()
         """Topics whose next messages belong to a run that was reset."""
+        self._held: list[tuple[str, bytes]] = []
+        """Topics and bytes of announcements for a run that the plant has not announced to this node yet."""
+        self._referenced = False
+        """Whether the first reference of the run has come."""
         self._state_messages, self._signals = StepMessages(STATE), Signals()
         for topic, name in zip(recorded, self._order, strict=True):
             self.create_step_subscription(topic, partial(self._on_step_message, name))
+        callbacks: dict[str, Callable[[bytes], None]] = {READY: self._on_ready, REFERENCE: self._on_reference}
         for topic, kind in OTHER_TOPICS.items():
-            profile = LATCHED if topic in LATCHED_TOPICS else STEP
-            callback: Callable[[bytes], None] = partial(self._on_other_message, self._names[topic])
-            self.create_subscription(message_class(kind), topic, callback, profile, raw=True)
+            if topic != RUN:
+                profile = LATCHED if topic in LATCHED_TOPICS else STEP
+                callback = callbacks.get(topic) or partial(self._on_other_message, self._names[topic])
+                self.create_subscription(message_class(kind), topic, callback, profile, raw=True)
+        # Last, so that the messages of a run that is reset are taken before the run that replaces it.
+        self.hear_runs(self._on_raw_run, raw=True)
         self._progress_message = RecorderProgress()
         self._progress = self.create_publisher(RecorderProgress, RECORDER_PROGRESS, STEP)
 
@@ -229,11 +239,39 @@ class RecorderNode(PeerNode):
     def _on_other_message(self, topic: str, data: bytes) -> None:
         self.bag.write(topic, self._now, data)
 
+    def _on_raw_run(self, data: bytes) -> None:
+        """Begin the run, in a bag of its own if it replaces another, and write what was announced for it before."""
+        held, self._held, self._referenced = self._held, [], False
+        self._on_run(deserialize_message(data, Run))
+        self._on_other_message(self._names[RUN], data)
+        for topic, announced in held:
+            (self._on_ready if topic == READY else self._on_reference)(announced)
+
+    def _on_ready(self, data: bytes) -> None:
+        ready = deserialize_message(data, Ready)
+        self._write_or_hold(READY, data, self._run is not None and ready.run_id == self._run.run_id)
+
+    def _on_reference(self, data: bytes) -> None:
+        # A reference does not name its run, but the first of every run is flown from step 0 on.
+        reference = deserialize_message(data, Reference)
+        first = reference.step == 0 and reference.status == Reference.FLOWN
+        of_this_run = self._run is not None and not (first and self._referenced)
+        self._referenced |= first and of_this_run
+        self._write_or_hold(REFERENCE, data, of_this_run)
+
+    def _write_or_hold(self, topic: str, data: bytes, of_this_run: bool) -> None:
+        if of_this_run:
+            self._on_other_message(self._names[topic], data)
+        else:
+            self._held.append((topic, data))
+
     def close(self) -> None:
-        """Write the messages of an unfinished step, and finish the bag."""
+        """Write the messages of an unfinished step and what is held, and finish the bag."""
         for stamp in sorted(self._pending):
             for topic in sorted(self._pending[stamp], key=self._order.index):
                 self.bag.write(topic, stamp, self._pending[stamp][topic])
+        for topic, data in self._held:
+            self._on_other_message(self._names[topic], data)
         self.bag.close()
         self.get_logger().info(f"closed the bag {self.bag.directory}: {self._complete + 1} steps")
 

@@ -253,7 +253,8 @@ class PeerNode(LockstepNode):
     The plant announces the end of the run; if it disappears without doing so, the run counts as broken off.
     """
 
-    def __init__(self, role: NodeDescription, task: str = "") -> None:
+    def __init__(self, role: NodeDescription, task: str = "", hears_runs: bool = True) -> None:
+        """Join the graph; a subclass without ``hears_runs`` subscribes to the runs itself."""
         super().__init__(role, task)
         self._run: Run | None = None
         self._announced = False
@@ -262,8 +263,13 @@ class PeerNode(LockstepNode):
         self._ready = self.create_publisher(Ready, description.READY, LATCHED)
         # Subscribe before /hsv/run, so that the end of a run is received before the start of the next.
         self.create_subscription(VehicleState, description.LAST_STATE, self._on_last_state, LATCHED)
+        if hears_runs:
+            self.hear_runs(self._on_run)
+
+    def hear_runs(self, callback: Callable[[Any], None], raw: bool = False) -> None:
+        """Subscribe to the runs; ``callback`` is called with each, or with its bytes if ``raw``."""
         links = SubscriptionEventCallbacks(matched=self._on_plant)
-        self._runs = self.create_subscription(Run, description.RUN, self._on_run, LATCHED, event_callbacks=links)
+        self._runs = self.create_subscription(Run, description.RUN, callback, LATCHED, event_callbacks=links, raw=raw)
 
     def start_run(self, run: Run) -> None:
         """Reset the node for a new run; overridden by every node."""
