@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,49 @@ def assert_each_has_its_own(*bags: Bag) -> None:
         ready = [message for _, message in bag.decode("/hsv/ready")]
         assert len(ready) == 5 and {message.run_id for message in ready} == {run.run_id}
     assert len({run.run_id for [(_, run)] in runs}) == len(bags)
+
+
+RESET_BEFORE_A_STEP = textwrap.dedent(
+    """
+    import rclpy
+    from hsv_bringup.flow_executor import BatchExecutor
+    from hsv_bringup.recorder import RecorderNode
+    from hsv_msgs.msg import Ready, Reference, Run
+    from hsv_node.middleware import LATCHED
+
+    words = ["--ros-args", "-p", "controller:=tube_mpc", "-p", "bag.directory:=flown", "-p", "bag.custom_data:=[a=b]"]
+    rclpy.init(args=words)
+    recorder, others = RecorderNode(), rclpy.create_node("others")
+    executor = BatchExecutor()
+    executor.add_node(recorder)
+    runs, readies, references = (
+        others.create_publisher(kind, topic, LATCHED)
+        for kind, topic in ((Run, "hsv/run"), (Ready, "hsv/ready"), (Reference, "hsv/reference"))
+    )
+    while any(publisher.get_subscription_count() == 0 for publisher in (runs, readies, references)):
+        executor.spin_once(timeout_sec=0.05)
+    for name in ("first", "second"):
+        # The nodes are told of a run before the recorder is.
+        readies.publish(Ready(node="notch_filter", run_id=name))
+        references.publish(Reference())
+        for _ in range(40):
+            executor.spin_once(timeout_sec=0.05)
+        runs.publish(Run(run_id=name, period=0.02, last_step=10, interface_version=Run.INTERFACE_VERSION))
+        for _ in range(40):
+            executor.spin_once(timeout_sec=0.05)
+    recorder.close()
+    """
+)
+
+
+def test_a_reset_before_the_first_step_is_recorded(processes: Processes) -> None:
+    done = processes.run(sys.executable, "-c", RESET_BEFORE_A_STEP)
+    assert done.returncode == 0, done.stdout
+    for name, run_id in (("flown_reset_1", "first"), ("flown", "second")):
+        bag = Bag(processes.folder / name)
+        assert [run.run_id for _, run in bag.decode("/hsv/run")] == [run_id]
+        assert [ready.run_id for _, ready in bag.decode("/hsv/ready")] == [run_id]
+        assert len(bag.messages("/hsv/reference")) == 1
 
 
 def test_quitting_ends_the_run_as_an_interruption_does(processes: Processes) -> None:

@@ -129,7 +129,7 @@ class RecorderNode(PeerNode):
 
     def start_run(self, run: Run) -> None:
         """Store the number of steps to expect; a run that replaces one that was reset has a bag of its own."""
-        if self._complete >= 0 and self._runs_of_one_plant():
+        if self._run is not None and self._runs_of_one_plant():
             self._keep_reset_run()
         elif self._complete >= 0:
             self.get_logger().fatal(
