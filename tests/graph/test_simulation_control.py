@@ -68,6 +68,7 @@ def assert_each_has_its_own(*bags: Bag) -> None:
         assert [(time, reference.step) for time, reference in bag.decode("/hsv/reference")] == [(0, 0)]
         ready = [message for _, message in bag.decode("/hsv/ready")]
         assert len(ready) == 5 and {message.run_id for message in ready} == {run.run_id}
+        assert bag.custom_data["run_id"] == run.run_id
     assert len({run.run_id for [(_, run)] in runs}) == len(bags)
 
 
@@ -109,6 +110,7 @@ def test_a_reset_before_the_first_step_is_recorded(processes: Processes) -> None
     assert done.returncode == 0, done.stdout
     for name, run_id in (("flown_reset_1", "first"), ("flown", "second")):
         bag = Bag(processes.folder / name)
+        assert bag.custom_data["run_id"] == run_id
         assert [run.run_id for _, run in bag.decode("/hsv/run")] == [run_id]
         assert [ready.run_id for _, ready in bag.decode("/hsv/ready")] == [run_id]
         assert len(bag.messages("/hsv/reference")) == 1

@@ -141,6 +141,7 @@ class RecorderNode(PeerNode):
         if self._peers:
             self._peers.close()
         self._peers = None
+        self.bag.add_custom_data({"run_id": run.run_id})
         self._last_step = run.last_step
         self._nanoseconds_per_step = round(run.period * 1e9)
 
@@ -186,7 +187,7 @@ class RecorderNode(PeerNode):
         for name, text in recorded_files(values, design).items():
             self._attach(name, text.encode())
         origin = provenance(self.controller, design.get("design.name", ""), digest(design), run.seed)
-        self.bag.add_custom_data({"run_id": run.run_id, **origin})
+        self.bag.add_custom_data(origin)
 
     def _attach(self, name: str, data: bytes) -> None:
         self.bag.attach(name, mimetypes.guess_type(name)[0] or "text/plain", data)

@@ -227,7 +227,6 @@ def prepare(
         print_json(
             {
                 "scenario": prepared.scenario.name,
-                "run_id": prepared.run_id,
                 "bag": str(prepared.bag),
                 "namespace": namespace,
                 "folder": str(target),

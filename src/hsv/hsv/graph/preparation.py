@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime
 import subprocess
 import tempfile
-import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,7 +42,6 @@ class PreparedRun:
     """A checked scenario with its parameter files (design first, scenario over it) and the bag to record to."""
 
     scenario: Scenario
-    run_id: str
     bag: Path
     parameter_files: tuple[Path, ...]
     nodes: tuple[NodeDescription, ...]
@@ -127,7 +125,6 @@ def prepare(
     wait = options.step_timeout or (FOREIGN_STEP_TIMEOUT if foreign else STEP_TIMEOUT)
     components = assemble_flight(scenario, design)
     now = datetime.datetime.now(datetime.UTC)
-    run_id = uuid.uuid4().hex
     temporary = None
     if folder is None:
         temporary = tempfile.TemporaryDirectory(prefix="hsv_run_")
@@ -162,7 +159,6 @@ def prepare(
         "bag.custom_data": [
             f"{key}={value}"
             for key, value in {
-                "run_id": run_id,
                 "scenario": scenario.name,
                 "title": scenario.title,
                 **provenance(
@@ -180,7 +176,7 @@ def prepare(
         }
     (folder / "run.yaml").write_text(ParameterSections(run).to_yaml(), encoding="utf-8")
     parameter_files = tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
-    return PreparedRun(scenario, run_id, bag, parameter_files, nodes, components.plant.steps, wait, temporary)
+    return PreparedRun(scenario, bag, parameter_files, nodes, components.plant.steps, wait, temporary)
 
 
 def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:
