@@ -44,10 +44,10 @@ SCENARIOS = {
     ("docs/scenarios.md", "[sensors]"),
     ("docs/montecarlo.md", 'extends = "case1"'),
 }
-"""Blocks that are scenarios, or what of one may be added to Case 1."""
+"""Blocks that are scenarios, or parts that may be added to Case 1."""
 
 PLAYER = "ros2 run hsv_bringup player BAG --rate 5 --topics /hsv/state /hsv/nominal"
-"""Waits for an end that nobody gives it here; tests/graph/test_player.py runs the player."""
+"""Command that is not run here, because it waits for nodes; tests/graph/test_player.py runs the player."""
 
 
 def all_blocks(page: str) -> list[Block]:

@@ -92,7 +92,7 @@ RESET_BEFORE_A_STEP = textwrap.dedent(
     while any(publisher.get_subscription_count() == 0 for publisher in (runs, readies, references)):
         executor.spin_once(timeout_sec=0.05)
     for name in ("first", "second"):
-        # The nodes are told of a run before the recorder is.
+        # The nodes receive the announcement of a run before the recorder does.
         readies.publish(Ready(node="notch_filter", run_id=name))
         references.publish(Reference())
         for _ in range(40):

@@ -44,7 +44,7 @@ class FlowExecutor(SingleThreadedExecutor):
         for subscription in node.subscriptions:
             taken = (subscription.handle.take_message, subscription.msg_type, subscription.raw, subscription.callback)
             self._subscriptions.append(taken)
-            # What a node is told once a run is not looked for in every step; what is recorded is, for its time is then.
+            # Announcements are left to the wait set. Recorded topics are swept: a message is recorded as it arrives.
             if subscription.raw or subscription.qos_profile.durability is not DurabilityPolicy.TRANSIENT_LOCAL:
                 self._flowing.append(taken)
         return bool(super().add_node(node))
