@@ -45,10 +45,10 @@ def test_an_unknown_name_is_refused_with_the_nearest(hsv, kind, name, message):
 
 
 def test_a_vehicle_that_is_printed_can_be_flown(hsv, tmp_path):
-    (tmp_path / "mine.toml").write_text(hsv("list", "vehicles", "stiffened").out)
+    (tmp_path / "mine.toml").write_text(hsv("list", "vehicles", "winged_cone").out)
     table = hsv("list", "vehicles", "mine.toml", "--json").json
-    assert table["rigid_body"]["mass"] == {"value": "318 slug", "symbol": "m", "uncertainty": "10 %"}
-    mine, shipped = (hsv("trim", "--vehicle", name, "--json").json for name in ("mine.toml", "stiffened"))
+    assert table["rigid_body"]["mass"] == {"value": "9375 slug", "symbol": "m", "uncertainty": "3 %"}
+    mine, shipped = (hsv("trim", "--vehicle", name, "--json").json for name in ("mine.toml", "winged_cone"))
     assert mine == shipped != hsv("trim", "--json").json
 
 

@@ -21,8 +21,12 @@ from hsv.flight.closed_loop import fly
 from hsv.flight.fingerprint import fingerprint
 from hsv.flight.scenario import parse_scenario
 from hsv.flight.side_by_side import FlightGroup
+from hsv.model.vehicle import vehicle_tables
 
-LINES = (Path(__file__).parents[1] / "golden" / "scenarios.jsonl").read_text().splitlines()
+GOLDEN = Path(__file__).parents[1] / "golden"
+VEHICLE = json.dumps(vehicle_tables(str(GOLDEN / "stiffened.toml")))
+FILLED = (GOLDEN / "scenarios.jsonl").read_text().replace('"{vehicle}"', VEHICLE).replace("{folder}", str(GOLDEN))
+LINES = FILLED.splitlines()
 PARTS = 20
 
 

@@ -42,7 +42,7 @@ COMPOSED, RECORDER = ("hsv_bringup", "composed"), ("hsv_bringup", "recorder")
         long(PLANT, "-r __node:=9x", ["__node:=9x", "no digit first"]),
         long(PLANT, "-p controller:=nosuch", ["controller = 'nosuch'", "expected one of robust_mpc, tube_mpc"]),
         long(TUBE_MPC, "-p controller:=robust_mpc", ["controller = 'robust_mpc'", "expected tube_mpc"]),
-        long(PLANT, "-p vehicle.name:=nosuch", ["vehicle 'nosuch'", "expected one of parker, stiffened, winged_cone"]),
+        long(PLANT, "-p vehicle.name:=nosuch", ["vehicle 'nosuch'", "expected one of parker, winged_cone"]),
         long(
             PLANT, "-p vehicle.coupling:=strong", ["vehicle.coupling = 'strong'", "expected one of paper_like, derived"]
         ),

@@ -9,7 +9,7 @@ from node_processes import Processes
 
 pytestmark = pytest.mark.graph
 
-VEHICLE = """extends = "stiffened"
+VEHICLE = """extends = "parker"
 [rigid_body]
 mass = { value = "4600 kg" }
 """

@@ -35,7 +35,7 @@ from hsv.model.signals import INPUT_NAMES, INPUT_UNITS
 GROUP = "hsv.vehicles"
 """The entry points of vehicles, ``package:file.toml`` each."""
 
-SHIPPED_VEHICLES = {name: f"hsv.model:vehicles/{name}.toml" for name in ("parker", "stiffened", "winged_cone")}
+SHIPPED_VEHICLES = {name: f"hsv.model:vehicles/{name}.toml" for name in ("parker", "winged_cone")}
 """Files of this library by name; others are entry points."""
 
 DEFAULT_VEHICLE = "parker"
