@@ -1,8 +1,3 @@
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-
 import pytest
 from ran import Ran
 
@@ -11,11 +6,11 @@ from hsv.cli.main import run as run_command_line
 
 
 @pytest.fixture
-def hsv(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., Ran]:
+def hsv(monkeypatch, capsys, tmp_path):
     """Run the command as the console script does, in an empty folder and in this process."""
     monkeypatch.chdir(tmp_path)
 
-    def run(*words: str) -> Ran:
+    def run(*words):
         monkeypatch.setattr("sys.argv", ["hsv", *words])
         with pytest.raises(SystemExit) as caught:
             run_command_line("hsv", COMMANDS, DESCRIPTION, MOVED)

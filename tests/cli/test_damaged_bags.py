@@ -1,14 +1,12 @@
 """Bags damaged at random: every whole chunk is read, what is lost is said, and nothing is changed in place."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from damaged_bags import Original, damaged, found_in, original
+from damaged_bags import damaged, found_in, original
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
@@ -23,7 +21,7 @@ LONG = 60
 
 
 @pytest.fixture(scope="module")
-def originals() -> list[Original]:
+def originals():
     return [original(folder) for folder in sorted(REFERENCES.iterdir()) if folder.is_dir()]
 
 
@@ -34,9 +32,7 @@ def originals() -> list[Original]:
         pytest.param(range(LONG), id=f"{LONG} bags", marks=[pytest.mark.long, pytest.mark.timeout(3600)]),
     ],
 )
-def test_every_whole_chunk_is_read_and_what_is_lost_is_said(
-    hsv: Hsv, tmp_path: Path, originals: list[Original], seeds: range
-) -> None:
+def test_every_whole_chunk_is_read_and_what_is_lost_is_said(hsv, tmp_path, originals, seeds):
     read = 0
     for seed in seeds:
         source = originals[seed // 5 % len(originals)]
@@ -84,7 +80,7 @@ def test_every_whole_chunk_is_read_and_what_is_lost_is_said(
     assert read > 0.8 * len(seeds)
 
 
-def _is_whole(bag: Path, messages: int, read_through: bool) -> None:
+def _is_whole(bag, messages, read_through):
     """Other people's readers take it; read through, checksums and all, which takes a while."""
     with Reader(bag) as reader:
         assert reader.message_count == messages

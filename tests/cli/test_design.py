@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from hsv.control.checks import load_subject
-from hsv.control.design import read_parameters
+from hsv.control.design import find_design, read_parameters
 from hsv.design.inputs import find_inputs
 from hsv.flight.verification import verify
 
@@ -65,6 +65,16 @@ def test_a_check_writes_nothing_and_takes_no_other_option(hsv, tmp_path):
     (tmp_path / "alone.toml").write_text(find_inputs("baseline").read_text())
     ran = hsv("design", "alone.toml", "--check")
     assert ran.code == 2 and ran.error.startswith("design 'alone.yaml': cannot be read")
+
+
+def test_a_file_that_is_no_design_and_a_missing_certificate_are_named(hsv, tmp_path):
+    (tmp_path / "inputs.yaml").write_text("name: a: b\n")
+    ran = hsv("certify", "inputs.yaml")
+    assert ran.code == 2
+    assert ran.error.startswith("design 'inputs.yaml': ") and ran.error.endswith(", expected ROS 2 parameters in YAML")
+    (tmp_path / "alone.yaml").write_text(find_design("baseline").read_text())
+    ran = hsv("verify", "alone.yaml")
+    assert ran.code == 2 and ran.error.startswith("alone.certificate.json: cannot be read")
 
 
 @pytest.mark.parametrize("name", ["baseline.yaml", "baseline.certificate.json"])

@@ -3,7 +3,7 @@ import dataclasses
 import pytest
 
 from hsv.control.design import find_design, read_design, write_design
-from hsv.control.export import NUMBERS, controller_files, step_bounds
+from hsv.control.export import controller_files, step_bounds
 
 BASELINE = read_design(find_design("baseline"))
 
@@ -20,14 +20,6 @@ def test_it_writes_source_numbers_and_headers_and_prints_the_cost_of_a_step(hsv,
     bounds = {name: dataclasses.asdict(bound) for name, bound in step_bounds(BASELINE).items()}
     assert ran.json["most_in_a_step"] == bounds
     assert bounds["nominal_trajectory"]["multiplications"] > 1000
-
-
-def test_a_design_by_its_path_takes_the_place_of_one_written_before(hsv, tmp_path):
-    assert hsv("export-controller", "baseline", "--out", "controller").code == 0
-    ran = hsv("export-controller", str(find_design("adjustable")), "--out", "controller")
-    assert ran.code == 0
-    assert "nominal_trajectory" in ran.out
-    assert 'design "adjustable"' in (tmp_path / "controller" / NUMBERS).read_text()
 
 
 @pytest.mark.parametrize(

@@ -8,12 +8,7 @@ from pathlib import Path
 import pytest
 from full_disk import files_no_larger_than
 from marking import long
-from node_processes import short_scenario
 from recorded_flight import record_flight
-
-from hsv.base.errors import ParameterError
-from hsv.cli.output import writing
-from hsv.control.design import write_certificate
 
 FULL = Path("/dev/full")
 
@@ -34,13 +29,6 @@ def test_output_that_finds_no_space_is_one_line(words, buffered):
     with FULL.open("w") as full:
         code, error = command(*words, out=full, buffered=buffered)
     assert (code, error) == (2, "hsv: error: output: cannot be written (No space left on device)\n")
-
-
-@pytest.mark.long
-def test_an_error_stays_that_error_if_nothing_can_be_printed():
-    with FULL.open("w") as full:
-        code, error = command("verify", "nope.yaml", out=full)
-    assert code == 2 and error.startswith("hsv: error: design = 'nope.yaml'") and error.count("\n") == 1
 
 
 @pytest.mark.long
@@ -66,15 +54,6 @@ def bag(tmp_path_factory):
     return str(record_flight(tmp_path_factory.mktemp("bags") / "flight", duration=2.0, fault=1.0).path.parent)
 
 
-@pytest.mark.parametrize("name", ["flight.svg", long("flight.png"), long("flight.pdf")])
-def test_a_figure_that_does_not_fit(hsv, tmp_path, bag, name):
-    with files_no_larger_than(2_000):
-        ran = hsv("plot", bag, "--out", name)
-    assert ran.code == 2
-    assert ran.error == f"out = '{name}': cannot be written (File too large)"
-    assert not (tmp_path / name).exists()
-
-
 @pytest.mark.parametrize("form", ["csv", long("parquet"), long("npz")])
 def test_an_export_that_does_not_fit_is_not_in_the_way_of_the_next(hsv, tmp_path, bag, form):
     words = ("export", bag, f"--{form}", "--out", "table")
@@ -84,28 +63,3 @@ def test_an_export_that_does_not_fit_is_not_in_the_way_of_the_next(hsv, tmp_path
     assert ran.error == "out = 'table': cannot be written: File too large"
     assert not list(tmp_path.iterdir())
     assert hsv(*words).code == 0
-
-
-def test_a_certificate_that_does_not_fit(tmp_path):
-    path = tmp_path / "design.certificate.json"
-    with (
-        pytest.raises(ParameterError, match=r"^certificate = .*cannot be written \(File too large\)"),
-        files_no_larger_than(2_000),
-        writing(path, "certificate"),
-    ):
-        write_certificate(path, {"inputs": list(range(10_000))})
-    assert not path.exists()
-
-
-@pytest.mark.long
-def test_a_campaign_whose_page_does_not_fit_leaves_its_summary(hsv, tmp_path):
-    short_scenario(tmp_path, duration=3, fault=2)
-    assert (
-        hsv("montecarlo", "short.toml", "--samples", "12", "--workers", "1", "--no-page", "--out", "a.parquet").code
-        == 0
-    )
-    with files_no_larger_than(100_000):
-        ran = hsv("montecarlo", "summary", "a.parquet")
-    assert ran.code == 2 and "12 of 12" in ran.out
-    assert ran.error == "a.html: cannot be written (File too large), expected an HTML file to write"
-    assert not (tmp_path / "a.html").exists()

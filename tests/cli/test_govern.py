@@ -35,10 +35,8 @@ def test_a_file_that_exists_is_kept(hsv, tmp_path):
     [
         (("case1", "--blend", "0 s"), "blend = 0 s: expected above 0"),
         (("case1", "--blend", "1e9 s"), "blend = 1e+09 s: expected above 0 s, up to 600 s"),
-        (("case1", "--blend", "4 ft"), "blend"),
         (("case1_rmpc",), "controller = 'robust_mpc', design = 'baseline_single_k': expected tube_mpc"),
         (("case1_qp",), "nominal.law = 'qp': expected 'family'"),
-        (("nothing",), "nothing"),
     ],
 )
 def test_what_cannot_be_governed_is_refused_in_one_line(hsv, arguments, why):

@@ -1,13 +1,12 @@
 """Ctrl-C, which a terminal sends to all processes of a command, is one line and exit code 130; nothing runs on."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 from marking import long
 from ros_domain import own_environment
@@ -30,19 +29,7 @@ COMMANDS = [
 ]
 
 
-def left_of(mark: str) -> list[int]:
-    """Return the processes that have ``mark`` in their environment."""
-    found = []
-    for process in Path("/proc").glob("[0-9]*"):
-        try:
-            if mark.encode() in (process / "environ").read_bytes():
-                found.append(int(process.name))
-        except OSError:
-            continue  # it has ended, or is another user's
-    return found
-
-
-def ignores_ctrl_c(process: int) -> bool:
+def ignores_ctrl_c(process):
     """Return whether a process, one that has not been waited for, has come to the end of Python, or is over."""
     lines = Path(f"/proc/{process}/status").read_text().splitlines()
     fields = dict(line.split(":", 1) for line in lines)
@@ -54,26 +41,17 @@ def ignores_ctrl_c(process: int) -> bool:
     [
         long("run case1", 0.05),
         ("run case1", 0.4),
-        *(long(words, delay) for words in COMMANDS for delay in (0.2, 1.0, 2.0, 4.0, 7.0)),
+        *(long(words, delay) for words in COMMANDS for delay in (0.2, 2.0, 7.0)),
     ],
 )
-def test_ctrl_c_is_one_line_and_leaves_no_process(tmp_path, words, delay) -> None:
+def test_ctrl_c_is_one_line_and_leaves_no_process(tmp_path, words, delay):
     for name in ("baseline.yaml", "baseline.certificate.json"):
         (tmp_path / name).symlink_to(DESIGNS / name)
     with own_environment() as environment:
-        # The whole path: other test runs on this machine have a folder of this name, too.
-        mark = f"HSV_INTERRUPTED={tmp_path}"
         marked = environment | {"HSV_INTERRUPTED": str(tmp_path)}
         command = ["hsv", *words.split(), *(["--out", "mine.yaml"] if words.startswith("design") else [])]
-        popen = subprocess.Popen(
-            command,
-            cwd=tmp_path,
-            env=marked,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        popen = subprocess.Popen(command, cwd=tmp_path, env=marked, start_new_session=True, **pipes)
         time.sleep(delay)
         done = popen.poll() is not None
         if not done:
@@ -86,4 +64,5 @@ def test_ctrl_c_is_one_line_and_leaves_no_process(tmp_path, words, delay) -> Non
         assert popen.returncode == INTERRUPTED
         assert said[-1].startswith("hsv: error: interrupted")
         assert not [line for line in said if "Traceback" in line or "KeyboardInterrupt" in line]
-        assert left_of(mark) == []
+        left = [each.info["environ"] or {} for each in psutil.process_iter(["environ"])]
+        assert not [found for found in left if found.get("HSV_INTERRUPTED") == str(tmp_path)]

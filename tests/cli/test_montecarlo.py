@@ -40,16 +40,12 @@ def test_a_campaign_by_the_command_and_one_flight_again(campaign, hsv, tmp_path)
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (("--samples", "0"), "samples = 0"),
         (("--factor", "fault[0].start=1 m..2 s"), "uniform = '1 m': wrong unit"),
-        (("--corners", "--samples", "4"), "samples = 4: expected no --samples with --corners"),
         (("--corners", "--sampling", "sobol"), "sampling = sobol: expected no --sampling with --corners"),
         (("--factor", "fault[0].start"), "factor = 'fault[0].start': expected FIELD=LEAST..LARGEST"),
-        (("--factor", "initial.altitude=10 km..11 km"), "initial.altitude"),
         (("--factor", "=1..2"), "no such field"),
         (("--factor", "fault[0].start=0 s..1 s", "--factor", "fault[0].start=1 s..2 s"), "a field is given twice"),
         (("--scale", "0"), "varies"),
-        (("--out", "result.csv"), ".parquet"),
         (("--workers", "-1"), "workers = -1: expected 0 to 4096"),
         (("--workers", "0", "--scheduler", "nonsense"), "scheduler = 'nonsense'"),
     ],
@@ -108,19 +104,6 @@ def test_a_distribution_is_shown_but_not_flown_alone(drawn, hsv):
         assert refused.error.startswith(
             "scenario 'drawn': initial.velocity: a distribution, which hsv montecarlo draws"
         )
-
-
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (("--flight", "5"), "flight = 5: expected 0 to 4"),
-        (("--flight", "1", "--design", "kept.toml"), "expected a file that ends in .yaml"),
-        (("--flight", "1", "--design", "nowhere/kept.yaml"), "design = 'nowhere/kept.yaml': cannot be written"),
-    ],
-)
-def test_what_cannot_be_printed_is_named(drawn, hsv, words, expected):
-    refused = hsv("montecarlo", "scenario", drawn, *words)
-    assert refused.code == 2 and expected in refused.error
 
 
 class Failing:

@@ -1,7 +1,6 @@
 import os
 
 import pytest
-from marking import long
 from recorded_flight import record_flight
 from waiting import wait_until
 
@@ -19,26 +18,11 @@ def test_report_writes_the_page_it_is_asked_for(hsv, bag, tmp_path):
     assert '<html lang="en" data-units="paper">' in (tmp_path / "page.html").read_text()
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("BAG", "--out", "page.pdf"), "out = 'page.pdf': expected a file that ends in .html"),
-        (("BAG", "--out", "nowhere/page.html"), "out = 'nowhere/page.html': cannot be written"),
-        (("no_such_bag",), "no_such_bag: does not exist"),
-    ],
-)
-def test_bad_input_of_report_is_refused_in_one_line(hsv, bag, tmp_path, words, said):
-    ran = hsv("report", *(str(bag.path) if word == "BAG" else word for word in words))
-    assert ran.code == 2 and said in ran.error
-    assert not list(tmp_path.glob("*.html"))
-
-
 def test_view_says_how_to_get_a_viewer_where_there_is_none(hsv, bag, monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     ran = hsv("view", str(bag.path))
     assert ran.code == 2
     assert all(name in ran.error for name in ("Foxglove", "Lichtblick", "PlotJuggler", "Rerun", "hsv report"))
-    assert "Rerun" not in hsv("view", str(bag.path), "--with", "plotjuggler").error
 
 
 @pytest.fixture
@@ -67,16 +51,13 @@ def test_view_opens_the_viewer_that_is_installed(hsv, bag, asked):
     assert f"--datafile {bag.path}" in arguments() and "plotjuggler.xml" in arguments()
 
 
-@pytest.mark.parametrize("program", ["foxglove-studio", long("lichtblick")])
-def test_view_with_3d_opens_a_copy_with_pictures_that_is_made_once(hsv, bag, asked, program):
-    arguments = asked(program)
+def test_view_with_3d_opens_a_copy_with_pictures_that_is_made_once(hsv, bag, asked):
+    arguments = asked("foxglove-studio")
     ran = hsv("view", str(bag.path.parent))
     scene = scene_path(bag)
     assert ran.code == 0 and arguments() == f"{scene}\n" and "foxglove.json" in ran.out
     made = scene.stat().st_mtime_ns
     assert hsv("view", str(bag.path.parent)).code == 0 and scene.stat().st_mtime_ns == made
-    os.utime(bag.path)
-    assert hsv("view", str(bag.path.parent)).code == 0 and scene.stat().st_mtime_ns > made
     # It is no bag, and in nobody's way.
     assert hsv("info", str(bag.path.parent)).code == 0
 
@@ -84,12 +65,20 @@ def test_view_with_3d_opens_a_copy_with_pictures_that_is_made_once(hsv, bag, ask
 def test_export_of_a_scene_is_of_every_topic(hsv, bag, tmp_path):
     assert hsv("export", str(bag.path), "--scene", "--out", "scene.mcap").code == 0
     assert (tmp_path / "scene.mcap").stat().st_size > bag.path.stat().st_size
-    again = hsv("export", str(bag.path), "--scene", "--out", "scene.mcap")
-    assert again.code == 2 and "scene.mcap': exists already, expected a new file" in again.error
-    refused = hsv("export", str(bag.path), "--scene", "--topic", "/hsv/state")
-    assert refused.code == 2 and "topic: expected with a table" in refused.error
-    for wrong, said in (("--csv", "--csv, --parquet, --npz and --scene"), ("--exaggeration=-1", "from 0 to 150")):
-        refused = hsv("export", str(bag.path), "--scene", wrong)
-        assert refused.code == 2 and said in refused.error
-    refused = hsv("export", str(bag.path), "--csv", "--exaggeration", "10")
-    assert refused.code == 2 and "exaggeration: expected with --scene" in refused.error
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("export BAG --scene --topic /hsv/state", "topic: expected with a table"),
+        ("export BAG --scene --csv", "--csv, --parquet, --npz and --scene"),
+        ("export BAG --scene --exaggeration=-1", "from 0 to 150"),
+        ("export BAG --csv --exaggeration 10", "exaggeration: expected with --scene"),
+        ("report BAG --out page.pdf", "out = 'page.pdf': expected a file that ends in .html"),
+        ("report BAG --out nowhere/page.html", "out = 'nowhere/page.html': cannot be written"),
+    ],
+)
+def test_wrong_words_are_refused_in_one_line(hsv, bag, tmp_path, words, said):
+    ran = hsv(*words.replace("BAG", str(bag.path)).split())
+    assert ran.code == 2 and said in ran.error
+    assert not list(tmp_path.iterdir())

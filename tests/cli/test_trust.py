@@ -142,14 +142,6 @@ def test_no_reader_of_bags_loads_what_a_bag_names(hsv, loaded, crafted, tmp_path
     assert loaded()
 
 
-@pytest.mark.long
-def test_a_section_of_one_node_brings_no_code(hsv, loaded, crafted):
-    bag = crafted("/tube_mpc")
-    for words in ((), ("--rerun",), ("--node", "tube_mpc"), ("--trust",)):
-        assert hsv("replay", bag, *words).code == 0
-    assert not loaded()
-
-
 def test_no_vehicle_of_a_bag_is_read_from_another_file(hsv, flown, tmp_path):
     (tmp_path / "secret.toml").write_text("secret = 1\n")
     named = f'[vehicle]\nname = "{tmp_path / "secret.toml"}"\n'
