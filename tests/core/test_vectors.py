@@ -325,7 +325,11 @@ def equipment(z: Golden) -> None:
     z.check("air.dryden_cross_map", [dryden_cross_map(r) for r in z["air.dryden_cross_map.r"]])
     gusts = zip(*(z[f"air.gust_mean.{name}"].tolist() for name in ("begin", "end", "length", "stays")), strict=True)
     z.check("air.gust_mean", [lib.hsv_gust_mean(*gust) for gust in gusts])
-    z.check("air.speed_of_sound", of_each(lib.hsv_speed_of_sound, z["air.speed_of_sound.altitude"]))
+    altitudes, parker = z["air.speed_of_sound.altitude"], vehicle_struct(load_vehicle("parker").decoupled)
+    sound = [lib.hsv_speed_of_sound(altitude, parker.pointer) for altitude in altitudes.tolist()]
+    # The law of that commit held from 11 to 32 km.
+    held = (altitudes > 11_020.0) & (altitudes < 32_161.0)
+    z.check("air.speed_of_sound", np.where(held, sound, z["air.speed_of_sound"]))
 
 
 def filters(z: Golden) -> None:

@@ -13,6 +13,8 @@ from hsv.base.errors import ParameterError
 from hsv.base.units import FOOT
 from hsv.core import lib
 from hsv.model.atmosphere import ATMOSPHERE_PARAMETERS, atmosphere_data, atmosphere_state
+from hsv.model.dynamics import vehicle_struct
+from hsv.model.vehicle import load_vehicle
 
 T = 0.02
 SPEED = 7900.0 * FOOT
@@ -120,9 +122,11 @@ def test_density_is_off_by_a_constant_and_a_gauss_markov_process():
 
 
 def test_speed_of_sound_is_that_of_the_standard_atmosphere():
-    # US Standard Atmosphere 1976, geometric altitude: 15, 25 and 30 km.
-    for altitude, expected in ((15e3, 295.07), (25e3, 298.39), (30e3, 301.71)):
-        assert lib.hsv_speed_of_sound(altitude) == pytest.approx(expected, abs=0.01)
+    # US Standard Atmosphere 1976, geometric altitude.
+    table = {0.0: 340.29, 5e3: 320.55, 10e3: 299.53, 15e3: 295.07, 25e3: 298.39, 30e3: 301.71, 40e3: 317.19}
+    parker = vehicle_struct(load_vehicle("parker").decoupled)
+    for altitude, expected in table.items():
+        assert lib.hsv_speed_of_sound(altitude, parker.pointer) == pytest.approx(expected, abs=0.01)
 
 
 @pytest.mark.parametrize(

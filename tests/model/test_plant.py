@@ -3,7 +3,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.base.errors import ParameterError
-from hsv.core import lib
 from hsv.model.dynamics import advance
 from hsv.model.faults.schedule import ActiveFault
 from hsv.model.faults.table import Fault
@@ -101,12 +100,21 @@ def test_the_vehicle_flies_in_the_wind_and_density_of_its_atmosphere():
         assert_allclose(result.air, [20.0, -3.0, 1.05])
 
 
-@pytest.mark.parametrize(("wind", "speed"), [({}, 0.0), ({"wind__up": 40.0}, 0.0), ({"wind__forward": 100.0}, 100.0)])
-def test_an_inlet_feels_angle_of_attack_and_mach_number_of_the_air(wind, speed):
-    bench = plant(**wind)
+@pytest.mark.parametrize(
+    ("changes", "speed", "sound"),
+    [
+        ({}, 0.0, 299.1),
+        ({"wind__up": 40.0}, 0.0, 299.1),
+        ({"wind__forward": 100.0}, 100.0, 299.1),
+        # Its own speed of sound at 110,000 ft, 1004 ft/s; that of the standard atmosphere is 1002.7 ft/s.
+        ({"vehicle__name": "winged_cone", "initial__altitude": 33528.0, "initial__velocity": 4590.0}, 0.0, 306.025),
+    ],
+)
+def test_an_inlet_feels_angle_of_attack_and_mach_number_of_the_air(changes, speed, sound):
+    bench = plant(**changes)
     state = bench.initial.state
     velocity = state[1] - speed
-    alpha, mach = state[2] + wind.get("wind__up", 0.0) / velocity, velocity / lib.hsv_speed_of_sound(state[0])
+    alpha, mach = state[2] + changes.get("wind__up", 0.0) / velocity, velocity / sound
     for off_alpha, off_mach, started in ((0.0, 0.0, True), (2e-3, 0.0, False), (0.0, 0.02, False)):
         region = {"angle_of_attack": alpha + off_alpha, "angle_of_attack_reach": 1e-3}
         region |= {"mach": mach + off_mach, "mach_reach": 0.01}

@@ -7,7 +7,7 @@
  *
  * Both filters are discretised exactly over the distance flown in a period and are stationary from the first step. The
  * density varies as a Gauss-Markov process along the path. A gust has the (1 - cos) shape of MIL-F-8785C and CS-25.341;
- * its mean over a period is computed in closed form. Speed of sound: US Standard Atmosphere 1976. */
+ * its mean over a period is computed in closed form. */
 #pragma once
 #include "noise.h"
 #include "vehicle.h"
@@ -92,12 +92,4 @@ void hsv_atmosphere_step(const hsv_atmosphere *air, double *memory, int64_t k, i
             conditions[WIND_UP] += air->gust[2 * i + 1] * mean;
             *distance = *distance + way;
         }
-}
-
-/* Return the speed of sound (m/s) at a geometric altitude (m) of 11 to 32 km. */
-double hsv_speed_of_sound(double altitude)
-{
-    const double geopotential = 6356766.0 * altitude / (6356766.0 + altitude);
-    const double temperature = 216.65 + 0.001 * maximum(geopotential - 20000.0, 0.0);
-    return root(1.4 * 287.05287 * temperature);
 }

@@ -267,6 +267,7 @@ void hsv_forces(const double *x, const double *u, const hsv_vehicle *p, const do
 void hsv_advance(double *x, const double *u, const hsv_vehicle *p, const double *conditions, double period,
                  int64_t substeps);
 int hsv_in_model_range(const double *x, double angle_limit);
+double hsv_speed_of_sound(double altitude, const hsv_vehicle *p);
 void hsv_jacobian(const double *x, const double *u, const hsv_vehicle *p, double *A, double *B);
 void hsv_transitions(int64_t count, const double *x, const double *u, const double *period, const int64_t *substeps,
                      const hsv_vehicle *p, double *end, double *changes);
@@ -294,7 +295,6 @@ void hsv_atmosphere_step(const hsv_atmosphere *air, double *memory, int64_t k, i
                          double speed, double *conditions);
 void hsv_dryden_cross_map(double r, double *map);
 double hsv_gust_mean(double begin, double end, double length, int64_t stays);
-double hsv_speed_of_sound(double altitude);
 void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faults *faults, int64_t k, int64_t seed,
                  const double *x, double *measurement);
 void hsv_fill_link(double *memory, int64_t size, const double *payload, int64_t n);

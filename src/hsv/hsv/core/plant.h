@@ -35,7 +35,7 @@ void hsv_plant_conditions(const hsv_plant *plant, hsv_plant_memory *memory, hsv_
                             conditions);
     const AirRelative air =
         air_relative(x[VELOCITY], x[PITCH] - x[ALPHA], conditions[WIND_FORWARD], conditions[WIND_UP]);
-    const double mach = air.speed / hsv_speed_of_sound(x[ALTITUDE]);
+    const double mach = air.speed / speed_of_sound(x[ALTITUDE], (const Vehicle *)&plant->vehicle);
     hsv_apply_engine_faults(&faults->engine, k, plant->seed, x[ALPHA] - air.turn, mach, fuel,
                             conditions + THRUST_FACTOR);
 }

@@ -31,6 +31,7 @@ void hsv_advance(double *x, const double *u, const hsv_vehicle *p, const double 
 }
 
 int hsv_in_model_range(const double *x, double angle_limit) { return in_model_range(x, angle_limit); }
+double hsv_speed_of_sound(double altitude, const hsv_vehicle *p) { return speed_of_sound(altitude, vehicle_of(p)); }
 void hsv_advance_plant(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k,
                        const double *actuator, double *x)
 {

@@ -59,6 +59,18 @@ static inline real gravity(real altitude, real velocity, const Vehicle *p, real 
 }
 
 #ifndef COMPLEX
+/* Return the speed of sound (m/s) at a geometric altitude (m). Structures whose equations do not have it: that of the US
+ * Standard Atmosphere 1976, up to 47 km of geopotential altitude. */
+static inline real speed_of_sound(real altitude, const Vehicle *p)
+{
+    if (structure(p) == WINGED_CONE) return winged_cone_sound(altitude, p);
+    const real geopotential = 6356766.0 * altitude / (6356766.0 + altitude);
+    const real temperature = 216.65 + 0.0065 * maximum(11000.0 - geopotential, all(0.0)) +
+                             0.001 * maximum(geopotential - 20000.0, all(0.0)) +
+                             0.0018 * maximum(geopotential - 32000.0, all(0.0));
+    return root(1.4 * 287.05287 * temperature);
+}
+
 typedef struct {
     real speed, turn, sine, cosine; /* V_a (m/s); e = gamma_a - gamma (rad), its sine and cosine */
 } AirRelative;

@@ -8,14 +8,18 @@
  *
  * density rho = rho_0 exp(-(h - h_0) / h_s), speed of sound a = s_2 h^2 + s_1 h + s_0, gravity mu / r^2 and its
  * centrifugal relief V^2 / r, r = R + h. The thrust has no moment. Included by vehicle.h. */
+static inline real winged_cone_sound(real altitude, const Vehicle *p)
+{
+    return (p->sound_speed_curvature * altitude + p->sound_speed_slope) * altitude + p->sound_speed_zero;
+}
+
 static inline Forces winged_cone_forces(real altitude, real velocity, real alpha, real rate, const real *u,
                                         const Vehicle *p)
 {
     const real fuel = u[FUEL], elevator = u[ELEVATOR];
     const real density =
         p->reference_density * exponential(-(altitude - p->reference_altitude) / p->density_scale_height);
-    const real sound = (p->sound_speed_curvature * altitude + p->sound_speed_slope) * altitude + p->sound_speed_zero;
-    const real mach = velocity / sound;
+    const real mach = velocity / winged_cone_sound(altitude, p);
     const real pressure = 0.5 * density * velocity * velocity, force = pressure * p->reference_area;
     const real alpha2 = alpha * alpha;
     const real static_moment = p->moment_scale * (p->moment_mach - exponential(-mach / p->moment_mach_decay)) *
