@@ -243,6 +243,8 @@ def design(
     shipped = load_subject(source.with_suffix(".yaml")) if check else None
     for path in () if check else (target, certificate_path(target)):
         check_new(path, "out", force)
+    import cvxpy  # noqa: F401  where it is missing, the command ends before the estimate
+
     size = "adjustable" if inputs.adjustable else "baseline"
     print_estimate(_DESIGN_SECONDS[size], json, f" for a design of the size of {size}")
     with stages() as progress:
