@@ -65,7 +65,7 @@ class PeerEmulatorNode(LockstepNode):
         )
         self._peers[peer.name] = node
         for topic in peer.publishes:
-            self.claim(topic, f"no {peer.name} beside its emulator")
+            self.claim(topic, f"no {peer.name} while its emulator runs")
             yield topic, node.create_publisher(message_class(description.TOPICS[topic]), topic, STEP)
         for topic in me.publishes:
             if topic in peer.subscribes:

@@ -179,7 +179,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument("bag", type=Path, help="bag directory, or its .mcap file")
     parser.add_argument("--rate", type=float, default=1.0, help="pace: 1 as recorded, 10 ten times as fast")
     parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, and the clock; default: all")
-    parser.add_argument("--no-clock", action="store_true", help="leave the clock to somebody else")
+    parser.add_argument("--no-clock", action="store_true", help="do not publish /clock")
     parser.add_argument("--paused", action="store_true", help="begin paused: call /player/step or /player/resume")
     parser.add_argument(
         "--delay", type=float, default=1.0, help="wall time (s) that subscribers get to discover the player"

@@ -75,7 +75,7 @@ class Bag:
         path: A bag directory, or a file in it.
 
     Raises:
-        RecordingError: The bag does not exist, is not an MCAP file, cannot be read at all, or is not of this project.
+        RecordingError: The bag does not exist, is not an MCAP file, cannot be read, or is not of this project.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -90,7 +90,7 @@ class Bag:
         """Whether the writer closed every file; a killed writer leaves a truncated file."""
         self.loss = Loss(files=missing)
         self.contradictions: list[str] = []
-        """What metadata.yaml states otherwise than the files, which are believed."""
+        """Statements of metadata.yaml that contradict the files; the files count."""
         self.attachments: dict[str, bytes] = {}
         self.media_types: dict[str, str] = {}
         """Media type of each attachment."""

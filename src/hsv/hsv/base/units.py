@@ -348,7 +348,8 @@ def _scaled(number: Fraction, square: Fraction) -> float:
     if not number:
         return 0.0
     product = number * number * square
-    # A whole number of at least _ROOT_BITS bits; where the root goes on behind it, its last bit says so.
+    # An integer of at least _ROOT_BITS bits. Its last bit is set if the root has further digits, so that rounding once
+    # is exact.
     shift = max(0, _ROOT_BITS - (product.numerator.bit_length() - product.denominator.bit_length()) // 2)
     whole, rest = divmod(product.numerator << 2 * shift, product.denominator)
     root = math.isqrt(whole)

@@ -118,10 +118,11 @@ class _Solution:
 class KothareLaw:
     """u_n = K x_n with K from the LMI for x_n(k), in effect from step k + ``SOLVE_STEPS`` exactly.
 
-    A worker thread solves in between; where it is late, that step waits for it: the flight depends on the nominal
-    state alone, never on timing. Until the first solution the family flies. A gain is taken over only if x_n then lies
-    in its ellipsoid, in which (35) bounds the input; otherwise, and where the solver fails, the gain before it stays
-    and the status says so. Inside the family's innermost ellipsoid the last gain stays: there is nothing left to gain.
+    A worker thread solves between the steps. A step whose solution is late waits for it, so that the flight depends on
+    the nominal state alone, never on timing. Until the first solution the family of gains is used. A new gain replaces
+    the last one only if x_n lies in its ellipsoid, in which (35) bounds the input; otherwise, and if the solver fails,
+    the last gain stays and the status reports it. It also stays inside the family's innermost ellipsoid, where a
+    new gain could not improve it.
     """
 
     in_core = False

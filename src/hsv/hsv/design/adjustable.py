@@ -43,7 +43,7 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
 
     W' is W with the fault and the parameter bounds scaled by tau (paper eq. 47). Z' is invariant under tau F' and under
     F', so that tau may change in flight between its value here and 1; the paper's Z' = tau Z, which holds only if W'
-    were tau W under F' itself, is reported beside it. The bounds of K' grow as U minus F' Z' does (eq. 52, eq. 53).
+    were tau W under F' itself, is reported as well. The bounds of K' grow as U minus F' Z' does (eq. 52, eq. 53).
 
     Arguments and errors as for :func:`hsv.design.baseline.design_baseline`; a DesignError, too, where ``inputs`` has no
     adjustable factor, chooses what such a design cannot have, or where a plan has no room at a certified factor.
@@ -160,7 +160,7 @@ def relaxed_bound(
     Both are compared about the target's ``trim_input`` (2), on the side with less room (paper eq. 53), and rounded.
 
     Raises:
-        DesignError: No room at all, at tau = 1 or at the factor.
+        DesignError: The tightened constraints are empty at tau = 1 or at the factor.
     """
     before, after = complete.symmetric(trim_input), incomplete.symmetric(trim_input)
     for name, room in (("U minus F Z at tau = 1", before), ("U minus F' Z'", after)):

@@ -32,7 +32,7 @@ class TubeProblem:
         """Return (r, n, d + 1) the effect of the disturbances at half their width on e - ``centre``.
 
         The last column is what each vertex moves the centre by under the mid-points: no choice of centre makes it
-        vanish at all vertices.
+        vanish at every vertex.
         """
         A, G = self.system.A, self.system.G
         drift = A @ centre + G @ self.disturbance.centre - centre

@@ -84,13 +84,13 @@ def replay_over_dds(
     # Stamps are whole nanoseconds, the campaign's time is not: the last bit of an integral over time would differ.
     data = replace(data, time=np.arange(len(data.time)) * runner.period)
     repeated = runner.outcome(FlightReading.of(data, runner.level(data), flight_fingerprint(recorded)))
-    told = not (
+    exact = not (
         measurement_errors(joined(recorded, equipment_topics(recorded)))
         or prepared.scenario.settings.get(ESTIMATOR_ENABLED.name)
     )
-    if repeated["tube_level"] is not None and told:
-        # What the controller itself published, not what is computed from its messages. It is that of the state it is
-        # given: of the true one, which a campaign keeps, only where it is told the truth.
+    if repeated["tube_level"] is not None and exact:
+        # The level that the controller published. It belongs to the state that the controller receives, which is the
+        # true state of the campaign only without measurement errors and without an estimator.
         repeated["tube_level"] = float(np.max(recorded.columns(TUBE_STATUS)["level"]))
     return ReplayedFlight(flight, _outcome(row), repeated, bag)
 

@@ -1,8 +1,7 @@
-"""What belongs to one process of this machine: in a ROS domain, nodes, topics and the namespace of a run; and ports.
+"""Locks of this machine: nodes, topics and run namespaces of a ROS domain, and ports, each held by one process.
 
-Each name in a domain is an abstract socket, which one process can bind: it is taken at once, before a second process
-has sent anything, and free as soon as its process is gone, however that ended. Other machines of the domain do not know
-of it.
+A lock is an abstract socket with the name of what it locks. Only one process can bind it, before it sends anything, and
+the kernel releases it when the process ends for whatever reason. Other machines of the domain do not see the lock.
 """
 
 from __future__ import annotations

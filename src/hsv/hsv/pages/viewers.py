@@ -35,7 +35,7 @@ class Viewer:
 
 
 def layout_for(bag: Bag, name: str) -> Path:
-    """Write the layout of file name ``name`` for the topics of ``bag`` beside the bag, and return its path.
+    """Write the layout file ``name`` for the topics of ``bag`` into the bag's folder, and return its path.
 
     Raises:
         RecordingError: It cannot be written.

@@ -58,12 +58,11 @@ typedef struct {
     double maximum;
 } hsv_parameter;
 
-/* Step k = 0, 1, 2, ... of a run; anything but 0 ends the flight.
+/* Compute step k = 0, 1, 2, ... of a run. Return 0; any other value ends the flight.
  *
- * in: the input signals, one after the other. out: the output signals, all of which are to be written. state: what is
- * kept from step to step, all zero at k = 0. par: the parameters, one after the other. The four do not overlap, and
- * in and par are not written. Nothing else may be kept: no static variables, no heap, no random numbers of one's own.
- * Flights would no longer be repeatable, one by one and many at a time.
+ * in: the input signals, one after the other. out: the output signals; write all of them. state: the memory from step
+ * to step, zero at k = 0. par: the parameters, one after the other. The four do not overlap; do not write in and par.
+ * Keep no other memory (static variables, heap, random numbers): flights would no longer repeat.
  */
 typedef int32_t (*hsv_step)(int64_t k, const double *in, double *out, double *state, const double *par);
 
@@ -112,8 +111,8 @@ enum {
 };
 
 /* The inputs and outputs of a controller. It may leave out inputs at the end; HSV_FILTER_STATE_INPUT follows where it
- * reads the notch filter's state, with as many numbers as the filter has that it flies with. The outputs are the wanted
- * input of the vehicle, which the bench limits. */
+ * reads the notch filter's state, with as many numbers as the filter has that it flies with. The output is the
+ * unsaturated input of the vehicle, which the bench clips to its limits. */
 #define HSV_CONTROLLER_INPUTS \
     {"estimate", HSV_STATE_UNITS, HSV_STATES}, \
     {"filtered_pitch_rate", "rad/s", 1}, \

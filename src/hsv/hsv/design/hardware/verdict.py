@@ -85,7 +85,7 @@ class Verdict:
     """Whether a design is certified with some models: ``half_width`` (5) of the rigid states, ``feedback`` (2), SI.
 
     ``room`` (2, 2): what the nominal plan leaves of each input, lower and upper side; below zero it does not fit.
-    ``reason``: why there is no set at all.
+    ``reason``: why there is no invariant set.
     """
 
     name: str

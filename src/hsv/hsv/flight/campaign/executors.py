@@ -273,7 +273,7 @@ class DaskExecutor(_PoolExecutor):
         try:
             return future.result()
         except KilledWorker as error:
-            raise RunError(f"campaign: several workers died of the same batch ({error}); {_KEPT}") from error
+            raise RunError(f"campaign: the same batch crashed several workers ({error}); {_KEPT}") from error
         except ImportError as error:
             raise RunError(f"campaign: a worker that came later has another program ({error}); {_KEPT}") from error
         except (CancelledError, OSError) as error:

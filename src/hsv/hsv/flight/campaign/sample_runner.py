@@ -1,4 +1,4 @@
-"""The flights of a campaign: components that all flights share are built once, and flights are read while they fly."""
+"""The flights of a campaign: shared components are built once, and metrics are computed while the flights run."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ class Flight {
     setInterval(() => this.draw(), REDRAW);
   }
 
-  /* The time window of the toolbar, which a zoom sets, or else what has been flown, as far as it is wanted. */
+  /* The time window that a zoom has set; otherwise the last seconds of the flight that the toolbar selects, or all. */
   window() {
     const last = Number(this.toolbar.form.elements.window.value);
     return this.toolbar.time ?? (last ? [Math.max(0, this.now - last), Math.max(this.now, 1)] : null);

@@ -99,7 +99,7 @@ class SideView {
   }
 }
 
-/* The pictures of a page: of each flight, and of the nominal trajectory where a figure says so. */
+/* The pictures of a page: one for each flight, and one for the nominal trajectory if the figure has it. */
 class Vehicle {
   constructor(charts, toolbar, slider) {
     Object.assign(this, { charts, time: 0, views: [] });
