@@ -1,6 +1,6 @@
 """Independent verification of a design: recompute every statement of its certificate with numpy.
 
-This module imports nothing of :mod:`hsv.design`; only the model of the vehicle, :mod:`hsv.model`, is common to both. It
+This module imports nothing of the code that designs; only the model of the vehicle, :mod:`hsv.model`, is common. It
 reads the numbers in flight (vertices A_i, B_i, gains F and K) from the design file, and the statements about them from
 the certificate. It recomputes the vertices from the parameters of the vehicle, and every inequality from its matrices;
 :mod:`hsv.flight.verification` repeats the flights.

@@ -1,4 +1,9 @@
-"""The adjustable design (paper section 4, Algorithm 1): notch filter in the model, factor tau on the feedback."""
+"""The adjustable design (paper section 4, Algorithm 1): notch filter in the model, factor tau on the feedback.
+
+    u = tau F' (x' - x_n' - x_r') + K' x_n' + u_r,   0 < tau <= 1                                             (48), (54)
+
+The steps: model (45), F' (24), W' (47), Z' for all factors from tau to 1 (25)-(28), U minus F' Z' (53), K' (49)-(52).
+"""
 
 from __future__ import annotations
 

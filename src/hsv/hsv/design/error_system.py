@@ -1,7 +1,11 @@
-"""The error system of the tube: how e = x - x_r - x_n and the error of the notch filter evolve (paper eq. 22).
+"""The error system of the tube: how e = x - x_r - x_n and the error of the notch filter evolve (paper eq. 22, eq. 23).
 
-The paper's error system leaves the notch filter out. Here its states belong to it: e_s = s - s_n, where s_n is the
-state of the same filter fed with the pitch rate of reference + nominal from the same start. Then
+(18) less (20) gives, with the feedback F e closed,
+
+    e(k+1) = (A_i + B_i F) e(k) + Delta(k)                                                                    (22), (23)
+
+at every vertex i. The paper's error system leaves the notch filter out. Here its states belong to it: e_s = s - s_n,
+where s_n is the state of the same filter fed with the pitch rate of reference + nominal from the same start. Then
 e_s(k+1) = A_s e_s + B_s e_q exactly, and the feedback sees F_q (C_s e_s + D_s e_q) plus F_q (notch(q_n) - q_n), a
 signal of the plan alone. The pitch rate in e is the true one.
 

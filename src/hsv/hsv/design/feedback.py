@@ -1,4 +1,17 @@
-"""The tube's feedback gain F by linear matrix inequalities over all vertices (paper eq. 22 to eq. 24)."""
+"""The tube's feedback gain F by linear matrix inequalities over all vertices (paper eq. 22 to eq. 24).
+
+Without disturbances the error e(k+1) = (A_i + B_i F) e(k) of (22) decreases in e' N^-1 e at every vertex if, for
+F = M N^-1,
+
+    [N, (A_i N + B_i M)'; A_i N + B_i M, N] > 0.                                                                   (24)
+
+This alone does not determine F. The design takes the F with the least common bound of the quadratic cost of the
+responses to the columns D of typical disturbances: it minimises the trace of Z with
+
+    [Z, D'; D, N] >= 0,   [N, (A_i N + B_i M)', (R N)', M'; ., N, 0, 0; ., ., I, 0; ., ., ., I] >= 0,
+
+where R and the unit matrix weigh the states and the inputs by their scales.
+"""
 
 from __future__ import annotations
 

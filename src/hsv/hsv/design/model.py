@@ -1,4 +1,12 @@
-"""The polytopic model of a design (paper eq. 10 to eq. 12, eq. 45) and its accuracy between the samples."""
+"""The polytopic model of a design (paper eq. 10 to eq. 12, eq. 45) and its accuracy between the samples.
+
+The decoupled vehicle, linearised in its trims over altitude and velocity p and sampled with held inputs, is a convex
+combination of vertices, with weights that are products of those of altitude and of velocity:
+
+    x(k+1) = A(p) x(k) + B(p) u(k),   [A(p), B(p)] = sum_i w_i(p) [A_i, B_i],   w_i >= 0, sum_i w_i = 1       (11), (12)
+
+(45) is the same of the vehicle with its notch filter.
+"""
 
 from __future__ import annotations
 

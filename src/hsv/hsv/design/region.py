@@ -1,4 +1,6 @@
-"""The declared region of a design: the flights over which its disturbances are measured.
+"""The declared region of a design: the flights over which its disturbances are measured (paper eq. 17, eq. 19, eq. 47).
+
+    W = {Delta: lower <= Delta <= upper in all flights},   W'(tau): the same with tau times the fault and the bounds.
 
 The flights are simulated with the real closed loop: the coupled vehicle, the notch filter, the design's own gains, the
 step from the design's start to its target, the fault; parameters nominal and at every corner of their bounds.

@@ -1,4 +1,6 @@
-"""Tightened bounds of the nominal input (paper eq. 30): U minus F Z, per side, with the trim.
+"""Tightened bounds of the nominal input: U minus F Z, per side, with the trim (paper eq. 30, with F' and Z' eq. 53).
+
+    u_n + u_r in {u: minimum - min F e <= u <= maximum - max F e over e in c + Z}                                   (30)
 
 U is not symmetric about trim and the tube not about zero, so every side has its own bound. The feedback consists of F e
 over c + Z, of a part from filtering the nominal pitch rate, and of the response to the lag of the plan where the design
