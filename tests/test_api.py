@@ -70,6 +70,18 @@ def test_a_trim_point_has_names_and_units():
         hsv.trim("200 ft", "10 ft/s")
 
 
+def test_trim_and_linear_model_of_a_rigid_vehicle_have_no_elastic_states():
+    cruise = {"altitude": "110000 ft", "velocity": "15060 ft/s", "vehicle": "winged_cone"}
+    rigid = ["altitude", "velocity", "angle_of_attack", "pitch_angle", "pitch_rate"]
+    assert [*hsv.trim(**cruise).quantities] == [*rigid, "fuel_equivalence_ratio", "elevator_deflection"]
+    found = hsv.linearise(**cruise)
+    assert [*found.states] == rigid and found.A.shape == (5, 5) and len(found.operating_state) == 5
+    assert max(mode.pole.real for mode in found.poles) == pytest.approx(0.715, abs=5e-4)
+    extended = hsv.linearise(**cruise, model="ECM")
+    assert [*extended.states] == [*rigid[:4], "filtered_pitch_rate", "filter_1", "filter_2"]
+    assert extended.B.shape == (7, 2)
+
+
 @pytest.mark.parametrize("model", ["CM", "DM", "ECM"])
 def test_a_linear_model_describes_itself_and_is_one_of_python_control(model, tmp_path):
     found = hsv.linearise(model=model)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import hsv
 from hsv.base.errors import QuantityError
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
@@ -107,6 +108,14 @@ def test_its_flight_has_no_metric_of_modes_and_stays_in_the_certified_tube():
     assert not any(name.startswith("elastic") for name in flight.metrics)
     limits = load_scenario("winged_cone").limits
     assert all(abs(flight.metrics[name]) <= limit for name, limit in limits.items())
+
+
+@pytest.mark.long
+def test_at_all_corners_of_its_uncertainty_none_is_lost_and_none_leaves_the_set():
+    flights = hsv.montecarlo("winged_cone", method="corners")
+    assert len(flights) == 128 and not flights["diverged"].any() and not flights["crashed"].any()
+    assert (flights["end_time"] == 200.0).all() and (flights["saturated_steps"] == 0).all()
+    assert flights["tube_level"].max() == pytest.approx(0.205, abs=5e-4)
 
 
 def test_parameters_of_another_structure_are_refused_and_perturbations_of_it_are_named():

@@ -23,8 +23,9 @@ SCENARIOS = (
     "case2",
     "case2_derived",
     "case1_integral_heavy",
+    "winged_cone",
 )
-"""Both vehicle models and couplings, every law that solves no problem in flight, commands and faults of both cases."""
+"""Structures, models and couplings of the vehicle, every law that solves no problem in flight, commands and faults."""
 
 
 def fly(environment: Environment | None = None, **variables: str) -> dict[str, Any]:

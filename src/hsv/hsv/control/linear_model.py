@@ -17,6 +17,8 @@ from hsv.model.lpv.linearisation import Filter, Mode, extended_jacobian, extende
 from hsv.model.signals import (
     INPUT_NAMES,
     INPUT_UNITS,
+    N_RIGID,
+    N_STATES,
     PUBLISHED_ALTITUDE,
     PUBLISHED_VELOCITY,
     STATE_NAMES,
@@ -123,6 +125,8 @@ def linearise(
 ) -> LinearModel:
     """Return the linear model at a level trim (paper eq. 6 to eq. 9; for the ECM eq. 40 to eq. 43), SI.
 
+    That of a rigid vehicle has no elastic states.
+
     Args:
         altitude: m, or a text with its unit.
         velocity: m/s, or a text with its unit.
@@ -157,6 +161,10 @@ def linearise(
         states |= {f"filter_{i + 1}": FILTER_UNITS[i % 2] for i in range(len(notch.B))}
     else:
         A, B = jacobian(point.state, point.input, parameters)
+    if not parameters.form.elastic:
+        kept = [i for i in range(len(A)) if not N_RIGID <= i < N_STATES]
+        A, B, state = A[np.ix_(kept, kept)], B[kept], state[kept]
+        states = {name: unit for i, (name, unit) in enumerate(states.items()) if i in kept}
     C, D = np.eye(len(A)), np.zeros_like(B)
     inputs = dict(zip(INPUT_NAMES, INPUT_UNITS, strict=True))
     named = (vehicle or DEFAULT_VEHICLE, coupling, model, reading)

@@ -13,7 +13,7 @@ from hsv.base.units import parse_quantity
 from hsv.core import doubles, lib
 from hsv.core.arithmetic import arcsine
 from hsv.model.dynamics import MODELS, VehicleParameters, derivative, vehicle_struct
-from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES, STATE_NAMES, STATE_UNITS
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_RIGID, N_STATES, STATE_NAMES, STATE_UNITS
 from hsv.model.vehicle import COUPLING_PARAMETER, Vehicle
 
 CONVERGED = 1e-9
@@ -36,10 +36,11 @@ class Trim:
 
     @property
     def quantities(self) -> dict[str, tuple[float, str]]:
-        """State and input by name, each with its SI unit."""
-        values = (*self.state.tolist(), *self.input.tolist())
-        units = (*STATE_UNITS, *INPUT_UNITS)
-        return dict(zip((*STATE_NAMES, *INPUT_NAMES), zip(values, units, strict=True), strict=True))
+        """State and input by name, each with its SI unit; without the elastic states of a rigid vehicle, which rest."""
+        n = N_STATES if self.state[N_RIGID:].any() else N_RIGID
+        values = (*self.state[:n].tolist(), *self.input.tolist())
+        units = (*STATE_UNITS[:n], *INPUT_UNITS)
+        return dict(zip((*STATE_NAMES[:n], *INPUT_NAMES), zip(values, units, strict=True), strict=True))
 
 
 def balance(
