@@ -281,7 +281,7 @@ class TubeLaw(Controller):
             raise SignalError(
                 "filter_state", f"filter_state: {size} numbers, expected {due} of the notch filter flown, or none"
             )
-        in_loop = 0 < size == due
+        in_loop = size == due
         planned = filter_state if k == 0 else self._memory["planned"][:size].copy()
         feedback, total, u, active = tube_step(self.kernel, self._memory, inputs)
         self._next = k + 1
