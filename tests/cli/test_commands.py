@@ -218,6 +218,7 @@ def test_a_bad_scenario_or_design_is_refused_before_anything_is_written(hsv, tmp
         ("trim --units imperial", "Invalid value for '--units': 'imperial' is not one of"),
         ("trim --wings", "No such option: --wings"),
         ("simulat case1", "command 'simulat': unknown (did you mean 'simulate'?)"),
+        ("list", "Missing argument 'scenarios|vehicles|faults|equipment|controllers'. Choose from: scenarios,"),
         ("simulate a b", "Got unexpected extra argument"),
         ("simulate case1 --json --json", "--json: given twice, expected once"),
         ("resilience --list --controllers ''", "--controllers = '': expected a text that is not empty"),

@@ -192,8 +192,8 @@ def run(prog: str, commands: Mapping[str, Command], description: str, moved: Map
 
 
 def _usage(error: Any, prog: str) -> str:
-    # For a choice, typer also prints the type of its own exception.
-    message = error.format_message().replace(": Value error, ", ": ")
+    # For a choice, typer also prints the type of its own exception; choices that are missing it lists a line each.
+    message = " ".join(error.format_message().replace(": Value error, ", ": ").split())
     if choice := re.search(r"'([^']*)' is not one of (.*)\.$", message):
         message += did_you_mean(choice[1], re.findall(r"'([^']*)'", choice[2]))
     return f"{message} (see {error.ctx.command_path if error.ctx else prog} --help)"
