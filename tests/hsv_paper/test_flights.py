@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import numpy as np
 
 from hsv.flight.assembly import assemble, flight_parameters
@@ -7,7 +5,7 @@ from hsv.flight.closed_loop import fly
 from hsv.flight.corners import corners
 from hsv.flight.scenario import load_scenario
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.flights import Flights, Point, fly_over, kept
+from hsv_paper.flights import Flights, Point, fly_over
 
 
 def test_a_flight_in_process_is_flown_once_and_not_kept(tmp_path):
@@ -57,19 +55,3 @@ def test_tables_are_flown_once_and_found_again(tmp_path):
     [other] = flights.tables("a sweep", points[1:])
     assert np.array_equal(other["altitude_end_error"], flown[1]["altitude_end_error"])
     assert len(list(tmp_path.iterdir())) == 1
-
-
-def test_what_is_kept_is_made_once_for_a_digest(tmp_path):
-    made = []
-
-    def get(digest):
-        def make():
-            made.append(digest)
-            return digest
-
-        return kept(tmp_path / "new" / f"probe_{digest}.txt", make, Path.write_text, Path.read_text)
-
-    first, second = "0123456789ab", "ba9876543210"
-    assert [get(first), get(first), get(second)] == [first, first, second]
-    assert made == [first, second]
-    assert [path.name for path in (tmp_path / "new").iterdir()] == [f"probe_{second}.txt"]

@@ -27,8 +27,8 @@ StudyOption = Annotated[Path, typer.Option("--out", help="Folder for a PDF, a PN
 
 _FLIGHTS = Path("bags/study")
 
-_SECONDS = {"figure": 4.0, "claims": 900.0}
-"""Time on one processor: of a figure, and of the claims with their 17 scenarios of 1025 vehicles each."""
+_FIGURE, _CLAIMS = 4.0, 900.0
+"""Time (s) on one processor: of a figure, and of the claims with their 17 scenarios of 1025 vehicles each."""
 
 
 def main() -> None:
@@ -59,22 +59,22 @@ def figures(
     chosen = [figure for number, figure in FIGURES.items() if not only or number in only]
     check_folder(out, "out")
     out.mkdir(parents=True, exist_ok=True)
-    print_estimate(_SECONDS["figure"] * len(chosen), json)
-    written = {}
+    print_estimate(_FIGURE * len(chosen), json)
+    rows: list[dict[str, Any]] = []
     with stages() as progress, matplotlib.rc_context(RC):
         source = Flights(out)
         for done, figure in enumerate(chosen):
             progress("figures", done, len(chosen))
             drawing = figure.draw(source)
-            written[figure.number] = save(drawing.figure, out / figure.stem)
+            paths = save(drawing.figure, out / figure.stem)
+            rows.append({"number": figure.number, "paths": list(map(str, paths))})
             (out / f"{figure.stem}.md").write_text(figure.page(drawing), encoding="utf-8")
         progress("figures", len(chosen), len(chosen))
     if json:
-        rows = [{"number": number, "paths": list(map(str, paths))} for number, paths in written.items()]
         print_json({"figures": rows})
         return
-    for number, paths in written.items():
-        console.print(f"Figure {number:2}  {', '.join(map(str, paths))}", soft_wrap=True)
+    for row in rows:
+        console.print(f"Figure {row['number']:2}  {', '.join(row['paths'])}", soft_wrap=True)
 
 
 def claims(
@@ -96,7 +96,7 @@ def claims(
     if out:
         check_target(out, "out")
     check_folder(flights, "flights")
-    print_estimate(_SECONDS["claims"], json, f", less with the flights kept in {flights}")
+    print_estimate(_CLAIMS, json, f", less with the flights kept in {flights}")
     with stages() as progress:
         evidence = Evidence(flights, progress)
         judged = judge(evidence, progress)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hsv.base.units import FOOT
-from hsv.control.design import ControlDesign, certificate_path, find_design, read_certificate, read_design
+from hsv.control.design import ControlDesign, TubeSet, certificate_path, find_design, read_certificate, read_design
 from hsv.control.notch_filter import NotchSection, continuous, series
 from hsv.design.inputs import DesignInputs, inputs_from_report
 from hsv.design.model import polytopic_model
@@ -33,6 +33,13 @@ def design(name: str) -> ControlDesign:
 def certificate(name: str) -> dict[str, Any]:
     """Return the certificate of a shipped design."""
     return read_certificate(certificate_path(find_design(name)))
+
+
+def tube_of(name: str) -> TubeSet:
+    """Return the invariant set of a shipped design."""
+    found = design(name).tube
+    assert found is not None
+    return found
 
 
 def inputs_of(name: str) -> DesignInputs:

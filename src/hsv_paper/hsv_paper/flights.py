@@ -6,10 +6,10 @@ A kept table has a digest of all it depends on in its name.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -23,12 +23,10 @@ from hsv.flight.scenario import load_scenario
 from hsv.flight.side_by_side import TubeLevels, fly_perturbed
 from hsv.flight.sources import DIGITS, code_digest, digest_of, drop_older
 from hsv.model.plant import FlightStatus
-from hsv_paper.designs import design
+from hsv_paper.designs import tube_of
 
 Table = dict[str, np.ndarray]
 """Columns (flights) by measure, the nominal vehicle first; NaN where a flight does not define the measure."""
-
-Result = TypeVar("Result")
 
 AFTER = 20.0
 """Seconds after the fault over which errors are averaged."""
@@ -76,20 +74,28 @@ class Flights:
             points: What is flown.
             keep: Keep the tables; not where flights depend on code outside this library.
         """
-
-        def flown() -> list[Table]:
-            total, done, found = sum(len(point.over) for point in points), 0, []
-            for point in points:
-                found.append(fly_over(point, lambda n, before=done: self._progress(name, before + n, total)))
-                done += len(point.over)
-            return found
-
-        if not keep:
-            return flown()
         asked = [[dict(point.values), [dict(corner) for corner in point.over]] for point in points]
-        text = json.dumps([asked, _half_width()], sort_keys=True, default=np.ndarray.tolist)
+        text = json.dumps([asked, tube_of("baseline").half_width], sort_keys=True, default=np.ndarray.tolist)
         digest = digest_of([text.encode(), code_digest().encode(), Path(__file__).read_bytes()])
-        return kept(self._folder / f"{name.replace(' ', '_')}_{digest[:DIGITS]}.npz", flown, _save, _load)
+        path = self._folder / f"{name.replace(' ', '_')}_{digest[:DIGITS]}.npz"
+        if keep and path.is_file():
+            with np.load(path) as columns:
+                return [
+                    {key.split(" ")[1]: columns[key] for key in columns if key.startswith(f"{number} ")}
+                    for number in range(len(points))
+                ]
+        total, done, tables = sum(len(point.over) for point in points), 0, []
+        for point in points:
+            tables.append(fly_over(point, lambda n, before=done: self._progress(name, before + n, total)))
+            done += len(point.over)
+        if keep:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            new = path.with_name(f".{path.name}")
+            kept: Any = {f"{number} {key}": table[key] for number, table in enumerate(tables) for key in table}
+            np.savez_compressed(new, **kept)
+            new.rename(path)  # a file that is there is whole
+            drop_older(path)
+        return tables
 
 
 def fly_over(point: Point, progress: Any = lambda done: None) -> Table:
@@ -127,7 +133,7 @@ def flight_measures(flight: FlightData) -> dict[str, float]:
     ringing = (since >= RINGING[0]) & (since <= RINGING[1])
     error = (flight.state - flight.reference - flight.deviation)[window, :5]
     values["post_fault_altitude_error"] = float(deviation[after, 0].max())
-    values["rigid_error"] = float(np.sqrt(np.mean((error / _half_width()) ** 2)))
+    values["rigid_error"] = float(np.sqrt(np.mean((error / tube_of("baseline").half_width[:5]) ** 2)))
     values["pitch_rate_error"] = float(np.sqrt(np.mean(error[:, 4] ** 2)))
     values["pitch_rate_ringing"] = float(np.ptp(flight.state[ringing, 4]))
     for mode, column in ((1, 5), (2, 7)):
@@ -142,46 +148,8 @@ def flight_measures(flight: FlightData) -> dict[str, float]:
     return values
 
 
-def kept(
-    path: Path, make: Callable[[], Result], save: Callable[[Path, Result], None], load: Callable[[Path], Result]
-) -> Result:
-    """Return the contents of the file ``path``, whose name ends in a digest; compute and store them if it is missing.
-
-    The file is written atomically; files with another digest are removed.
-    """
-    if path.is_file():
-        return load(path)
-    made = make()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    new = path.with_name(f".{path.name}")
-    save(new, made)
-    new.rename(path)
-    drop_older(path)
-    return made
-
-
-def _half_width() -> np.ndarray:
-    tube = design("baseline").tube
-    assert tube is not None
-    return tube.half_width[:5]
-
-
 def _settling_time(time: np.ndarray, states: np.ndarray) -> float:
     """Return the last time (n) at which one of the states (n, m) is not within :data:`SETTLED` of its last value."""
     distance = np.abs(states - states[-1])
     moving = np.flatnonzero(np.any(distance > SETTLED * distance.max(axis=0), axis=1))
     return float(time[moving[-1]]) if len(moving) else 0.0
-
-
-def _save(path: Path, tables: list[Table]) -> None:
-    columns = {f"{i} {name}": column for i, table in enumerate(tables) for name, column in table.items()}
-    np.savez_compressed(path, **columns)  # type: ignore[arg-type]
-
-
-def _load(path: Path) -> list[Table]:
-    tables: dict[int, Table] = {}
-    with np.load(path) as columns:
-        for key in columns:
-            number, _, name = key.partition(" ")
-            tables.setdefault(int(number), {})[name] = columns[key]
-    return [tables[i] for i in sorted(tables)]

@@ -5,9 +5,10 @@ Actuators and a delay may stand between controller and vehicle.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
@@ -16,7 +17,7 @@ from scipy.optimize import brentq
 from hsv.base.units import FOOT
 from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import NotchSection, discretise, with_notch
-from hsv.model.actuators import ActuatorSet
+from hsv.model.actuators import ACTUATOR_SETS, IDEAL, ActuatorSet
 from hsv.model.dynamics import VehicleParameters, jacobian
 from hsv.model.lpv.actuated import held_behind
 from hsv.model.signals import N_STATES, PITCH_RATE
@@ -48,8 +49,13 @@ class Hardware:
     actuators: tuple[ActuatorSet, ...] = ()
     delay: float = 0.0
 
+    @classmethod
+    def of(cls, elevator: str) -> Hardware:
+        """Return a published elevator with the fuel delivery of 10 rad/s, or ideal hardware."""
+        return cls() if elevator == IDEAL else cls((ACTUATOR_SETS["fuel_10"], ACTUATOR_SETS[elevator]))
 
-IDEAL = Hardware()
+
+NO_HARDWARE = Hardware.of(IDEAL)
 
 
 @dataclass(frozen=True)
@@ -106,11 +112,11 @@ class Feedback:
     gain: np.ndarray
     notch: tuple[NotchSection, ...]
     period: float
-    hardware: Hardware = IDEAL
+    hardware: Hardware = NO_HARDWARE
 
     @classmethod
     def of(
-        cls, design: ControlDesign, factor: float = 1.0, *, notched: bool = True, hardware: Hardware = IDEAL
+        cls, design: ControlDesign, factor: float = 1.0, *, notched: bool = True, hardware: Hardware = NO_HARDWARE
     ) -> Feedback:
         """Return the feedback ``factor`` times F of a design, with its notch filter or without."""
         return cls(factor * design.feedback_gain, design.notch if notched else (), design.period, hardware)
@@ -130,14 +136,22 @@ class Feedback:
         B[:, ELEVATOR] *= effectiveness
         return SampledLoop(A, B, gain, self.period)
 
+    def growths(self, vehicle: VehicleParameters, over: Corners) -> np.ndarray:
+        """Return the growth (1/s) by vehicle of ``over``, the largest at both ends of the step, with fault or not."""
+        return np.array(
+            [
+                max(
+                    self.around(vehicle.perturbed(corner), point, share).growth
+                    for point in (START, TARGET)
+                    for share in EFFECTIVENESS
+                )
+                for corner in over
+            ]
+        )
+
     def growth(self, vehicle: VehicleParameters, over: Corners = NOMINAL) -> float:
         """Return the largest growth (1/s) at both ends of Case 1's step, before and after the fault, over vehicles."""
-        return max(
-            self.around(vehicle.perturbed(corner), point, share).growth
-            for corner in over
-            for point in (START, TARGET)
-            for share in EFFECTIVENESS
-        )
+        return float(self.growths(vehicle, over).max())
 
     def critical_coupling(self, over: Corners = NOMINAL) -> float | None:
         """Return the multiple kappa of the derived coupling at which the first of the vehicles becomes unstable.
@@ -157,35 +171,24 @@ def _held(
     return held_behind(A, B, period, hardware.actuators, hardware.delay)
 
 
-def stability_limit(growth: Callable[[float], float], along: Sequence[float], tolerance: float = 1e-6) -> float | None:
-    """Return where ``growth`` first reaches zero going ``along`` its argument, by root finding between the points.
+def crossings(growth: Callable[[float], float], along: Sequence[float], tolerance: float = 1e-6) -> Iterator[float]:
+    """Yield the values at which ``growth`` changes its sign going ``along`` its argument.
 
     Args:
         growth: Largest real part (1/s) of a loop's poles over a scalar, such as kappa.
         along: Values of the scalar, increasing or decreasing, dense enough to bracket every change of sign.
-        tolerance: Tolerance of the limit, as a fraction of the interval it lies in.
-
-    Returns:
-        The limit; the first value if the loop is not stable there; ``None`` if it is stable at all values.
+        tolerance: Tolerance of a crossing, as a fraction of the interval it lies in.
     """
-    before = None
-    for value in map(float, along):
-        if growth(value) >= 0.0:
-            if before is None:
-                return value
-            return float(brentq(growth, before, value, xtol=tolerance * abs(value - before)))
-        before = value
-    return None
+    stable = growth(along[0]) < 0.0
+    for before, value in pairwise(along):
+        if (growth(value) < 0.0) != stable:
+            stable = not stable
+            yield float(brentq(growth, before, value, xtol=tolerance * abs(value - before)))
 
 
-def crossings(growth: Callable[[float], float], along: Sequence[float]) -> list[float]:
-    """Return all values at which ``growth`` changes its sign going ``along`` its increasing argument."""
-    values = [growth(float(value)) for value in along]
-    return [
-        float(brentq(growth, along[i], along[i + 1], xtol=1e-6 * (along[i + 1] - along[i])))
-        for i in range(len(values) - 1)
-        if (values[i] < 0.0) != (values[i + 1] < 0.0)
-    ]
+def stability_limit(growth: Callable[[float], float], along: Sequence[float], tolerance: float = 1e-6) -> float | None:
+    """Return the first of the :func:`crossings`; the first value if the loop is not stable there; ``None`` without."""
+    return float(along[0]) if growth(along[0]) >= 0.0 else next(crossings(growth, along, tolerance), None)
 
 
 @dataclass(frozen=True)

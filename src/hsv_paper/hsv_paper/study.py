@@ -20,7 +20,7 @@ Rows = Sequence[Mapping[str, Any]]
 """A table: its rows, each with a cell (text, rounded number or ``None``) by column."""
 
 _PAGE = """# {kind}: {title}
-Made by `hsv-paper {command} --out docs/study`, including all numbers.
+Made by `hsv-paper {command} --out docs/study`, including all numbers; [terms](index.md#terms).
 
 ![{title}]({name}.png)
 
@@ -125,5 +125,5 @@ def rounded(value: float | None, digits: int = 0) -> float | None:
 
 
 def in_words(over: Sequence[Corner]) -> str:
-    """Return the number of corners in ``over`` besides the nominal vehicle, and the number of all."""
-    return f"{len(over) - 1} of the {2 ** len(load_vehicle().uncertainty)} corners"
+    """Return which vehicles ``over`` has: the nominal one, and some of all corners."""
+    return f"nominal vehicle and {len(over) - 1} of the {2 ** len(load_vehicle().uncertainty)} corners"

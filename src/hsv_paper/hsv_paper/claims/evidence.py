@@ -12,7 +12,6 @@ import numpy as np
 
 from hsv.base.processes import Progress
 from hsv.base.units import to_paper
-from hsv.control.design import find_design, read_parameters
 from hsv.control.notch_filter import NotchSection
 from hsv.flight.assembly import flight_parameters
 from hsv.flight.corners import Corner, corners, screening_corners
@@ -23,11 +22,8 @@ from hsv_paper.designs import certificate, design
 from hsv_paper.flights import Flights, Point, Table, fly_over
 from hsv_paper.linear_loop import Feedback, Hardware
 
-FUEL = ACTUATOR_SETS["fuel_10"]
-"""The fuel delivery that goes with every elevator which is not ideal."""
-
-ELEVATORS = {IDEAL: ()} | {name: (FUEL, ACTUATOR_SETS[name]) for name in ("elevator_150", "elevator_50", "elevator_20")}
-"""Actuators that readings may name, as the linear loop has them; those of the paper are ideal."""
+ELEVATORS = {name: ACTUATOR_SETS[name] for name in ("elevator_150", "elevator_50", "elevator_20")}
+"""Elevators that readings may name, each with the fuel delivery of 10 rad/s; those of the paper are ideal."""
 
 
 class Evidence:
@@ -38,7 +34,7 @@ class Evidence:
         folder: Path,
         progress: Progress = lambda what, done, total: None,
         over: Sequence[Corner] | None = None,
-        actuators: str = IDEAL,
+        elevator: str = IDEAL,
         loops: Sequence[Corner] | None = None,
     ) -> None:
         """Keep tables in ``folder``.
@@ -47,14 +43,20 @@ class Evidence:
             folder: Folder of tables and flights.
             progress: Called with the current measurement.
             over: Vehicles that are flown, the nominal one first; by default all corners.
-            actuators: Actuators in loops and flights, from :data:`ELEVATORS`.
+            elevator: Elevator in loops and flights, ideal or of :data:`ELEVATORS`.
             loops: Vehicles of the linear loops; by default those that are flown.
         """
         self._folder = folder
         self._progress = progress
-        self.hardware = Hardware(ELEVATORS[actuators])
-        equipped = () if actuators == IDEAL else ("fuel_10", actuators)
-        self._equipment = tuple((f"actuator.{ACTUATOR_SETS[name].channel}.set", name) for name in equipped)
+        self.hardware = Hardware.of(elevator)
+        self._equipment = (
+            ()
+            if elevator == IDEAL
+            else (
+                ("actuator.fuel_equivalence_ratio.set", "fuel_10"),
+                ("actuator.elevator_deflection.set", elevator),
+            )
+        )
         self.over = corners(load_vehicle().uncertainty) if over is None else over
         self._loops = self.over if loops is None else loops
         self.flights = Flights(folder, progress)
@@ -68,12 +70,12 @@ class Evidence:
         """Number of vehicles in a table: the nominal one and those at corners."""
         return len(self.over)
 
-    def _behind(self, actuators: str) -> Evidence:
-        """Return the evidence with these actuators: this one if they are ideal, else flights of at most 32 corners."""
-        if actuators == IDEAL:
+    def _behind(self, elevator: str) -> Evidence:
+        """Return the evidence with this elevator: this one if it is ideal, else flights of at most 32 corners."""
+        if elevator == IDEAL:
             return self
         over = [corner for corner in screening_corners(load_vehicle().uncertainty) if corner in self.over]
-        return Evidence(self._folder, self._progress, over, actuators, self._loops)
+        return Evidence(self._folder, self._progress, over, elevator, self._loops)
 
     def _values(self, scenario: str, changes: Sequence[tuple[str, Any]]) -> dict[str, Any]:
         return {**flight_parameters(load_scenario(scenario)), **dict((*self._equipment, *changes))}
@@ -86,11 +88,8 @@ class Evidence:
 
     def _changed(self, scenario: str, *changes: tuple[str, Any]) -> dict[str, float]:
         """Return the measurements of the nominal flight of a scenario with other parameters."""
-        return _nominal_flight(self._values(scenario, changes))
-
-    def adjustable_step(self) -> dict[str, float]:
-        """Return the measurements on the step of Case 1 with the adjustable design."""
-        return _nominal_flight({**read_parameters(find_design("adjustable")), **load_scenario("case1").parameters()})
+        table = fly_over(Point(self._values(scenario, changes), [{}]))
+        return {name: float(column[0]) for name, column in table.items()}
 
     def uncertain(self, scenario: str, measure: str, *changes: tuple[str, Any]) -> float:
         """Return the magnitude of a measure with the uncertain parameters of Case 1 and 2; NaN where not defined.
@@ -112,15 +111,9 @@ class Evidence:
 
         It is the largest of both ends of the step, before and after the fault. ``factor`` multiplies the feedback.
         """
+        self._progress(f"poles, {coupling} coupling", 0, 1)
         loop = Feedback(factor * design(name).feedback_gain, notch, design(name).period, self.hardware)
-        vehicle, what = load_vehicle().coupled(coupling), f"poles, {coupling}, {'with' if notch else 'without'} notch"
-        found = []
-        for number, corner in enumerate(self._loops):
-            if number % 50 == 0:
-                self._progress(what, number, len(self._loops))
-            found.append(loop.growth(vehicle, [corner]))
-        self._progress(what, len(self._loops), len(self._loops))
-        return np.array(found)
+        return loop.growths(load_vehicle().coupled(coupling), self._loops)
 
 
 def certified(entry: str) -> np.ndarray:
@@ -149,7 +142,3 @@ def worst(table: Table, measure: str) -> float:
     """Return the largest magnitude over all vehicles; infinite where one diverged or does not define it."""
     values = np.abs(table[measure])
     return float(np.inf) if np.any(np.isnan(values)) else float(values.max())
-
-
-def _nominal_flight(values: dict[str, Any]) -> dict[str, float]:
-    return {name: float(column[0]) for name, column in fly_over(Point(values, [{}])).items()}

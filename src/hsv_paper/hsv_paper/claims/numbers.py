@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from hsv.base.units import to_paper
-from hsv.control.design import ControlDesign
+from hsv.control.design import ControlDesign, find_design, read_parameters
 from hsv.control.nominal_law import FamilyLaw
 from hsv.control.nominal_trajectory import nominal_data
 from hsv.control.notch_filter import NotchSection, discretise, flown_sections, notch_response
@@ -34,8 +34,17 @@ from hsv.model.signals import N_RIGID, PITCH_RATE
 from hsv.model.vehicle import Vehicle, load_vehicle
 from hsv_paper.box import infeasibility
 from hsv_paper.claims.evidence import Evidence, nominal, shown, worst
-from hsv_paper.designs import CODESIGN_FREQUENCIES, certificate, codesigned_model, design, extended_model, inputs_of
+from hsv_paper.designs import (
+    CODESIGN_FREQUENCIES,
+    certificate,
+    codesigned_model,
+    design,
+    extended_model,
+    inputs_of,
+    tube_of,
+)
 from hsv_paper.figures.frequency import POLE_DAMPINGS, POLE_FREQUENCIES
+from hsv_paper.flights import Point, fly_over
 from hsv_paper.linear_loop import COUPLING_SCALES, ELEVATOR, TARGET, Feedback, Margin, phase_margins
 from hsv_paper.modes import FREQUENCIES, elastic_modes, linearised, open_loop_modes, peak_falls, pitch_rate_response
 
@@ -115,8 +124,7 @@ def box(evidence: Evidence) -> Numbers:
 
 def symmetric(evidence: Evidence) -> Numbers:
     """Return the distances of the centres of W and Z from zero, relative to their half-widths."""
-    tube = design("baseline").tube
-    assert tube is not None
+    tube = tube_of("baseline")
     channels = certificate("baseline")["tube"]["disturbance"]["channels"]
     off = {name: abs(b["upper"] + b["lower"]) / (b["upper"] - b["lower"]) for name, b in channels.items()}
     name = max(off, key=lambda channel: off[channel])
@@ -126,9 +134,7 @@ def symmetric(evidence: Evidence) -> Numbers:
 
 def certified_attitude(evidence: Evidence) -> Numbers:
     """Return the half-width (rad) of the invariant set in the attitude angles."""
-    tube = design("baseline").tube
-    assert tube is not None
-    return {"attitude": float(tube.half_width[2:4].max())}
+    return {"attitude": float(tube_of("baseline").half_width[2:4].max())}
 
 
 def input_set(evidence: Evidence) -> Numbers:
@@ -482,7 +488,6 @@ def stabilises(evidence: Evidence) -> Numbers:
 def sets(evidence: Evidence) -> Numbers:
     """Return half-widths (7) relative to those of Z: of Z' as flown, and of the sets under F' for W' and W / 2."""
     flown, inputs, ones = design("adjustable"), inputs_of("adjustable"), np.ones(N_RIGID)
-    assert flown.tube is not None
     complete, incomplete = (
         DisturbanceSet.from_report(certificate("adjustable")["adjustable"][name]["disturbance"]["channels"])
         for name in ("complete", "incomplete")
@@ -492,15 +497,15 @@ def sets(evidence: Evidence) -> Numbers:
         invariant_set(tube_problem(under_F, inputs.flown_vehicle, W), inputs.invariant_set).half_width
         for W in (complete, incomplete, complete.scaled(0.5))
     )
-    tau, ratio = float(flown.tau.min()), flown.tube.half_width / whole
+    ratio = tube_of("adjustable").half_width / whole
     moving = complete.half_width > 0.0
     shares = incomplete.half_width[moving] / complete.half_width[moving]
     return {
         "halved": halved / whole,
         "measured": measured / whole,
-        "measured_scaled": measured / (tau * whole),
+        "measured_scaled": measured / (_tau() * whole),
         "flown": ratio,
-        "flown_scaled": flown.tube.half_width / (tau * whole),
+        "flown_scaled": ratio / _tau(),
         "mean": ratio.mean(),
         "altitude": ratio[0],
         "velocity": ratio[1],
@@ -517,10 +522,11 @@ def relaxed(evidence: Evidence) -> Numbers:
 
 def adjustable_step(evidence: Evidence) -> Numbers:
     """Return the settling of the step of Case 1 relative to the baseline, and the inputs used by Case 2's ramp (%)."""
-    adjustable, baseline = evidence.adjustable_step(), evidence.corners("case1")
+    values = {**read_parameters(find_design("adjustable")), **load_scenario("case1").parameters()}
+    adjustable, baseline = fly_over(Point(values, [{}])), evidence.corners("case1")
     found: Numbers = {"tau": _tau(), "used": 100 * _used_inputs(evidence, "case2", "adjustable")}
     for axis in ("velocity", "altitude"):
-        time, before = adjustable[f"{axis}_settling_time"], nominal(baseline, f"{axis}_settling_time")
+        time, before = (nominal(table, f"{axis}_settling_time") for table in (adjustable, baseline))
         found |= {axis: time / before, f"{axis}_time": shown(time, "s"), f"{axis}_baseline": shown(before, "s")}
     return found
 

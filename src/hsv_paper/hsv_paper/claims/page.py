@@ -10,7 +10,7 @@ import numpy as np
 
 from hsv.flight.corners import screening_corners
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.claims.evidence import ELEVATORS, FUEL, Evidence, nominal, shown, worst
+from hsv_paper.claims.evidence import ELEVATORS, Evidence, nominal, shown, worst
 from hsv_paper.claims.table import THRESHOLDS, Finding, Reading, Verdict
 from hsv_paper.study import markdown
 
@@ -38,15 +38,8 @@ METRICS = {
 
 _CORNERS = 2 ** len(load_vehicle().uncertainty)
 _SCREENED = len(screening_corners(load_vehicle().uncertainty)) - 1
-
-
-def _elevator(name: str) -> str:
-    """Return the name of actuators for the page: the bandwidth of the elevator, or ideal or none."""
-    actuators = ELEVATORS.get(name)
-    return f"{actuators[1].natural_frequency:g} rad/s" if actuators else name
-
-
-_BANDWIDTHS = ", ".join(_elevator(name) for name, actuators in ELEVATORS.items() if actuators)
+_BANDWIDTHS = {name: f"{elevator.natural_frequency:g} rad/s" for name, elevator in ELEVATORS.items()}
+"""Names of the elevators for the page."""
 
 _HEADER = f"""# The paper's claims
 Made by `hsv-paper claims --out docs/claims.md`; every number is measured. Each claim is quoted word for word and has
@@ -66,8 +59,8 @@ the notch filter depend on a narrow margin ([modes rejected](#modes-rejected-pap
 *Actuators* are ideal, like the paper's, unless others are named. The benefit of the notch filter depends on them: even
 without the filter, a slow elevator stabilises the elastic modes. Readings of claims on the filter therefore name their
 actuators: none (the reading concerns only the filter or the vehicle), ideal, or a second-order elevator with this
-bandwidth ({_BANDWIDTHS})
-together with a fuel delivery of {FUEL.natural_frequency:g} rad/s. The summary lists the actuators with which all
+bandwidth ({", ".join(_BANDWIDTHS.values())})
+together with a fuel delivery of 10 rad/s. The summary lists the actuators with which all
 readings hold (*yes*) and those with which at least one does not (*not*). If the elevator is not ideal, flights cover
 only {_SCREENED} of the corners, and the *worst corner* is the worst of these; linear loops cover all corners.
 
@@ -103,19 +96,13 @@ Ranks = dict[str, dict[str, Rank]]
 def ranking(evidence: Evidence) -> Ranks:
     """Return the ranks of robust MPC and the tube controllers on the same metrics."""
     tables = {name: evidence.corners(scenario) for name, scenario in CONTROLLERS.items()}
-
-    def place(values: dict[str, float], name: str) -> int:
-        # Values that differ by less than a thousandth share a rank.
-        return 1 + int(np.count_nonzero(np.array(list(values.values())) < values[name] * (1.0 - 1e-3)))
-
     ranks: Ranks = {}
     for metric in METRICS:
-        at_nominal = {name: abs(nominal(table, metric)) for name, table in tables.items()}
-        at_worst = {name: worst(table, metric) for name, table in tables.items()}
-        ranks[metric] = {
-            name: Rank(at_nominal[name], at_worst[name], place(at_nominal, name), place(at_worst, name))
-            for name in tables
-        }
+        values = np.array([(abs(nominal(table, metric)), worst(table, metric)) for table in tables.values()])
+        # Values that differ by less than a thousandth share a rank.
+        places = 1 + (values < values[:, None] * (1.0 - 1e-3)).sum(axis=1)
+        rows = zip(tables, values.tolist(), places.tolist(), strict=True)
+        ranks[metric] = {name: Rank(*value, *place) for name, value, place in rows}
     return ranks
 
 
@@ -154,7 +141,7 @@ def details(found: Finding) -> str:
     named, claim = any(reading.actuators for reading in found.readings), found.claim
     rows = [
         {"reading": f"**{what}**" if number < found.leading else what}
-        | ({"actuators": _elevator(r.actuators)} if named else {})
+        | ({"actuators": _BANDWIDTHS.get(r.actuators, r.actuators)} if named else {})
         | {"measured": r.measured(), "threshold": r.threshold(), "": "yes" if r.holds else "no"}
         for number, r in enumerate(found.readings)
         if (what := r.what.replace("|", "\\|"))
@@ -184,6 +171,7 @@ def ranking_table(ranks: Ranks) -> str:
 def _conditions(readings: Sequence[Reading]) -> str:
     """Return the actuators with which all readings of a claim hold and those with which not; empty if it names none."""
     failed = {reading.actuators for reading in readings if not reading.holds}
-    names = dict.fromkeys(reading.actuators for reading in readings if reading.actuators)
-    kept, lost = ([_elevator(name) for name in names if (name in failed) is side] for side in (False, True))
-    return "; ".join(f"{word}: {', '.join(side)}" for word, side in (("yes", kept), ("not", lost)) if side)
+    sides: dict[str, list[str]] = {"yes": [], "not": []}
+    for name in dict.fromkeys(reading.actuators for reading in readings if reading.actuators):
+        sides["not" if name in failed else "yes"].append(_BANDWIDTHS.get(name, name))
+    return "; ".join(f"{word}: {', '.join(side)}" for word, side in sides.items() if side)

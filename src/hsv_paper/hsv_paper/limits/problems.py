@@ -10,6 +10,7 @@ command. For a delay the command of the trim is kept, then any inputs within U a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -41,7 +42,6 @@ REST = 0.4
 
 TYPICAL = 12.0
 """Longest time (s) with the Runge-Kutta steps of flights; for longer times the steps are longer in proportion."""
-
 
 PERIOD = 0.02
 """T (s), as flown."""
@@ -112,8 +112,7 @@ def time_bound(vehicle: VehicleParameters) -> float:
     """
     start, target = trim(vehicle, *START).state, trim(vehicle, *TARGET).state
     change = target[:2] - start[:2]
-    altitudes = np.array([start[0] - MARGIN[0], 0.5 * (start[0] + target[0]), target[0] + MARGIN[0]])
-    velocities = np.array([start[1] - MARGIN[1], 0.5 * (start[1] + target[1]), target[1] + MARGIN[1]])
+    altitudes, velocities = np.linspace(start[:2] - MARGIN, target[:2] + MARGIN, 3).T
     fuel = np.array([vehicle.fuel_equivalence_ratio_minimum, vehicle.fuel_equivalence_ratio_maximum])
     elevator = np.linspace(vehicle.elevator_deflection_minimum, vehicle.elevator_deflection_maximum, 121)
     alpha = np.linspace(-vehicle.angle_limit, vehicle.angle_limit, 241)
@@ -123,7 +122,7 @@ def time_bound(vehicle: VehicleParameters) -> float:
     # R is affine in the fuel, the thrust being so: its two limits are enough.
     grid = product(*(axis.tolist() for axis in (altitudes, velocities, alpha, path, fuel, elevator)))
     for h, V, angle, gamma, phi, delta in grid:
-        x, u = np.array([h, V, angle, angle + gamma, 0.0, 0.0, 0.0, 0.0, 0.0]), np.array([phi, delta])
+        x, u = np.array([h, V, angle, angle + gamma, *[0.0] * 5]), np.array([phi, delta])
         rates = derivative(x, u, vehicle)
         rows.append((rates[0], rates[1], rates[2], forces(x, u, vehicle)[3]))
     climb, acceleration, turn, moment = np.array(rows).T.copy()
@@ -156,8 +155,7 @@ def recovery(vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizo
     period = np.repeat(held * PERIOD / divide, divide)
     n, kept = len(period), round(delay / PERIOD) * divide
     low, high = free_states(vehicle, before.state, n)
-    for i, (axis_low, axis_high) in enumerate((envelope.altitude_range, envelope.velocity_range)):
-        low[-1, i], high[-1, i] = axis_low, axis_high
+    low[-1, :2], high[-1, :2] = np.transpose((envelope.altitude_range, envelope.velocity_range))
     # The fuel is between its limits, the elevator that acts between s times those of the command.
     inputs, slope = np.zeros((2, n, 2)), np.zeros((2, n, 2))
     for side, limits in enumerate((vehicle.input_minimum, vehicle.input_maximum)):
@@ -197,8 +195,15 @@ def static_limit(vehicle: VehicleParameters, points: np.ndarray) -> float:
 
 def envelope_points(envelope: Vehicle) -> np.ndarray:
     """Return a grid (9, 2) of altitudes (m) and velocities (m/s) over the envelope: its corners, sides and middle."""
-    axes = [(low, 0.5 * (low + high), high) for low, high in (envelope.altitude_range, envelope.velocity_range)]
-    return np.array([(altitude, velocity) for altitude in axes[0] for velocity in axes[1]])
+    return np.array([*product(*(np.linspace(*axis, 3) for axis in (envelope.altitude_range, envelope.velocity_range)))])
+
+
+def least(holds: Callable[[float], bool], low: float, high: float, resolution: float) -> float:
+    """Return the least value from ``low`` to ``high`` for which something ``holds``, to a resolution, by bisection."""
+    while high - low > resolution:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if holds(middle) else (middle, high)
+    return high
 
 
 def turning_limit(vehicle: VehicleParameters, delay: float, resolution: float = 1e-4) -> float:
@@ -208,24 +213,17 @@ def turning_limit(vehicle: VehicleParameters, delay: float, resolution: float = 
     the fuel, whose thrust lifts the nose, is shut off; the nose is turned when the angle of attack is back at
     that of the trim.
     """
-    before = trim(vehicle, *TARGET)
-    low, high = 0.0, 1.0
-    while high - low > resolution:
-        share = 0.5 * (low + high)
-        if _turns(vehicle, before.state, before.input, round(delay / PERIOD), share):
-            high = share
-        else:
-            low = share
-    return high
-
-
-def _turns(vehicle: VehicleParameters, state: np.ndarray, inputs: np.ndarray, kept: int, share: float) -> bool:
-    x = state
+    before, kept = trim(vehicle, *TARGET), round(delay / PERIOD)
     stop = np.array([vehicle.fuel_equivalence_ratio_minimum, vehicle.elevator_deflection_maximum])
-    for k in range(int(20.0 / PERIOD)):
-        x = advance(x, (inputs if k < kept else stop) * [1.0, share], vehicle, PERIOD, SUBSTEPS)
-        if k >= kept and x[4] < 0.0 and x[2] <= state[2]:
-            return True
-        if not in_model_range(x, vehicle.angle_limit):
-            return False
-    return False
+
+    def turns(share: float) -> bool:
+        x = before.state
+        for k in range(int(20.0 / PERIOD)):
+            x = advance(x, (before.input if k < kept else stop) * [1.0, share], vehicle, PERIOD, SUBSTEPS)
+            if k >= kept and x[4] < 0.0 and x[2] <= before.state[2]:
+                return True
+            if not in_model_range(x, vehicle.angle_limit):
+                return False
+        return False
+
+    return least(turns, 0.0, 1.0, resolution)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -50,8 +49,7 @@ BLEND, RESOLUTION = 5.0, 1e-3
 """Half the time (s) in which the rates of the governed reference change; to which effectiveness is bisected."""
 
 
-@dataclass(frozen=True)
-class FastestTransfer:
+class FastestTransfer(NamedTuple):
     """A transfer of the least ``time`` (s), that on a mesh half as fine, and its flight."""
 
     time: float
@@ -59,8 +57,17 @@ class FastestTransfer:
     flown: Flown
 
 
-@dataclass(frozen=True)
-class DeepestFault:
+def fastest_transfer(vehicle: VehicleParameters, periods: int, *, settling: bool) -> FastestTransfer:
+    """Return the fastest transfer with so many ``periods``; see :func:`hsv_paper.limits.problems.transfer`."""
+    first, half, whole = (problems.transfer(vehicle, n, settling=settling) for n in (COARSE, periods // 2, periods))
+    coarse = first.solve(problems.straight(first, GUESS), 10.0 * TOLERANCE)
+    coarser = half.solve(coarse.finer(periods // 2 // COARSE), TOLERANCE)
+    found = whole.solve(coarser.finer(2), TOLERANCE)
+    flown = fly_optimum(whole, found, np.ones(len(found.input), dtype=int), AFTER)
+    return FastestTransfer(found.scalar, coarser.scalar, flown)
+
+
+class DeepestFault(NamedTuple):
     """The least effectiveness for a delay and a horizon (s), and that on a mesh twice as fine, where it was solved.
 
     ``turning``: by bisection; ``static``: of the trim that the optimum leads to; ``flown``: with :data:`MARGIN` more.
@@ -76,49 +83,27 @@ class DeepestFault:
 
     def row(self, vehicle: str) -> dict[str, Any]:
         """Return a row of the table of optima."""
-        return {
-            "vehicle": vehicle,
-            "known after, s": self.delay,
-            "horizon s": self.horizon,
-            "least P": rounded(self.effectiveness, 4),
-            "on a mesh twice as fine": rounded(self.finer, 4),
-            "turning": rounded(self.turning, 4),
-            "static, at its end": rounded(self.static, 4),
-            "flown": "recovers" if self.flown.finished else "is lost",
-        }
-
-
-def fastest_transfer(vehicle: VehicleParameters, periods: int, *, settling: bool) -> FastestTransfer:
-    """Return the fastest transfer with so many ``periods``; see :func:`hsv_paper.limits.problems.transfer`."""
-    first = problems.transfer(vehicle, COARSE, settling=settling)
-    half = problems.transfer(vehicle, periods // 2, settling=settling)
-    whole = problems.transfer(vehicle, periods, settling=settling)
-    coarse = first.solve(problems.straight(first, GUESS), 10.0 * TOLERANCE)
-    coarser = half.solve(coarse.finer(periods // 2 // COARSE), TOLERANCE)
-    found = whole.solve(coarser.finer(2), TOLERANCE)
-    flown = fly_optimum(whole, found, np.ones(len(found.input), dtype=int), AFTER)
-    return FastestTransfer(found.scalar, coarser.scalar, flown)
+        heads = ("least P", "on a mesh twice as fine", "turning", "static, at its end")
+        numbers = dict(zip(heads, (rounded(number, 4) for number in self[2:6]), strict=True))
+        flown = "recovers" if self.flown.finished else "is lost"
+        return {"vehicle": vehicle, "known after, s": self.delay, "horizon s": self.horizon, **numbers, "flown": flown}
 
 
 def deepest_fault(
     vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizon: float, *, refine: bool
 ) -> DeepestFault:
     """Return the deepest loss of effectiveness; see :func:`hsv_paper.limits.problems.recovery`."""
-    problem = problems.recovery(vehicle, envelope, delay, horizon)
+    problem, fine = (problems.recovery(vehicle, envelope, delay, horizon, divide) for divide in (1, 2))
     found = problem.solve(problems.at_trim(problem), TOLERANCE)
-    fine = problems.recovery(vehicle, envelope, delay, horizon, 2)
-    share = found.scalar
-    flown = fly_optimum(
-        problem, found, np.array(problems.held_periods(horizon)), AFTER, share + MARGIN, round(delay / problems.PERIOD)
-    )
+    held, kept = np.array(problems.held_periods(horizon)), round(delay / problems.PERIOD)
     return DeepestFault(
         delay,
         horizon,
-        share,
+        found.scalar,
         fine.solve(found.finer(2), TOLERANCE).scalar if refine else None,
         problems.turning_limit(vehicle, delay),
         problems.static_limit(vehicle, found.state[-1:, :2]),
-        flown,
+        fly_optimum(problem, found, held, AFTER, found.scalar + MARGIN, kept),
     )
 
 
@@ -148,12 +133,12 @@ def least_survived(scenario: str) -> float:
 
     ``scenario``: One whose first fault is a loss of effectiveness.
     """
-    lost, survived = 0.3, 1.0
-    while survived - lost > RESOLUTION:
-        middle = 0.5 * (lost + survived)
-        flight = fly(assemble_flight(load_scenario(scenario, {"fault[0].effectiveness": middle})))
-        lost, survived = (lost, middle) if flight.status is FlightStatus.FINISHED else (middle, survived)
-    return survived
+
+    def survives(effectiveness: float) -> bool:
+        changed = load_scenario(scenario, {"fault[0].effectiveness": effectiveness})
+        return fly(assemble_flight(changed)).status is FlightStatus.FINISHED
+
+    return problems.least(survives, 0.3, 1.0, RESOLUTION)
 
 
 def run(scope: Scope) -> Outcome:
@@ -169,13 +154,11 @@ def run(scope: Scope) -> Outcome:
     scope.progress("flights of the controllers", 1, 4)
     flights = {name: fly(assemble_flight(load_scenario(name))).data() for name in SCENARIOS}
     along = parse_scenario(governed("case1", BLEND).text, "case1")
-    flights[f'[governor](../governor.md), `hsv govern case1 --blend "{BLEND:g} s"`'] = fly(
-        assemble_flight(along)
-    ).data()
+    named = f'[governor](../governor.md), `hsv govern case1 --blend "{BLEND:g} s"`'
+    flights[named] = fly(assemble_flight(along)).data()
     survived = least_survived("case1")
     scope.progress("corners", 2, 4)
-    every = corners(envelope.uncertainty)
-    over = every if whole else every[:: min(512, round(64 * scope.coarseness))]
+    over = corners(envelope.uncertainty)[:: 1 if whole else min(512, round(64 * scope.coarseness))]
     limits = corner_limits(vehicle, envelope, over, CURVE)
     needed = needed_effectiveness(limits)
     scope.progress("deepest faults", 3, 4)
@@ -219,10 +202,9 @@ def run(scope: Scope) -> Outcome:
         [settling(name, data) for name, data in flights.items()],
         _FAULT,
         optima,
-        f"Flown: with {MARGIN:g} more than the least, through the loop's plant and fault injector, and {AFTER:g} s "
-        "in the trim\nafter it. At the least itself no elevator is left in a trim at the static limit, and "
-        "rounding decides.\n\n"
-        f"All vehicles, the nominal one and {len(limits) - 1} corners of the parameter bounds:",
+        f"Flown: with {MARGIN:g} more than the least, through the loop's plant and fault injector, and {AFTER:g} s in "
+        "the trim\nafter it. At the least itself no elevator is left in a trim at the static limit, and rounding "
+        f"decides.\n\nAll vehicles, the nominal one and {len(limits) - 1} corners of the parameter bounds:",
         [
             over_all("trim at Case 1's target", limits[:, 0]),
             over_all("a trim in the envelope", limits[:, 1]),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -40,44 +41,66 @@ def run(scope: Scope) -> Outcome:
     inputs = read_inputs(find_inputs("adjustable"))
     gains = replace(design_gains(inputs, scope.progress).design, filtered=True)
     least = min(tau for tau in FINE.tolist() if is_certified(gains, inputs, tau))
+    rows = _rows(gains, inputs, scope)
     figure = new_figure(7.2)
     panels = figure.subplots(3, 2).ravel()
     panels[0].axvspan(least, 1.0, color=GREEN, alpha=0.12, linewidth=0.0, label="one Lyapunov function")
     stable = []
     for coupling, color in zip(load_vehicle().couplings, (BLUE, RED), strict=True):
         label = f"{coupling.replace('_', '-')} coupling"
-        limits = {}
-        for which, over, style in (
-            ("nominal vehicle", scope.over[:1], {"label": label}),
-            (f"worst of {in_words(scope.over)}", scope.over, {"linestyle": "--", "linewidth": 0.9}),
+        limits: dict[str, float | None] = {}
+        styles: tuple[dict[str, Any], ...] = {"label": label}, {"linestyle": "--", "linewidth": 0.9}
+        for which, over, style in zip(
+            ("nominal vehicle", "worst corner"), (scope.over[:1], scope.over), styles, strict=True
         ):
             along = partial(growth, gains, coupling, over)
             panels[0].plot(FINE, [along(tau) for tau in FINE.tolist()], color=color, **style)
             limits[which] = rounded(stability_limit(along, FINE[::-1].tolist()), 2)
         stable.append({"linear loop": label, **limits})
+    for panel, name, color, label, marker in (
+        (1, "Z' in V, ft/s", BLUE, "Z' for W'(τ)", "o-"),
+        (1, _DRAWN_ONLY, RED, "Z' for W", "o-"),
+        (1, "τZ", GREY, "τZ, the paper's", "o-"),
+        (2, "room, fuel", ORANGE, "fuel equivalence ratio", "o-"),
+        (2, "elevator", BLUE, "elevator", "o-"),
+        (3, "step settled: h, s", GREEN, "altitude", "o-"),
+        (4, "ramp error: h", GREEN, "altitude", "o-"),
+        (3, "V, s", RED, "velocity", "o-"),
+        (4, "V", RED, "velocity", "o-"),
+        (5, "attitude after fault, deg", BLUE, "nominal", "o-"),
+        (5, "worst corner, deg", RED, "worst", "o--"),
+    ):
+        tau = [row["τ"] for row in rows]
+        panels[panel].plot(tau, [row[name] for row in rows], marker, color=color, markersize=3, label=label)
     panels[0].axhline(0.0, **ZERO)
-    panels[0].set_ylabel("largest real part (1/s)")
-    rows = _rows(gains, inputs, scope)
-    _draw_rows(panels, rows)
-    for panel in panels:
-        panel.set_xlabel("τ")
-        panel.set_xlim(1.02, FINE[0] if panel is panels[0] else rows[-1]["τ"] - 0.02)
-        panel.legend(loc="best")
+    panels[2].axhline(0.0, **ZERO)
+    panels[5].axhline(0.5, **DOTTED_GREY)
+    for panel, ylabel in enumerate(
+        (
+            "largest real part (1/s)",
+            "half-width in velocity (ft/s)",
+            "room of the nominal input,\nshare of that at τ = 1",
+            "step settled (s)",
+            "Case 2, error over time,\nshare of that at τ = 1",
+            "attitude after the fault (deg)",
+        )
+    ):
+        panels[panel].set(xlabel="τ", ylabel=ylabel, xlim=(1.02, rows[-1]["τ"] - 0.02 if panel else FINE[0]))
+        panels[panel].legend(loc="best")
+        if panel in (1, 3, 5):
+            panels[panel].set_ylim(bottom=0.0)
     letter(panels)
-    corners = in_words(scope.over)
     return Outcome(
         figure,
-        "The adjustable design is computed and flown for each factor. (a) Largest real part of the poles of the "
-        "linear sampled loop around the coupled vehicle, including the notch filter, over both ends of the step, "
-        f"before and after the fault: nominal vehicle (solid), and the worst of {corners} of the parameter bounds "
-        "(dashed). Shaded: one Lyapunov function is found for the factor and all larger ones up to 1, over the "
-        "vertices of the design's model, which does not include the coupling. (b) Half-width of the invariant set "
-        "in velocity: Z' for the gain in use and W'(τ), the same for the full W, and the paper's τZ. (c) Range "
-        "that remains for the nominal input about the target's trim, on the smaller side, relative to that at "
-        "τ = 1 (eq. 53). (d) Time until a step of +600 ft, +250 ft/s has settled to 2 % under K'(τ). (e) Case 2: "
+        "The adjustable design is computed and flown for each factor. (a) Growth of the loop around the coupled "
+        f"vehicle, {in_words(scope.over)}. Shaded: one Lyapunov function is found for the factor and all larger ones "
+        "up to 1, over the vertices of the design's model, which does not include the coupling. (b) Half-width of the "
+        "invariant set in velocity: Z' for the gain in use and W'(τ), the same for the full W, and the paper's τZ. (c) "
+        "Range that remains for the nominal input about the target's trim, on the smaller side, relative to that at τ "
+        "= 1 (eq. 53). (d) Time until a step of +600 ft, +250 ft/s has settled to 2 % under K'(τ). (e) Case 2: "
         "integral of the error of altitude and velocity, nominal vehicle, relative to that at τ = 1. (f) Attitude "
-        "deviation from nominal after the fault: nominal vehicle, and the worst of "
-        f"{in_words(fraction(load_vehicle().uncertainty))}, a different selection.",
+        f"deviation from nominal after the fault, {in_words(fraction(load_vehicle().uncertainty))}, a different "
+        "selection.",
         f"One Lyapunov function is found for every factor from τ = {least:.2f} to 1. The linear loop is stable down to "
         "these factors (1: not even there):",
         stable,
@@ -174,37 +197,3 @@ def _with(gains: ControlDesign, tau: float) -> ControlDesign:
 def _metrics(design: ControlDesign, inputs: DesignInputs, over: Corners) -> list[dict[str, float]]:
     parts = assemble({**design.to_parameters(), **region_parameters(inputs.model_dump(), inputs.flown_vehicle)})
     return [flight_metrics(fly(parts.perturbed(corner)).data()) for corner in over]
-
-
-def _draw_rows(panels: np.ndarray, rows: list[dict[str, float]]) -> None:
-    for panel, name, color, label, style in (
-        (1, "Z' in V, ft/s", BLUE, "Z' for W'(τ)", "o-"),
-        (1, _DRAWN_ONLY, RED, "Z' for W", "o-"),
-        (1, "τZ", GREY, "τZ, the paper's", "o-"),
-        (2, "room, fuel", ORANGE, "fuel equivalence ratio", "o-"),
-        (2, "elevator", BLUE, "elevator", "o-"),
-        (3, "step settled: h, s", GREEN, "altitude", "o-"),
-        (4, "ramp error: h", GREEN, "altitude", "o-"),
-        (3, "V, s", RED, "velocity", "o-"),
-        (4, "V", RED, "velocity", "o-"),
-        (5, "attitude after fault, deg", BLUE, "nominal", "o-"),
-        (5, "worst corner, deg", RED, "worst", "o--"),
-    ):
-        tau = [row["τ"] for row in rows]
-        panels[panel].plot(tau, [row[name] for row in rows], style, color=color, markersize=3, label=label)
-    panels[2].axhline(0.0, **ZERO)
-    panels[5].axhline(0.5, **DOTTED_GREY)
-    for panel, label in zip(
-        panels[1:],
-        (
-            "half-width in velocity (ft/s)",
-            "room of the nominal input,\nshare of that at τ = 1",
-            "step settled (s)",
-            "Case 2, error over time,\nshare of that at τ = 1",
-            "attitude after the fault (deg)",
-        ),
-        strict=True,
-    ):
-        panel.set_ylabel(label)
-    for index in (1, 3, 5):
-        panels[index].set_ylim(bottom=0.0)

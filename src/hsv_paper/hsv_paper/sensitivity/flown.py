@@ -24,14 +24,11 @@ from hsv_paper.sensitivity.sweep import (
     ALL,
     LOSSES,
     RMPC_DECOUPLED,
-    RMPC_GAIN,
-    SATURATED,
     WITHOUT_NOTCH,
     Columns,
     Controller,
     draw_losses,
     draw_metric,
-    feedback,
     legend,
     lost_where,
     sweep,
@@ -74,8 +71,8 @@ def coupling(scope: Scope) -> Outcome:
     axes = figure.subplots(3, 1, sharex=True)
     for done, (controller, width) in enumerate(zip(ALL, widths(len(ALL)), strict=True)):
         scope.progress("coupling, linear loops", done, len(ALL))
-        style = {"color": controller.color, "linewidth": width}
-        draw_growth(axes[0], kappas, feedback(controller), scope.over, controller.label, style, style)
+        style = {"label": controller.label, "color": controller.color}
+        draw_growth(axes[0], kappas, controller.loop, scope.over, (width, width), **style)
     axes[0].set(ylim=(-0.5, 1.5))
     draw_metric(axes[1], kappas, results, "elastic_decay_time", "elastic decay (s)")
     draw_metric(axes[2], kappas, results, "post_fault_attitude_deviation", "attitude excursion (deg)")
@@ -86,22 +83,19 @@ def coupling(scope: Scope) -> Outcome:
     axes[0].text(0.995, 1.32, "derived", color=plots.GREY, fontsize=8, ha="right")
     plots.letter(axes)
     legend(figure, shares=False)
-    limit = feedback(WITHOUT_NOTCH).critical_coupling()
-    unstable = np.array(growth_over(feedback(WITHOUT_NOTCH), PAPER_LIKE, scope.over)) >= 0.0
+    limit = WITHOUT_NOTCH.loop.critical_coupling()
+    unstable = WITHOUT_NOTCH.loop.growths(load_vehicle().coupled("paper_like"), scope.over) >= 0.0
     return Outcome(
         figure,
-        f"Case 1 on the coupled model, with the nominal vehicle (solid) and the worst of {in_words(scope.over)} of "
-        "the parameter bounds (dashed). (a) Largest real part of the poles of the linear sampled loop, over both "
-        "ends of the step, before and after the fault; the limits of stability below are found by root finding. "
-        "(b), (c) Flights; a line ends where a flight is lost, and a decay time of 100 s means that the rates have "
-        f"not decayed by the end of the flight. {SATURATED} {RMPC_GAIN}; with κ = 0 and without notch, it is the "
-        "controller of the paper, which flies it on the decoupled model only.",
+        f"Case 1 on the coupled model, {in_words(scope.over)}. (a) Growth of the linear loops. (b), (c) Flights; a "
+        "decay time of 100 s means that the rates have not decayed by the end of the flight. With κ = 0 and without "
+        "notch, RMPC is the controller of the paper, which flies it on the decoupled model only.",
         [
-            {"controller": c.label, **coupling_limits(feedback(c), scope.over), **lost_where(kappas, columns)}
+            {"controller": c.label, **coupling_limits(c.loop, scope.over), **lost_where(kappas, columns)}
             for c, columns in results.items()
         ],
         f"The paper-like coupling is κ = {PAPER_LIKE:.2f}. The loop of the {WITHOUT_NOTCH.label} becomes unstable "
-        f"at κ = {'–' if limit is None else f'{limit:.4f}'} (nominal vehicle); with the paper-like coupling, it is "
+        f"at κ = {rounded(limit, 4) or '–'} (nominal vehicle); with the paper-like coupling, it is "
         f"unstable at {unstable[1:].sum()} of the {len(scope.over) - 1} corners.",
     )
 
@@ -126,8 +120,8 @@ def sampling(scope: Scope) -> Outcome:
         row: dict[str, Any] = {"period": f"{period:g} s"}
         for axis, name in zip(axes, ("with the notch", "without"), strict=True):
             loop = Feedback.of(designs[period], notched=name != "without")
-            style, label = {"color": controller.color}, f"${controller.label}$".replace(" s$", "$ s")
-            draw_growth(axis, kappas, loop, scope.over, label, style, style | {"linewidth": 0.9})
+            style = {"label": f"${controller.label}$".replace(" s$", "$ s"), "color": controller.color}
+            draw_growth(axis, kappas, loop, scope.over, (1.0, 0.9), **style)
             row |= {f"{name}: {what}": limit for what, limit in coupling_limits(loop, scope.over).items()}
         columns = results[controller]
         for metric, head, factor, digits in (
@@ -146,10 +140,8 @@ def sampling(scope: Scope) -> Outcome:
     return Outcome(
         figure,
         "At each period, the polytopic model, F and K are designed from the baseline's inputs, and its notch is "
-        "discretised at that period. The panels show the largest real part of the poles of the sampled loop over "
-        "the coupling, over both ends of the step, before and after the fault: nominal vehicle (solid) and the "
-        f"worst of {in_words(scope.over)} of the parameter bounds (dashed). The limits of stability below are "
-        "found by root finding; the flights are those of Case 1 with the paper-like coupling and the notch.",
+        f"discretised at that period. The panels show the growth over the coupling, {in_words(scope.over)}. The "
+        "flights are those of Case 1 with the paper-like coupling and the notch.",
         rows,
     )
 
@@ -165,8 +157,7 @@ def parameters(scope: Scope) -> Outcome:
         axis.axvline(1.0, **plots.DOTTED_GREY)
     return Outcome(
         figure,
-        "Case 1 on the coupled model with the paper-like coupling, flown with the nominal vehicle and "
-        f"{in_words(over[0])} of the scaled bounds. {LOSSES} {RMPC_GAIN}.",
+        f"Case 1 on the coupled model with the paper-like coupling, {in_words(over[0])} of the scaled bounds. {LOSSES}",
         "In multiples of the bounds:",
         [{"controller": c.label, **lost_where(scales, columns)} for c, columns in results.items()],
     )
@@ -211,8 +202,7 @@ def fault(scope: Scope) -> Outcome:
         axis.set_xlim(1.0, 0.3)
     return Outcome(
         figure,
-        "Case 1 on the coupled model with the paper-like coupling, flown with the nominal vehicle and "
-        f"{in_words(scope.over)} of the parameter bounds. {LOSSES} {RMPC_GAIN}.",
+        f"Case 1 on the coupled model with the paper-like coupling, {in_words(scope.over)}. {LOSSES}",
         "By effectiveness, from 1 down:",
         [{"controller": c.label, **lost_where(shares, found, 3, rising=False)} for c, found in results.items()],
     )
@@ -256,38 +246,31 @@ def ramp(scope: Scope) -> Outcome:
             )
             for which in ("nominal", "worst")
         }
-        attitude = plots.DEGREES * np.array(columns["post_fault_attitude_from_nominal_worst"])
+        attitude = plots.DEGREES * columns["post_fault_attitude_from_nominal_worst"]
         return {
             "controller": controller.label,
             "ramp, s": rounded(lengths[index]),
             **errors,
             "worst attitude from nominal over all ramps, deg": f"{attitude.min():.3f} to {attitude.max():.3f}",
-            "saturated flights over all ramps, %": rounded(100.0 * (1.0 - min(columns["without_limits"]))),
+            "saturated flights over all ramps, %": rounded(100.0 * (1.0 - columns["without_limits"].min())),
         }
 
     return Outcome(
         figure,
-        f"Case 2 with a ramp that starts at {shipped.start:g} s; nominal vehicle (solid) and the worst of "
-        f"{in_words(scope.over)} of the parameter bounds (dashed). The ramp of {lengths[-1]:g} s ends when the "
-        "fault occurs, so that its largest error includes the effect of the fault. (c) Attitude deviation from "
-        f"nominal after the fault; the black line is half a degree. {SATURATED}",
+        f"Case 2 with a ramp that starts at {shipped.start:g} s, {in_words(scope.over)}. The ramp of {lengths[-1]:g} s "
+        "ends when the fault occurs, so that its largest error includes the effect of the fault. (c) Attitude "
+        "deviation from nominal after the fault; the black line is half a degree.",
         [row(controller, columns, index) for controller, columns in results.items() for index in (0, -1)],
     )
 
 
-def growth_over(loop: Feedback, kappa: float, over: Corners) -> list[float]:
-    """Return the growth (1/s) of a loop around each vehicle of ``over`` with ``kappa`` times the derived coupling."""
-    vehicle = load_vehicle().coupled(kappa)
-    return [loop.growth(vehicle, [corner]) for corner in over]
-
-
 def draw_growth(
-    axis: Axes, kappas: np.ndarray, loop: Feedback, over: Corners, label: str, nominal: Any, worst: Any
+    axis: Axes, kappas: np.ndarray, loop: Feedback, over: Corners, widths: tuple[float, float], **style: Any
 ) -> None:
     """Draw the growth of a loop over the coupling: the nominal vehicle, and the worst of ``over`` dashed."""
-    values = np.array([growth_over(loop, kappa, over) for kappa in kappas.tolist()])
-    axis.plot(kappas, values[:, 0], label=label, **nominal)
-    axis.plot(kappas, values.max(axis=1), "--", **worst)
+    values = np.array([loop.growths(load_vehicle().coupled(kappa), over) for kappa in kappas.tolist()])
+    axis.plot(kappas, values[:, 0], linewidth=widths[0], **style)
+    axis.plot(kappas, values.max(axis=1), "--", linewidth=widths[1], color=style["color"])
     axis.set_ylabel("largest real part (1/s)")
 
 

@@ -12,12 +12,11 @@ from matplotlib.axes import Axes
 
 from hsv.control.notch_filter import NotchSection
 from hsv.flight.scenario import load_scenario
-from hsv.model.vehicle import load_vehicle
 from hsv_paper.designs import design
 from hsv_paper.flights import Point
 from hsv_paper.linear_loop import Corners, stability_limit
 from hsv_paper.plots import BLUE, DOTTED_GREY, RED, letter, new_figure, plain_log
-from hsv_paper.sensitivity.sweep import Controller, feedback, sweep
+from hsv_paper.sensitivity.sweep import Controller, sweep
 from hsv_paper.study import Outcome, Scope, in_words, rounded
 
 SETS = (
@@ -53,7 +52,7 @@ def run(scope: Scope) -> Outcome:
         axis.set_title(coupled.label, loc="right")
         panels.append(axis)
         for over, suffix in ((scope.over[:1], "nominal"), (scope.over, "worst")):
-            decay = np.array(results[coupled][f"elastic_decay_time_{suffix}"])
+            decay = results[coupled][f"elastic_decay_time_{suffix}"]
             best = int(np.nanargmin(decay)) if np.isfinite(decay).any() else 0
             rows.append(
                 {"loop": f"{coupled.label}, {suffix}"}
@@ -74,16 +73,14 @@ def run(scope: Scope) -> Outcome:
     axis.set_xlabel(rf"notch centre (rad/s), $\varepsilon_z$ = {own.zero_damping:g}")
     axis.legend(loc="upper right")
     letter((*panels, axis))
-    corners, derived = in_words(scope.over), SETS[1].scenario
+    derived = SETS[1].scenario
     return Outcome(
         figure,
-        "(a), (b) Largest real part of the poles of the sampled loop over the centre of the notch and the damping "
-        "of its zeros, over both ends of the step, before and after the fault. The colours and the solid line, the "
-        f"limit of stability, are those of the nominal vehicle; the dashed line is the limit of the worst of "
-        f"{corners} of the parameter bounds; the cross is the baseline's filter. Zeros and poles have the same "
-        f"centre; the damping of the poles is {own.pole_damping:g}. (c) Decay time in flight, nominal vehicle "
-        "(solid) and worst corner (dashed); there is no point where a flight is lost. The dotted lines are the "
-        f"limits of the scenarios; the scenario {derived} itself flies another design, "
+        f"(a), (b) Growth over the centre of the notch and the damping of its zeros, {in_words(scope.over)}. The "
+        "colours and the solid line, the limit of stability, are those of the nominal vehicle; the dashed line is the "
+        "limit of the worst corner; the cross is the baseline's filter. Zeros and poles have the same centre; the "
+        f"damping of the poles is {own.pole_damping:g}. (c) Decay time in flight; there is no point where a flight is "
+        f"lost. The dotted lines are the limits of the scenarios; the scenario {derived} itself flies another design, "
         f"{load_scenario(derived).design}.",
         f"The linear loop is stable with centres from and to, at a zero damping of {own.zero_damping:g}, and up to "
         f"a zero damping, with the centre at {own.zero_frequency:g} rad/s; ≤ and ≥: to the end of the range "
@@ -103,7 +100,7 @@ def stable_range(coupled: Controller, over: Corners, centres: np.ndarray, depths
 
     @cache
     def off_centre(centre: float) -> float:
-        return max(_growths(coupled, centre, own.zero_damping, over))
+        return float(_growths(coupled, centre, own.zero_damping, over).max())
 
     def limit(growth: Callable[[float], float], along: np.ndarray, digits: str, sign: str) -> str:
         if growth(float(along[0])) >= 0.0:
@@ -116,7 +113,7 @@ def stable_range(coupled: Controller, over: Corners, centres: np.ndarray, depths
         "centre from, rad/s": limit(off_centre, around[best::-1], ".2f", "≤"),
         "to": limit(off_centre, around[best:], ".2f", "≥"),
         "zero damping up to": limit(
-            lambda depth: max(_growths(coupled, own.zero_frequency, depth, over)),
+            lambda depth: float(_growths(coupled, own.zero_frequency, depth, over).max()),
             np.array([own.zero_damping, *depths[depths > own.zero_damping]]),
             ".2g",
             "≥",
@@ -124,12 +121,10 @@ def stable_range(coupled: Controller, over: Corners, centres: np.ndarray, depths
     }
 
 
-def _growths(coupled: Controller, centre: float, zero_damping: float, over: Corners) -> list[float]:
+def _growths(coupled: Controller, centre: float, zero_damping: float, over: Corners) -> np.ndarray:
     """Return the growth (1/s) by vehicle with the baseline's section moved to a ``centre`` (rad/s)."""
     section = NotchSection(centre, zero_damping, centre, design("baseline").notch[0].pole_damping)
-    loop = replace(feedback(coupled), notch=(section,))
-    vehicle = load_vehicle().coupled(load_scenario(coupled.scenario).vehicle.coupling)
-    return [loop.growth(vehicle, [corner]) for corner in over]
+    return replace(coupled.loop, notch=(section,)).growths(coupled.vehicle, over)
 
 
 def _draw_map(axis: Axes, centres: np.ndarray, depths: np.ndarray, values: np.ndarray) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,35 +17,20 @@ from hsv.control.design import ControlDesign, find_design, read_parameters
 from hsv.flight.assembly import assemble, scenario_parameters
 from hsv.flight.metrics import METRICS
 from hsv.flight.scenario import load_scenario
+from hsv.model.dynamics import VehicleParameters
+from hsv.model.vehicle import load_vehicle
 from hsv_paper.flights import Point, Table
 from hsv_paper.linear_loop import Feedback
 from hsv_paper.plots import BLUE, GREEN, ORANGE, PURPLE, RED, letter, plain_log
 from hsv_paper.study import Scope
 
-Columns = dict[str, list[float]]
+Columns = dict[str, np.ndarray]
 """Numbers of one controller over the points of a sweep, by name."""
-
-SWEPT = (
-    "post_fault_attitude_deviation",
-    "post_fault_attitude_from_nominal",
-    "altitude_end_error",
-    "altitude_error_maximum",
-    "velocity_error_maximum",
-    "elastic_decay_time",
-    "altitude_settling_time",
-    "velocity_settling_time",
-)
-"""Metrics that a sweep keeps, of the nominal vehicle and of the worst."""
 
 SATURATED_STEPS = 50
 """Limited steps, one second, up to which a flight does not count as saturated."""
 
-SATURATED = "A flight counts as saturated if its inputs are at their limits for more than a second, or if it is lost."
-
-LOSSES = (
-    "(a) Share of the flights that are not lost (solid), and of those that are not saturated (dotted). (b), (c) "
-    f"Nominal vehicle (solid) and worst corner (dashed); a line ends where a flight is lost. {SATURATED}"
-)
+LOSSES = "(a) Share of the flights that are not lost (solid), and of those that are not saturated (dotted)."
 """Description of the plot of :func:`draw_losses`."""
 
 
@@ -69,6 +54,21 @@ class Controller:
             **dict(self.changes),
         }
 
+    @cached_property
+    def vehicle(self) -> VehicleParameters:
+        """The nominal vehicle with the coupling of the flight."""
+        return load_vehicle().coupled(self.parameters()["vehicle.coupling"])
+
+    @cached_property
+    def loop(self) -> Feedback:
+        """The feedback of the linear loop."""
+        values = self.parameters()
+        design = ControlDesign.from_parameters(values)
+        gain = design.adjusted_gain(design.tau)
+        if values["controller"] == "robust_mpc":
+            gain = design.nominal_gains[values["robust_mpc.gain_index"]]
+        return Feedback(gain, tuple(assemble(values).notch_filter.sections), design.period)
+
 
 _ON_CM = (("vehicle.model", "CM"),)
 
@@ -82,20 +82,6 @@ RMPC_WITH_NOTCH = Controller(
 RMPC_DECOUPLED = Controller("RMPC as the paper flies it, on the decoupled model", RMPC.scenario, RED)
 
 ALL = (WITH_NOTCH, WIDER_NOTCH, WITHOUT_NOTCH, RMPC, RMPC_WITH_NOTCH)
-
-RMPC_GAIN = "RMPC flies the fourth gain of the nominal family"
-"""Description of the RMPC gain for the pages."""
-
-
-@cache
-def feedback(controller: Controller) -> Feedback:
-    """Return the feedback of a controller's linear loop."""
-    values = controller.parameters()
-    design = ControlDesign.from_parameters(values)
-    gain = design.adjusted_gain(design.tau)
-    if values["controller"] == "robust_mpc":
-        gain = design.nominal_gains[values["robust_mpc.gain_index"]]
-    return Feedback(gain, tuple(assemble(values).notch_filter.sections), design.period)
 
 
 def sweep(scope: Scope, name: str, along: Mapping[Controller, Sequence[Point]]) -> dict[Controller, Columns]:
@@ -113,17 +99,16 @@ def columns_of(tables: Sequence[Table]) -> Columns:
 
     A metric that a lost flight does not define is NaN, for the nominal vehicle and for the worst.
     """
-    columns: Columns = {"finished": [], "without_limits": [], "nominal_finished": []}
+    rows = []
     for table in tables:
         finished = table["diverged"] == 0.0
-        columns["finished"].append(float(finished.mean()))
-        columns["nominal_finished"].append(float(finished[0]))
-        columns["without_limits"].append(float((finished & (table["saturated_steps"] <= SATURATED_STEPS)).mean()))
-        for name in SWEPT:
-            values = np.where(finished, np.abs(table.get(name, np.full(len(finished), np.nan))), np.nan)
-            columns.setdefault(f"{name}_nominal", []).append(float(values[0]))
-            columns.setdefault(f"{name}_worst", []).append(float(values.max()))
-    return columns
+        unsaturated = finished & (table["saturated_steps"] <= SATURATED_STEPS)
+        row = {"finished": finished.mean(), "nominal_finished": finished[0], "without_limits": unsaturated.mean()}
+        for name in METRICS:
+            values = np.where(finished, np.abs(table.get(name, np.nan)), np.nan)
+            row |= {f"{name}_nominal": values[0], f"{name}_worst": values.max()}
+        rows.append(row)
+    return {name: np.array([row[name] for row in rows], float) for name in rows[0]}
 
 
 def widths(count: int) -> np.ndarray:
@@ -136,7 +121,7 @@ def draw_metric(axis: Axes, x: np.ndarray, results: Mapping[Controller, Columns]
     factor = to_paper(1.0, METRICS[name].unit)[0]
     for (controller, columns), width in zip(results.items(), widths(len(results)), strict=True):
         for suffix, style in (("nominal", "-"), ("worst", "--")):
-            axis.plot(x, factor * np.array(columns[f"{name}_{suffix}"]), style, color=controller.color, linewidth=width)
+            axis.plot(x, factor * columns[f"{name}_{suffix}"], style, color=controller.color, linewidth=width)
     axis.set_ylabel(label)
 
 
@@ -152,8 +137,7 @@ def draw_losses(figure: Figure, x: np.ndarray, results: Mapping[Controller, Colu
     axes = np.asarray(figure.subplots(3, 1, sharex=True))
     for (controller, columns), width in zip(results.items(), widths(len(results)), strict=True):
         for name, style, key in (("finished", "-", controller.label), ("without_limits", ":", None)):
-            shares = 100.0 * np.array(columns[name])
-            axes[0].plot(x, shares, style, color=controller.color, linewidth=width, label=key)
+            axes[0].plot(x, 100.0 * columns[name], style, color=controller.color, linewidth=width, label=key)
     axes[0].set(ylabel="flights (%)", ylim=(-5.0, 105.0))
     draw_metric(axes[1], x, results, "post_fault_attitude_deviation", "attitude excursion (deg)")
     draw_metric(axes[2], x, results, "altitude_end_error", "altitude error at end (ft)")
@@ -168,10 +152,9 @@ def draw_losses(figure: Figure, x: np.ndarray, results: Mapping[Controller, Colu
 def legend(figure: Figure, *, shares: bool) -> None:
     """Add a legend of controllers and line styles above the panels; ``shares``: panel (a) shows shares."""
     controllers, _ = figure.axes[0].get_legend_handles_labels()
-    styles = {"-": "nominal vehicle", "--": "worst corner"}
-    if shares:
-        styles |= {"-": "nominal vehicle; (a): flown to the end", ":": "(a): not a second at the limits"}
-    keys = [Line2D([], [], color="black", linestyle=s, linewidth=0.9, label=text) for s, text in styles.items()]  # type: ignore[arg-type]
+    nominal = "nominal vehicle; (a): flown to the end" if shares else "nominal vehicle"
+    styles: Any = {"-": nominal, "--": "worst corner"} | ({":": "(a): not a second at the limits"} if shares else {})
+    keys = [Line2D([], [], color="black", linestyle=style, linewidth=0.9, label=styles[style]) for style in styles]
     figure.legend(handles=[*controllers, *keys], loc="outside upper center", ncols=3, frameon=False)
 
 
@@ -191,7 +174,7 @@ def lost_where(x: np.ndarray, columns: Columns, digits: int = 2, *, rising: bool
         ("losses begin", "finished"),
         ("nominal vehicle lost", "nominal_finished"),
     ):
-        lost = np.array(columns[name])[order] < 1.0
+        lost = columns[name][order] < 1.0
         begins = np.flatnonzero(lost & ~np.concatenate(([False], lost[:-1])))
         cells[what] = ", ".join(f"{along[i - 1]} to {along[i]}" if i else f"at {along[0]}" for i in begins) or "–"
     return cells

@@ -132,7 +132,7 @@ def run(scope: Scope) -> Outcome:
     ):
         for group, columns in results.items():
             for name, style in zip(names, ("o-", "o--"), strict=False):
-                axis.plot(factors[law], unit * np.array(columns[name]), style, color=group.color, markersize=3)
+                axis.plot(factors[law], unit * columns[name], style, color=group.color, markersize=3)
         axis.set_ylabel(label)
     for axis, limit in ((panels[0, 0], 0.0), (panels[1, 0], 0.5), (panels[1, 1], 0.5)):
         axis.axhline(limit, **ZERO)
@@ -161,18 +161,15 @@ def run(scope: Scope) -> Outcome:
 
     return Outcome(
         figure,
-        "The baseline with one group of its scales or input bounds multiplied by a factor (1 is the baseline "
-        "itself; a weight is one over the square of its scale, so that a larger scale is a smaller weight). The "
-        "left panels vary F, the right panels K with its input bounds; everything else is unchanged. The flights "
-        "are those of Case 1 with the paper-like coupling, for the nominal vehicle and "
-        f"{in_words(scope.over)} of the parameter bounds. (a) Largest real part of the poles of the linear sampled "
-        "loop, over all vehicles and both ends of the step, before and after the fault; with notch (solid) and "
-        "without (dashed). (b) Time until altitude (solid) and velocity (dashed) have settled to 2 % of the step, "
+        "The baseline with one group of its scales or input bounds multiplied by a factor (1 is the baseline itself; a "
+        "weight is one over the square of its scale, so that a larger scale is a smaller weight). The left panels vary "
+        "F, the right panels K with its input bounds; everything else is unchanged. The flights are those of Case 1 "
+        f"with the paper-like coupling, {in_words(scope.over)}. (a) Largest growth of all vehicles; with notch (solid) "
+        "and without (dashed). (b) Time until altitude (solid) and velocity (dashed) have settled to 2 % of the step, "
         "nominal vehicle; a line ends where they do not settle before the fault. (c), (d) Attitude deviation from "
         "nominal after the fault, worst corner; the black line is half a degree. (e) Altitude error at the end, "
-        "nominal vehicle (solid) and worst corner (dashed). (f) The same error with robust MPC and the fourth "
-        "gain, as the paper flies it: on the decoupled model, without notch; a dashed line ends where a flight is "
-        "lost.",
+        "nominal vehicle (solid) and worst corner (dashed). (f) The same error with robust MPC and the fourth gain, as "
+        "the paper flies it: on the decoupled model, without notch; a dashed line ends where a flight is lost.",
         rows(
             "F",
             lambda group, i: {
@@ -198,7 +195,7 @@ def run(scope: Scope) -> Outcome:
             {
                 "controller": controller.label,
                 "nominal vehicle": _elevator_limit(controller is WITH_NOTCH, scope.over[:1]),
-                f"worst of {in_words(scope.over)}": _elevator_limit(controller is WITH_NOTCH, scope.over),
+                "worst corner": _elevator_limit(controller is WITH_NOTCH, scope.over),
             }
             for controller in (WITH_NOTCH, WITHOUT_NOTCH)
         ],
