@@ -13,8 +13,7 @@ from hsv.flight.scenario import load_scenario, scenario_names
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.designs import design
 from hsv_paper.figures import FIGURES
-from hsv_paper.figures.figure import gain_switches, in_words
-from hsv_paper.figures.over_time import NOTCH
+from hsv_paper.figures.over_time import NOTCH, gain_switches
 from hsv_paper.flights import Flights
 from hsv_paper.plots import RC, save
 
@@ -112,8 +111,6 @@ def test_gain_switches_are_where_the_index_changes(flights):
     steps = gain_switches(flight)
     assert list(flight.gain_index[steps] - flight.gain_index[steps - 1]) == [1.0] * len(steps)
     assert flight.gain_index[-1] == flight.gain_index[0] + len(steps)
-    assert in_words([1.2, 2.0, 3.4]) == "1, 2 and 3"
-    assert in_words([1.2]) == "1"
 
 
 def test_the_notch_takes_out_its_centre_and_passes_the_rest():

@@ -76,29 +76,25 @@ def save(figure: Figure, stem: Path) -> list[Path]:
     return paths
 
 
-def bode_panels(height: float = 5.0) -> tuple[Figure, Axes, Axes]:
+def bode_panels() -> tuple[Figure, Axes, Axes]:
     """Return a figure with a magnitude panel above a phase panel."""
-    figure = new_figure(height)
+    figure = new_figure(5.0)
     magnitude, phase = figure.subplots(2, 1, sharex=True)
     return figure, magnitude, phase
 
 
-def bode_lines(
-    magnitude: Axes, phase: Axes, frequencies: np.ndarray, response: np.ndarray, label: str, **style: Any
+def draw_bode(
+    magnitude: Axes, phase: Axes, frequencies: np.ndarray, curves: Iterable[tuple[np.ndarray, str, dict[str, Any]]]
 ) -> None:
-    """Draw a response (f) into a magnitude and a phase panel.
+    """Draw responses (f) with their labels and styles into a magnitude and a phase panel, and label the axes.
 
     The phase at the lowest frequency is within half a turn of -270 deg, the phase of elevator to pitch rate between
     the slow modes and the elastic ones, so that all figures show the same branch.
     """
-    decibel, degree = bode(response)
-    degree = degree - 360.0 * np.round((degree[0] + 270.0) / 360.0)
-    magnitude.semilogx(frequencies, decibel, label=label, **style)
-    phase.semilogx(frequencies, degree, **style)
-
-
-def label_bode(magnitude: Axes, phase: Axes, frequencies: np.ndarray) -> None:
-    """Label the axes of a magnitude and a phase panel."""
+    for response, label, style in curves:
+        decibel, degree = bode(response)
+        magnitude.semilogx(frequencies, decibel, label=label, **style)
+        phase.semilogx(frequencies, degree - 360.0 * np.round((degree[0] + 270.0) / 360.0), **style)
     magnitude.set_ylabel("Magnitude (dB)")
     phase.set_ylabel("Phase (deg)")
     phase.set_xlabel("Frequency (rad/s)")

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from hsv.base.units import FOOT
 from hsv.control.notch_filter import notch_response
@@ -22,6 +23,7 @@ from hsv_paper.designs import (
     extended_model,
     inputs_of,
 )
+from hsv_paper.figures.figure import paper_figure
 from hsv_paper.flights import Flights
 from hsv_paper.linear_loop import ELEVATOR
 from hsv_paper.modes import PeakFall, elastic_modes, linearised, open_loop_modes, peak_falls, pitch_rate_response
@@ -32,24 +34,23 @@ POLE_DAMPINGS = (0.2, 0.5, 0.8)
 """Poles of the notch filters in Figure 3."""
 
 _BETWEEN = f"{BETWEEN[0] / FOOT:.0f} ft and {BETWEEN[1] / FOOT:.0f} ft/s"
-_POLYTOPIC = {"color": plots.BLUE, "linestyle": ":", "linewidth": 2.0}
+_POLYTOPIC: dict[str, Any] = {"color": plots.BLUE, "linestyle": ":", "linewidth": 2.0}
+_WITHOUT = {"color": plots.RED, "linestyle": "--"}
 
 
+@paper_figure(
+    2,
+    "Bode diagram comparison of polytopic LPV and DM. (a) Amplitude frequency characteristic. (b) Phase frequency "
+    "characteristic.",
+)
 def figure_02(flights: Flights) -> Outcome:
     """Draw elevator to pitch rate of the polytopic model and of the decoupled model, between the samples."""
     flown, model = design("baseline"), certificate("baseline")["model"]
     frequencies = np.logspace(-2.0, 2.0, 600)
     exact = zero_order_hold(*linearise(load_vehicle().decoupled, *BETWEEN), flown.period)
-    figure, magnitude, phase = plots.bode_panels()
-    for system, label, style in (
-        (exact, "DM", {"color": plots.RED}),
-        (flown.polytope.at(*BETWEEN), "Polytopic LPV", _POLYTOPIC),
-    ):
-        response = frequency_response(*system, frequencies, flown.period)[:, PITCH_RATE, ELEVATOR]
-        plots.bode_lines(magnitude, phase, frequencies, response, label, **style)
-    plots.label_bode(magnitude, phase, frequencies)
-    plots.letter((magnitude, phase))
-    magnitude.legend(loc="upper right")
+    polytopic = flown.polytope.at(*BETWEEN)
+    curves = ((exact, "DM", {"color": plots.RED}), (polytopic, "Polytopic LPV", _POLYTOPIC))
+    figure, _ = _compared(frequencies, flown.period, *curves)
     accuracy, (rows, columns) = model["accuracy"], model["vertices"]
     return Outcome(
         figure,
@@ -65,6 +66,11 @@ def figure_02(flights: Flights) -> Outcome:
     )
 
 
+@paper_figure(
+    3,
+    "Bode diagram of notch filter's effect on flexible hypersonic vehicle. (a) Effect of omega_p when epsilon_p = "
+    "0.5. (b) Effect of epsilon_p when omega_p = 15.",
+)
 def figure_03(flights: Flights) -> Outcome:
     """Draw elevator to filtered pitch rate of the coupled model, one parameter of the poles changed at a time."""
     section, frequencies = design("baseline").notch[0], np.logspace(0.0, 2.0, 1500)
@@ -76,12 +82,11 @@ def figure_03(flights: Flights) -> Outcome:
         [(f"$\\varepsilon_p$ = {e:g}", replace(section, pole_damping=e)) for e in POLE_DAMPINGS],
     )
     for (magnitude, phase), family in zip(grid.T, families, strict=True):
-        plots.bode_lines(magnitude, phase, frequencies, plain, "without notch", color=plots.RED, linestyle="--")
-        for (label, changed), color in zip(family, (plots.GREEN, plots.BLUE, plots.ORANGE), strict=True):
-            plots.bode_lines(
-                magnitude, phase, frequencies, plain * notch_response([changed], frequencies), label, color=color
-            )
-        plots.label_bode(magnitude, phase, frequencies)
+        filtered = [
+            (plain * notch_response([changed], frequencies), label, {"color": color})
+            for (label, changed), color in zip(family, (plots.GREEN, plots.BLUE, plots.ORANGE), strict=True)
+        ]
+        plots.draw_bode(magnitude, phase, frequencies, [(plain, "without notch", _WITHOUT), *filtered])
         magnitude.legend(loc="lower left")
     for axis in grid[:, 1]:
         axis.set_ylabel("")
@@ -102,6 +107,7 @@ def figure_03(flights: Flights) -> Outcome:
     )
 
 
+@paper_figure(4, "Open-loop pole distribution.")
 def figure_04(flights: Flights) -> Outcome:
     """Draw all poles of the coupled model, and those near the origin enlarged, for both sets of coupling."""
     figure = plots.new_figure(4.2)
@@ -160,17 +166,16 @@ def figure_04(flights: Flights) -> Outcome:
     )
 
 
+@paper_figure(5, "Bode diagram of Notch filter on flexible modes.")
 def figure_05(flights: Flights) -> Outcome:
     """Draw elevator to pitch rate about both modes, with and without the design's filter, and its gain alone."""
     section, frequencies = design("baseline").notch, np.logspace(0.7, 1.7, 3000)
     plain, filter_ = pitch_rate_response("paper_like", frequencies), notch_response(section, frequencies)
     figure, magnitude, phase = plots.bode_panels()
-    plots.bode_lines(magnitude, phase, frequencies, plain, "without notch", color=plots.RED, linestyle="--")
-    plots.bode_lines(magnitude, phase, frequencies, plain * filter_, "with notch", color=plots.BLUE)
-    magnitude.semilogx(
-        frequencies, bode(filter_)[0], color=plots.GREY, linewidth=0.7, label="gain of the notch filter alone"
-    )
-    plots.label_bode(magnitude, phase, frequencies)
+    curves = (plain, "without notch", _WITHOUT), (plain * filter_, "with notch", {"color": plots.BLUE})
+    plots.draw_bode(magnitude, phase, frequencies, curves)
+    alone = {"color": plots.GREY, "linewidth": 0.7, "label": "gain of the notch filter alone"}
+    magnitude.semilogx(frequencies, bode(filter_)[0], **alone)
     modes = {name: mode.natural_frequency for name, mode in elastic_modes("paper_like").items()}
     for (name, frequency), side in zip(modes.items(), ("right", "left"), strict=True):
         for axis in (magnitude, phase):
@@ -194,24 +199,23 @@ def figure_05(flights: Flights) -> Outcome:
     )
 
 
+@paper_figure(
+    8,
+    "Bode diagram comparison of codesigned polytopic LPV model and ECM. (a) Amplitude frequency characteristics. "
+    "(b) Phase frequency characteristics.",
+)
 def figure_08(flights: Flights) -> Outcome:
     """Draw elevator to filtered pitch rate of the co-designed model and of the ECM without and with its coupling."""
     inputs, model, frequencies = inputs_of("adjustable"), certificate("adjustable")["model"], CODESIGN_FREQUENCIES
-    figure, magnitude, phase = plots.bode_panels()
-    drawn = []
-    for system, label, style in (
+    curves = (
         (extended_model(inputs, "paper_like"), "ECM with its coupling", {"color": plots.GREY, "linewidth": 0.8}),
         (extended_model(inputs, 0.0), "ECM, coupling ignored", {"color": plots.RED}),
         (codesigned_model(inputs), "Codesigned polytopic LPV", _POLYTOPIC),
-    ):
-        drawn.append(frequency_response(*system, frequencies, inputs.model.period)[:, PITCH_RATE, ELEVATOR])
-        plots.bode_lines(magnitude, phase, frequencies, drawn[-1], label, **style)
+    )
+    figure, drawn = _compared(frequencies, inputs.model.period, *curves)
     decibel, degree = bode_difference(drawn[-1], drawn[0])
     loud, late = np.argmax(decibel), np.argmax(degree)
     elastic = [f"{mode.natural_frequency:.1f}" for mode in elastic_modes("paper_like").values()]
-    plots.label_bode(magnitude, phase, frequencies)
-    plots.letter((magnitude, phase))
-    magnitude.legend(loc="upper right")
     accuracy, (rows, columns) = model["accuracy"], model["vertices"]
     return Outcome(
         figure,
@@ -229,6 +233,19 @@ def figure_08(flights: Flights) -> Outcome:
         "weak coupling is part of the design, and the price is that stability with flexibility must be shown by other "
         "means.",
     )
+
+
+def _compared(
+    frequencies: np.ndarray, period: float, *models: tuple[tuple[np.ndarray, np.ndarray], str, dict[str, Any]]
+) -> tuple[Figure, list[np.ndarray]]:
+    """Draw elevator to pitch rate of discrete models (A and B, label, style); return the figure and the responses."""
+    figure, magnitude, phase = plots.bode_panels()
+    drawn = [frequency_response(*model, frequencies, period)[:, PITCH_RATE, ELEVATOR] for model, *_ in models]
+    curves = [(response, label, style) for response, (_, label, style) in zip(drawn, models, strict=True)]
+    plots.draw_bode(magnitude, phase, frequencies, curves)
+    plots.letter((magnitude, phase))
+    magnitude.legend(loc="upper right")
+    return figure, drawn
 
 
 def _poles(coupling: str) -> np.ndarray:

@@ -12,8 +12,9 @@ from matplotlib.patheffects import withStroke
 from hsv.control.design import TubeSet
 from hsv.flight.metrics import FlightData
 from hsv.model.signals import N_RIGID
-from hsv_paper.designs import design
-from hsv_paper.flights import Flights
+from hsv_paper.designs import tube_of
+from hsv_paper.figures.figure import paper_figure
+from hsv_paper.flights import Flights, flight_measures
 from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, GREY, letter, new_figure
 from hsv_paper.study import Outcome
 
@@ -63,10 +64,10 @@ def rigid_level(tube: TubeSet, error: np.ndarray) -> np.ndarray:
     return np.asarray(np.einsum("ki,ij,kj->k", offset, shape, offset))
 
 
+@paper_figure(6, "The state of system in the mRPI set at the same time.", WITH, WITHOUT)
 def figure_06(flights: Flights) -> Outcome:
     """Draw three projections of the set, whole and enlarged about the states; below, levels over time."""
-    tube = design("baseline").tube
-    assert tube is not None
+    tube = tube_of("baseline")
     shown = (("Tube-MPC without notch", GREEN, "s", WITHOUT), ("Tube-MPC with notch", BLUE, "o", WITH))
     errors = [tube_error(flights[name])[steps(flights[name], INSTANTS)] for *_, name in shown]
     figure = new_figure(7.4)
@@ -102,7 +103,7 @@ def figure_06(flights: Flights) -> Outcome:
     for axis in grid[1]:
         axis.set_title("enlarged", loc="left")
     closer = int(np.count_nonzero(np.abs(errors[1][:, 4]) < np.abs(errors[0][:, 4])))
-    without, with_ = (_pitch_rate_error(flights[name]) for *_, name in shown)
+    without, with_ = (flight_measures(flights[name])["pitch_rate_error"] for *_, name in shown)
     return Outcome(
         figure,
         f"The errors e = x - x_r - x_n with uncertain parameters are shown at the same {len(INSTANTS)} instants, which "
@@ -148,9 +149,3 @@ def _label_instants(axis: Axes, x: np.ndarray, y: np.ndarray, side: float) -> No
             at, text = (right, up), (float(offset[0]), float(offset[1]))
             axis.annotate(f"{since:g} s", at, text, path_effects=halo, **style)
             labelled.append(place)
-
-
-def _pitch_rate_error(flight: FlightData) -> float:
-    """Return the root mean square of the pitch-rate error (rad/s) over the 20 s after the fault."""
-    window = slice(*steps(flight, (0.0, 20.0)))
-    return float(np.sqrt(np.mean(tube_error(flight)[window, 4] ** 2)))

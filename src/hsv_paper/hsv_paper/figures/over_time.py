@@ -13,24 +13,19 @@ from matplotlib.lines import Line2D
 from hsv.base.units import FOOT, to_paper
 from hsv.control.notch_filter import notch_response
 from hsv.flight.assembly import assemble, flight_parameters
-from hsv.flight.metrics import FlightData
+from hsv.flight.metrics import METRICS, FlightData, flight_metrics
 from hsv.flight.scenario import load_scenario
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.figures.figure import (
-    LIMITS,
-    gain_switches,
-    in_words,
-    input_extremes,
-    input_ranges,
-    limited,
-    measured,
-)
-from hsv_paper.flights import Flights
+from hsv_paper.figures.figure import paper_figure
+from hsv_paper.flights import Flights, flight_measures
 from hsv_paper.modes import elastic_modes
-from hsv_paper.plots import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
+from hsv_paper.plots import BLUE, DEGREES, GREEN, GREY, ORANGE, RED, letter, new_figure
 from hsv_paper.study import Outcome
 
-_LIMITS = load_vehicle().decoupled
+LOWEST, HIGHEST = load_vehicle().decoupled.input_minimum, load_vehicle().decoupled.input_maximum
+_TRAVEL = f"{np.degrees(LOWEST[1]):g} deg to {np.degrees(HIGHEST[1]):g} deg"
+LIMITS = f"The limits, {LOWEST[0]:g} to {HIGHEST[0]:g} and {_TRAVEL}, are"
+"""Limits of the inputs, and the beginning of a sentence on them."""
 
 _FAULT: Any = {"color": GREY, "linewidth": 0.6, "linestyle": (0, (4, 3))}
 _LIMIT: Any = {"color": "black", "linewidth": 0.7, "linestyle": (0, (1, 1.5))}
@@ -38,11 +33,8 @@ _COMMAND: Any = {"color": "black", "linewidth": 0.9, "linestyle": ":"}
 _THIN = 0.5
 """Width of the lines of nominal flights."""
 
-_NEAR = 1.0 / 3.0
-"""A limit is drawn if it is within this share of the panel's range from the curves, so that they stay readable."""
-
-_OFF = 0.03
-"""Share of a panel's range that is left between a limit and the panel's frame."""
+_NEAR, _OFF = 1.0 / 3.0, 0.03
+"""Shares of a panel's range: the distance from the curves up to which a limit is drawn, and from the frame to it."""
 
 Scenarios = tuple[str, str]
 """Scenarios of a controller with uncertain and with nominal parameters."""
@@ -57,6 +49,7 @@ ADJUSTABLE: Scenarios = ("case2_uncertain", "case2")
 WHOLE: Scenarios = ("case2_uncertain_tau1", "case2_tau1")
 BASELINE: Scenarios = ("case2_uncertain_baseline", "case2_baseline")
 CASE_2 = (*ADJUSTABLE, *WHOLE, *BASELINE)
+UNCERTAIN_2 = ADJUSTABLE[0], WHOLE[0], BASELINE[0]
 
 SECOND_MODE, NO_FILTER = "case1_second_mode_notch", "case1_no_notch"
 """Scenarios of Figure 13."""
@@ -172,15 +165,10 @@ def _panel(
 ) -> bool:
     """Draw flights with their line styles; return whether a limit of the input is near enough to be in the panel."""
     unit, first = to_paper(1.0, panel.unit)[0], drawn[0][0]
-
-    def line(time: np.ndarray, values: np.ndarray, style: Any) -> None:
+    lines = [(flight.time, getattr(flight, panel.array), style) for flight, style in drawn]
+    for time, values, style in [*lines, *([(first.time, first.reference, _COMMAND)] if reference else [])]:
         inside = slice(None) if window is None else (time >= window.start) & (time <= window.end)
         axis.plot(time[inside], unit * values[inside, panel.column], **style)
-
-    for flight, style in drawn:
-        line(flight.time, getattr(flight, panel.array), style)
-    if reference:
-        line(first.time, first.reference, _COMMAND)
     if first.fault_start is not None:
         axis.axvline(first.fault_start, **_FAULT)
     if window:
@@ -191,7 +179,7 @@ def _panel(
     margin, off = _NEAR * (high - low), _OFF * (high - low)
     near = []
     if panel.array == "command":
-        limits = unit * _LIMITS.input_minimum[panel.column], unit * _LIMITS.input_maximum[panel.column]
+        limits = unit * LOWEST[panel.column], unit * HIGHEST[panel.column]
         near = [limit for limit in limits if low - margin <= limit <= high + margin]
     for limit in near:
         axis.axhline(limit, **_LIMIT)
@@ -226,29 +214,43 @@ _CASE_2 = (
 """The three controllers of Figures 14 to 17, the paper's on top."""
 
 
-def _conditions_1(nominal: str = "thin lines show") -> str:
-    """Return a description of the flights of Case 1; ``nominal``: how those with nominal parameters are shown."""
-    return (
-        "The uncertain parameters are those of `case1_uncertain` (mass +5 %, moment of inertia -5 %, the others at "
-        "half of their bounds), and the elevator effectiveness is 0.9 from 100 s on; "
-        f"{nominal} nominal parameters. Robust MPC flies the decoupled model without tube and notch filter, as in the "
-        "paper, with the fourth gain of the family, the tightest gain with which no corner of the bounds is lost."
-    )
+def _flown(case: int, nominal: str = "thin lines show") -> str:
+    """Return a description of the flights of a case; ``nominal``: how those with nominal parameters are shown."""
+    return f"The flights are those of [Case {case}](index.md#flights); {nominal} nominal parameters."
 
 
-def _conditions_2(nominal: str = "thin lines show") -> str:
-    """Return a description of the flights of Case 2; ``nominal``: as above."""
-    return (
-        "The uncertain parameters are those of `case2_uncertain` (the same as in Case 1). The ramp lasts from 20 s to "
-        f"80 s, and the elevator effectiveness is 0.9 from 100 s on; {nominal} nominal parameters. The adjustable "
-        "design is flown with the paper's tau = 0.8 and with tau = 1, and the baseline design on the same ramp."
-    )
+def measured(flights: Flights, metric: str, *scenarios: str) -> list[float]:
+    """Return a metric of flights in the paper's unit."""
+    return [to_paper(flight_metrics(flights[name])[metric], METRICS[metric].unit)[0] for name in scenarios]
+
+
+def commands(flights: Flights, scenarios: Sequence[str]) -> np.ndarray:
+    """Return all commands (n, 2) of flights: fuel equivalence ratio, elevator in deg."""
+    return np.concatenate([flights[scenario].command for scenario in scenarios]) * [1.0, DEGREES]
+
+
+def ranges(flights: Flights, scenarios: Sequence[str]) -> str:
+    """Return the ranges of both commands over several flights, in words."""
+    least, largest = (end(commands(flights, scenarios), axis=0) for end in (np.min, np.max))
+    return f"{least[0]:.2f} to {largest[0]:.2f} and {least[1]:.1f} deg to {largest[1]:.1f} deg"
+
+
+def limited(flights: Flights, scenarios: Sequence[str]) -> str:
+    """Return in how many steps of several flights a command was saturated, in words."""
+    steps = sum(int(np.any(flights[scenario].flight_curves.saturated, axis=1).sum()) for scenario in scenarios)
+    return f"saturated in {steps or 'no'} step{'s' if steps > 1 else ''} of the {len(scenarios)} flights"
+
+
+def gain_switches(flight: FlightData) -> np.ndarray:
+    """Return the steps in which the nominal law switches to another gain of its nested family."""
+    return np.flatnonzero(np.diff(flight.gain_index)) + 1
 
 
 def _switches(flights: Flights) -> str:
-    """Return in words at which times (s) the tubes' nominal law switches to the next gain."""
+    """Return in words the times (s) at which the tubes' nominal law switches to the next gain."""
     flight = flights[NOTCH[0]]
-    return f"at {in_words(flight.time[gain_switches(flight)])} s"
+    *first, last = (f"{time:.0f}" for time in flight.time[gain_switches(flight)])
+    return f"at {', '.join(first)} and {last} s"
 
 
 def _during(flight: FlightData, start: float, end: float) -> np.ndarray:
@@ -256,120 +258,123 @@ def _during(flight: FlightData, start: float, end: float) -> np.ndarray:
     return flight.state[(flight.time >= start) & (flight.time <= end)]
 
 
-def _of_case_2(flights: Flights, metric: str) -> list[float]:
-    """Return a metric of the three controllers of Case 2 with uncertain parameters, in the paper's unit."""
-    return [measured(flights, names[0], metric) for names in (ADJUSTABLE, WHOLE, BASELINE)]
-
-
+@paper_figure(9, "Trajectory in Case 1. (a) Altitude. (b) Velocity.", *CASE_1, *RMPC_SINGLE)
 def figure_09(flights: Flights) -> Outcome:
     """Draw altitude and velocity; the altitude with the single gain leaves its panel."""
     top = 86480.0
     panels = ALTITUDE._replace(shown=(85450.0, top)), VELOCITY._replace(shown=(7880.0, 8190.0))
     figure = histories(flights, panels, _case_1(single=True), None, 2.7, reference=True)
-    notch, without, robust, single_gain = (
-        measured(flights, names[0], "altitude_end_error") for names in (NOTCH, NO_NOTCH, RMPC, RMPC_SINGLE)
-    )
+    errors = measured(flights, "altitude_end_error", NOTCH[0], NO_NOTCH[0], RMPC[0], RMPC_SINGLE[0])
+    [off] = measured(flights, "velocity_end_error", RMPC_SINGLE[0])
     flight = flights[RMPC_SINGLE[0]]
     leaves = flight.time[np.argmax(flight.state[:, 0] > top * FOOT)]
     arrow = {"arrowstyle": "-", "color": RED, "linewidth": 0.5}
-    text, at, place = f"{single_gain:.0f} ft above the\ncommand at 200 s", (leaves, top - 10), (leaves + 12, top - 190)
+    text, at, place = f"{errors[3]:.0f} ft above the\ncommand at 200 s", (leaves, top - 10), (leaves + 12, top - 190)
     figure.axes[0].annotate(text, at, place, color=RED, fontsize=8, arrowprops=arrow)
     return Outcome(
         figure,
-        _conditions_1() + " The single gain, designed for the whole step, is also shown.",
-        f"Both tube controllers track through the fault, with an altitude error at 200 s of {notch:.1f} ft with the "
-        f"notch and {without:.1f} ft without it. Robust MPC does not; its error at the end is {robust:.0f} ft.",
+        _flown(1) + " The single gain, designed for the whole step, is also shown.",
+        f"Both tube controllers track through the fault, with an altitude error at 200 s of {errors[0]:.1f} ft with "
+        f"the notch and {errors[1]:.1f} ft without it. Robust MPC does not; its error at the end is {errors[2]:.0f} "
+        "ft.",
         "The error of robust MPC at the end depends on its gain, which the paper does not state: with the single gain "
-        f"of (32) to (35) it is {single_gain:.0f} ft and {measured(flights, RMPC_SINGLE[0], 'velocity_end_error'):.0f} "
-        "ft/s. An error of a few feet remains with the tube controllers, because their law has no integral action. "
-        f"Their velocity has kinks {_switches(flights)}, where the nominal state enters the next smaller ellipsoid of "
-        "the nested family and the law switches to its gain; the paper's law has a single gain and would have no "
-        "kinks.",
+        f"of (32) to (35) it is {errors[3]:.0f} ft and {off:.0f} ft/s. An error of a few feet remains with the tube "
+        "controllers, because their law has no integral action. Their velocity has kinks at the "
+        f"[gain switches](index.md#flights) {_switches(flights)}.",
     )
 
 
+@paper_figure(10, "States in Case 1. (a) Attack angle. (b) Pitch angle. (c) Pitch rate.", *CASE_1)
 def figure_10(flights: Flights) -> Outcome:
     """Draw angle of attack, pitch angle and pitch rate."""
     figure = histories(flights, ATTITUDE, _case_1(), Zoom(95.0, 125.0), 2.1)
-    tube, without, robust = (
-        measured(flights, names[0], "post_fault_attitude_deviation") for names in (NOTCH, NO_NOTCH, RMPC)
-    )
-    rate, rate_without = (
-        np.degrees(np.ptp(_during(flights[names[0]], 110.0, 120.0)[:, 4])) for names in (NOTCH, NO_NOTCH)
-    )
+    shown = NOTCH[0], NO_NOTCH[0], RMPC[0]
+    tube, without, robust = measured(flights, "post_fault_attitude_deviation", *shown)
+    rate, rate_without = (DEGREES * flight_measures(flights[name])["pitch_rate_ringing"] for name in shown[:2])
     return Outcome(
         figure,
-        _conditions_1(),
+        _flown(1),
         "The attitude moves at the fault and settles at the new equilibrium. The excursion is smaller with the tube "
         f"({tube:.2f} deg) than with robust MPC ({robust:.2f} deg). The response is smoother with the notch: between "
         f"10 s and 20 s after the fault, the peak-to-peak pitch rate is {rate:.3f} deg/s with it and "
         f"{rate_without:.3f} deg/s without it.",
         "The size of the excursion is determined by the lost elevator and not by the notch: without the notch it is "
         f"{without:.2f} deg. The notch removes the ringing that follows. The dips of the tube controllers before the "
-        f"fault follow gain switches {_switches(flights)} (Figure 12).",
+        f"fault follow [gain switches](index.md#flights) {_switches(flights)}.",
     )
 
 
+@paper_figure(
+    11,
+    "The generalized flexible coordinates of real system in Case 1. (a) The first-order generalized flexible "
+    "coordinate. (b) Derivative of the first-order generalized flexible coordinate. (c) The second-order "
+    "generalized flexible coordinate. (d) Derivative of the second-order generalized flexible coordinate.",
+    *CASE_1,
+)
 def figure_11(flights: Flights) -> Outcome:
     """Draw both elastic coordinates with their derivatives."""
     figure = histories(flights, ELASTIC, _case_1(vibrating=True), Zoom(99.0, 107.0), 1.9, apart=True)
-    decay = {name: measured(flights, name, "elastic_decay_time") for name in (*NOTCH, *NO_NOTCH)}
+    with_, with_nominal, without, without_nominal = measured(flights, "elastic_decay_time", *NOTCH, *NO_NOTCH)
     unit = to_paper(1.0, "kg^0.5 m/s")[0]
 
     def span(scenario: str, start: float, end: float) -> float:
-        """Return the peak-to-peak second rate (sqrt(slug) ft/s) between two times (s)."""
+        """Return the peak-to-peak second rate (√slug ft/s) between two times (s)."""
         return float(unit * np.ptp(_during(flights[scenario], start, end)[:, 8]))
 
     def largest(start: float) -> float:
-        """Return the largest second rate (sqrt(slug) ft/s) of the tube with notch within 3 s of ``start`` (s)."""
+        """Return the largest second rate (√slug ft/s) of the tube with notch within 3 s of ``start`` (s)."""
         return float(unit * np.abs(_during(flights[NOTCH[0]], start, start + 3.0)[:, 8]).max())
 
     flight = flights[NOTCH[0]]
     bursts = [largest(flight.time[step]) for step in gain_switches(flight)]
     return Outcome(
         figure,
-        _conditions_1("the middle column shows"),
+        _flown(1, "the middle column shows"),
         "The coordinates vibrate at the fault and return to rest. With the notch, both rates are within 5 % of their "
-        f"peak after {decay[NOTCH[0]]:.1f} s (with nominal parameters, {decay[NOTCH[1]]:.1f} s). Without the notch, "
-        f"they still ring at the end, {decay[NO_NOTCH[0]]:.0f} s after the fault (with nominal parameters, they decay "
-        f"in {decay[NO_NOTCH[1]]:.0f} s).",
+        f"peak after {with_:.1f} s (with nominal parameters, {with_nominal:.1f} s). Without the notch, they still ring "
+        f"at the end, {without:.0f} s after the fault (with nominal parameters, they decay in {without_nominal:.0f} "
+        "s).",
         "Without the notch, the second mode already grows before the fault with these parameters: its peak-to-peak "
         f"rate is {span(NO_NOTCH[0], 30.0, 40.0):.2f} √slug ft/s from 30 s to 40 s and "
         f"{span(NO_NOTCH[0], 90.0, 100.0):.2f} from 90 s to 100 s. The fault lowers the loop gain and thereby reduces "
         "the vibration. Robust MPC does not vibrate a lot more than the tube controllers: it flies the decoupled "
         "model, which feeds no vibration back (peak-to-peak second rate after the fault "
         f"{span(RMPC[0], 100.0, 200.0):.2f}, tube with notch {span(NOTCH[0], 100.0, 200.0):.2f}). Only its coordinates "
-        f"move far, with the angle of attack. The bursts of the tube controllers {_switches(flights)} are gain "
-        "switches of the nested family, which move the elevator within one step; with the notch, the second rate "
-        f"reaches {max(bursts):.2f} in them and {largest(100.0):.2f} at the fault. The paper's law has a single gain "
-        "and would have no bursts.",
+        f"move far, with the angle of attack. The bursts of the tube controllers {_switches(flights)} are "
+        "[gain switches](index.md#flights), which move the elevator within one step; with the notch, the second rate "
+        f"reaches {max(bursts):.2f} in them and {largest(100.0):.2f} at the fault.",
     )
 
 
+@paper_figure(12, "Control inputs in Case 1. (a) Fuel-to-air ratio. (b) Elevator deflection.", *CASE_1)
 def figure_12(flights: Flights) -> Outcome:
     """Draw both inputs as commanded."""
     figure = histories(flights, INPUTS, _case_1(), Zoom(98.0, 118.0), 2.3)
-    _, largest = input_extremes(flights, RMPC)
-    flight = flights[NOTCH[0]]
+    largest, flight = commands(flights, RMPC).max(axis=0), flights[NOTCH[0]]
     steps = gain_switches(flight)
     jumps = np.abs(flight.command[steps] - flight.command[steps - 1]).max(axis=0)
     return Outcome(
         figure,
-        _conditions_1() + f" The limits, {LIMITS}, are drawn where they are near the curves.",
+        f"{_flown(1)} {LIMITS} drawn where they are near the curves.",
         f"The inputs stay within their limits and are {limited(flights, CASE_1)}. With uncertain and nominal "
-        f"parameters together, the fuel ratio and the elevator range over {input_ranges(flights, NOTCH)} with the "
-        f"notch, over {input_ranges(flights, NO_NOTCH)} without it, and over {input_ranges(flights, RMPC)} with robust "
-        "MPC.",
+        f"parameters together, the fuel ratio and the elevator range over {ranges(flights, NOTCH)} with the notch, "
+        f"over {ranges(flights, NO_NOTCH)} without it, and over {ranges(flights, RMPC)} with robust MPC.",
         "The tube controllers stay far from the limits, so the figure says little about their behaviour at the limits. "
-        f"Robust MPC does not: at the step it commands a fuel ratio of {largest[0]:.2f} (limit "
-        f"{_LIMITS.input_maximum[0]:g}) and an elevator deflection of {largest[1]:.0f} deg (limit "
-        f"{np.degrees(_LIMITS.input_maximum[1]):.0f} deg). The jumps in the inputs of the tube controllers "
-        f"{_switches(flights)}, of up to {jumps[0]:.2f} and {np.degrees(jumps[1]):.1f} deg, are gain switches of the "
-        "nested family: closer to rest, a tighter gain satisfies the same bounds. The paper's law has a single gain "
-        "and would have no jumps. Without the notch, the vibration appears in the elevator.",
+        f"Robust MPC does not: at the step it commands a fuel ratio of {largest[0]:.2f} (limit {HIGHEST[0]:g}) and an "
+        f"elevator deflection of {largest[1]:.0f} deg (limit {np.degrees(HIGHEST[1]):.0f} deg). The jumps in the "
+        f"inputs of the tube controllers {_switches(flights)}, of up to {jumps[0]:.2f} and {np.degrees(jumps[1]):.1f} "
+        "deg, are [gain switches](index.md#flights). Without the notch, the vibration appears in the elevator.",
     )
 
 
+@paper_figure(
+    13,
+    "Derivative of the generalized flexible coordinates of nominal system in the case of notch filter for the "
+    "second-order flexible mode. (a) Derivative of the first-order generalized flexible coordinate. (b) Derivative "
+    "of the second-order generalized flexible coordinate.",
+    SECOND_MODE,
+    NO_FILTER,
+)
 def figure_13(flights: Flights) -> Outcome:
     """Draw both elastic rates, with the notch at the second mode and without a notch."""
     curves = [
@@ -377,18 +382,15 @@ def figure_13(flights: Flights) -> Outcome:
         Curve("Tube-MPC with notch for the second mode", BLUE, [SECOND_MODE]),
     ]
     figure = histories(flights, (ELASTIC[1], ELASTIC[3]), curves, Zoom(99.0, 107.0), 2.3)
-    first, second = (
-        [measured(flights, name, f"elastic_rate_{mode}_decay_time") for name in (NO_FILTER, SECOND_MODE)]
-        for mode in (1, 2)
-    )
-    modes = {name: mode.natural_frequency for name, mode in elastic_modes("paper_like").items()}
+    first, second = (measured(flights, f"elastic_rate_{mode}_decay_time", NO_FILTER, SECOND_MODE) for mode in (1, 2))
+    frequencies = [mode.natural_frequency for mode in elastic_modes("paper_like").values()]
     sections = assemble(flight_parameters(load_scenario(SECOND_MODE))).notch_filter.sections
-    passed = abs(notch_response(sections, np.array([modes["first"]]))[0])
+    passed = abs(notch_response(sections, np.array(frequencies))[0])
     return Outcome(
         figure,
         'The parameters are nominal, which is our interpretation of the paper\'s "nominal system", and the fault '
         f"occurs. The notch is at {sections[0].zero_frequency:g} rad/s; the second coupled mode is at "
-        f"{modes['second']:.2f} rad/s.",
+        f"{frequencies[1]:.2f} rad/s.",
         f"The second rate decays in {second[1]:.1f} s instead of {second[0]:.1f} s.",
         f"The first rate decays in {first[1]:.1f} s instead of {first[0]:.1f} s, which is more than the slight effect "
         f"that the paper describes: a filter with such wide poles passes only {100.0 * passed:.0f} % of the pitch rate "
@@ -396,17 +398,18 @@ def figure_13(flights: Flights) -> Outcome:
     )
 
 
+@paper_figure(14, "Trajectory in case 2. (a) altitude. (b) Velocity.", *CASE_2)
 def figure_14(flights: Flights) -> Outcome:
     """Draw altitude and velocity along the ramp."""
     closer = Zoom(78.0, 130.0, "end of the ramp, and the fault")
     figure = histories(flights, (ALTITUDE, VELOCITY), _CASE_2, closer, 2.6, reference=True)
-    lag = _of_case_2(flights, "velocity_integral_absolute_error")
+    lag = measured(flights, "velocity_integral_absolute_error", *UNCERTAIN_2)
+    [largest], [last] = (measured(flights, f"altitude_{x}", ADJUSTABLE[0]) for x in ("error_maximum", "end_error"))
     return Outcome(
         figure,
-        _conditions_2(),
-        f"The ramp is tracked through the fault; the altitude error is at most "
-        f"{measured(flights, ADJUSTABLE[0], 'altitude_error_maximum'):.0f} ft, and "
-        f"{measured(flights, ADJUSTABLE[0], 'altitude_end_error'):.1f} ft at the end.",
+        _flown(2),
+        f"The ramp is tracked through the fault; the altitude error is at most {largest:.0f} ft, and {last:.1f} ft at "
+        "the end.",
         "The paper says that the adjustable scheme responds faster in velocity. Along a ramp this cannot be seen: the "
         f"integral of the velocity error is {lag[0]:.0f} ft with tau = 0.8, {lag[1]:.0f} ft with tau = 1 and "
         f"{lag[2]:.0f} ft with the baseline. The relaxed bounds of K' make the velocity response faster on a step; the "
@@ -414,10 +417,11 @@ def figure_14(flights: Flights) -> Outcome:
     )
 
 
+@paper_figure(15, "States in Case 2. (a) Attack angle. (b) Pitch angle. (c) Pitch rate.", *CASE_2)
 def figure_15(flights: Flights) -> Outcome:
     """Draw angle of attack, pitch angle and pitch rate."""
     figure = histories(flights, ATTITUDE, _CASE_2, Zoom(95.0, 125.0), 2.1)
-    off = _of_case_2(flights, "post_fault_attitude_deviation")
+    off = measured(flights, "post_fault_attitude_deviation", *UNCERTAIN_2)
 
     def moved(start: float) -> float:
         """Return the largest change (deg) of angle of attack or pitch angle within 5 s of ``start`` (s)."""
@@ -425,12 +429,12 @@ def figure_15(flights: Flights) -> Outcome:
         return float(np.degrees(np.abs(attitude - attitude[0]).max()))
 
     rates = [
-        np.degrees(max(np.abs(_during(flights[names[0]], start, start + 5.0)[:, 4]).max() for start in (20.0, 80.0)))
-        for names in (ADJUSTABLE, WHOLE, BASELINE)
+        np.degrees(max(np.abs(_during(flights[name], start, start + 5.0)[:, 4]).max() for start in (20.0, 80.0)))
+        for name in UNCERTAIN_2
     ]
     return Outcome(
         figure,
-        _conditions_2(),
+        _flown(2),
         f"The attitude moves by {off[0]:.2f} deg at the fault and settles.",
         f"With tau = 1 it moves less, by {off[1]:.2f} deg, and with the baseline by {off[2]:.2f} deg: this is the "
         f"price of tau = 0.8. The attitude also moves when the ramp begins, by {moved(20.0):.2f} deg, and when it "
@@ -440,42 +444,46 @@ def figure_15(flights: Flights) -> Outcome:
     )
 
 
+@paper_figure(
+    16,
+    "The generalized flexible coordinates of real system in Case 2. (a) The first-order generalized flexible "
+    "coordinate. (b) Derivative of the first-order generalized flexible coordinate. (c) The second-order "
+    "generalized flexible coordinate. (d) Derivative of the second-order generalized flexible coordinate.",
+    *CASE_2,
+)
 def figure_16(flights: Flights) -> Outcome:
     """Draw both elastic coordinates with their derivatives."""
     figure = histories(flights, ELASTIC, _CASE_2, Zoom(99.0, 107.0), 1.9, apart=True)
-    decay = _of_case_2(flights, "elastic_decay_time")
-    nominal = [measured(flights, names[1], "elastic_decay_time") for names in (ADJUSTABLE, WHOLE)]
+    decay = measured(flights, "elastic_decay_time", *UNCERTAIN_2, ADJUSTABLE[1], WHOLE[1])
     return Outcome(
         figure,
-        _conditions_2("the middle column shows"),
+        _flown(2, "the middle column shows"),
         f"The coordinates vibrate at the fault and are at rest after {decay[0]:.1f} s (both rates within 5 % of "
         "their peak).",
         f"The same is true with tau = 1 ({decay[1]:.1f} s) and with the baseline ({decay[2]:.1f} s): all three fly "
         "with the notch filter, without which the vibration continues in Case 1 (Figure 11). With nominal parameters, "
-        f"the decay takes {nominal[0]:.1f} s with tau = 0.8 and {nominal[1]:.1f} s with tau = 1.",
+        f"the decay takes {decay[3]:.1f} s with tau = 0.8 and {decay[4]:.1f} s with tau = 1.",
     )
 
 
+@paper_figure(17, "Control inputs in Case 2. (a) Fuel-to-air ratio. (b) Elevator deflection.", *CASE_2)
 def figure_17(flights: Flights) -> Outcome:
     """Draw both inputs as commanded."""
     figure = histories(flights, INPUTS, _CASE_2, Zoom(98.0, 118.0), 2.3)
 
-    def peak_delay(scenario: str) -> float:
-        """Return the time (s) from the fault to the largest elevator deflection."""
-        flight = flights[scenario]
+    late = []  # time (s) from the fault to the largest elevator deflection
+    for flight in (flights[name] for name in UNCERTAIN_2):
         assert flight.fault_start is not None
         after = flight.time >= flight.fault_start
-        return float(flight.time[after][np.argmax(flight.command[after, 1])] - flight.fault_start)
-
+        late.append(flight.time[after][np.argmax(flight.command[after, 1])] - flight.fault_start)
     return Outcome(
         figure,
-        _conditions_2() + f" The limits, {LIMITS}, are outside the range of the panels.",
+        f"{_flown(2)} {LIMITS} outside the range of the panels.",
         f"The inputs stay within a reasonable range and are {limited(flights, CASE_2)}. With uncertain and nominal "
-        f"parameters together, the fuel ratio and the elevator range over {input_ranges(flights, ADJUSTABLE)} with tau "
-        f"= 0.8, over {input_ranges(flights, WHOLE)} with tau = 1, and over {input_ranges(flights, BASELINE)} with the "
-        "baseline.",
+        f"parameters together, the fuel ratio and the elevator range over {ranges(flights, ADJUSTABLE)} with tau = "
+        f"0.8, over {ranges(flights, WHOLE)} with tau = 1, and over {ranges(flights, BASELINE)} with the baseline.",
         "With tau = 0.8, the elevator responds later to the fault: its deflection is largest "
-        f"{peak_delay(ADJUSTABLE[0]):.2f} s after the fault, compared with {peak_delay(WHOLE[0]):.2f} s with tau = 1 "
-        f"and {peak_delay(BASELINE[0]):.2f} s with the baseline. The jumps of the fuel ratio at 20 s and 80 s come "
+        f"{late[0]:.2f} s after the fault, compared with {late[1]:.2f} s with tau = 1 and {late[2]:.2f} s with the "
+        "baseline. The jumps of the fuel ratio at 20 s and 80 s come "
         "from the climbing trim: the climb and the acceleration of the reference start and stop within one step.",
     )
