@@ -137,12 +137,12 @@ def test_faults_are_marked_on_the_time_line_and_told_while_they_act(opened):
 
 def test_it_plays_at_the_speed_chosen_and_stops_at_the_end(opened):
     shown(opened, 0.0)
-    opened.run("document.querySelector('[name=speed]').value = '20'; document.querySelector('[name=play]').click()")
-    opened.wait("return own.time > 5")
+    opened.run("document.querySelector('[name=speed]').value = '1'; document.querySelector('[name=play]').click()")
+    opened.wait("return own.time > 1")
     opened.run("document.querySelector('[name=play]').click()")
     paused = opened.run("return own.time")
     assert opened.run("return [own.playing, own.time]") == [False, paused]
-    opened.run("document.querySelector('[name=play]').click()")
+    opened.run("document.querySelector('[name=speed]').value = '20'; document.querySelector('[name=play]').click()")
     opened.wait("return !own.playing")
     assert opened.run("return own.time") == 20.0
     assert opened.console() == []
@@ -177,7 +177,7 @@ def test_on_paper_the_picture_stays_and_the_controls_go(opened):
     shown(opened, 9.0)
     opened.media(media="print")
     assert opened.run("return getComputedStyle(document.getElementById('player')).display") == "none"
-    assert opened.run("return document.querySelector('#vehicle svg').getBoundingClientRect().width") > 100
+    assert opened.run("return document.querySelector('.side-view svg').getBoundingClientRect().width") > 100
     assert opened.run("return document.querySelector('#vehicle .at').textContent") == "9.00 s"
     opened.media(media="")
 

@@ -59,3 +59,10 @@ def test_units_are_switched_and_kept_in_the_address(browser, page):
     browser.driver.get("about:blank")
     browser.driver.get(address)
     assert browser.run(head) == "ft" and browser.console() == []
+
+
+def test_a_long_title_wraps_on_a_phone(browser, page, screen):
+    screen(390)
+    browser.open(page)
+    title = "const cell = document.querySelector('.title'); cell.textContent = 'a long title '.repeat(20);"
+    assert browser.run(f"{title} return cell.getBoundingClientRect().width") < 390
