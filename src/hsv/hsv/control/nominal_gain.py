@@ -1,5 +1,13 @@
 """Nominal gains by the min-max LMI with input bounds (paper eq. 31 to eq. 35), one gain or a nested family.
 
+K = Y Q^-1 minimises gamma, a bound of the cost sum x_n' psi x_n + u_n' sigma u_n from x_n(0) (31), (32), subject to
+
+    [1, x_n(0)'; x_n(0), Q] >= 0,                                                                                  (33)
+    [Q, (A_i Q + B_i Y)', (psi^1/2 Q)', (sigma^1/2 Y)'; ., Q, 0, 0; ., ., gamma I, 0; ., ., ., gamma I] >= 0,      (34)
+    [X, Y; Y', Q] >= 0,   X_jj <= u_nj,max^2                                                                       (35)
+
+with (34) at every vertex i. Of the co-designed model these are (49) to (52).
+
 The problem is Kothare, Balakrishnan and Morari's (Automatica 32, 1996); the look-up over nested ellipsoids is Wan and
 Kothare's (Automatica 39, 2003): the smallest ellipsoid that holds the state names the gain, and because each ellipsoid
 is invariant under its own gain and lies in the one before, the state only ever moves inwards. Their second law takes a
@@ -161,9 +169,7 @@ class NominalGain:
 
 
 def nominal_gain(problem: NominalProblem, state: np.ndarray, outside: np.ndarray | None = None) -> NominalGain:
-    """Return the gain with the smallest worst-case cost from ``state``, verified after solving.
-
-    Paper eq. 32, eq. 33, eq. 34, eq. 35; of the co-designed model eq. 49, eq. 50, eq. 51, eq. 52.
+    """Return the gain with the least worst-case cost from ``state`` (paper eq. 32 to eq. 35), verified after solving.
 
     Args:
         problem: Vertices, weights and input bounds.
