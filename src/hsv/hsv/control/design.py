@@ -471,7 +471,10 @@ def _plan_bounds(values: Mapping[str, Any]) -> PlanBounds | None:
 def _check_stable(name: str, polytope: Polytope, gain: np.ndarray) -> None:
     # The flexible states follow the rigid ones and have poles of their own: all nine must be inside the unit circle.
     for vertex, (a, b) in enumerate(zip(polytope.A, polytope.B, strict=True)):
-        radius = float(np.max(np.abs(np.linalg.eigvals(a + b @ gain))))
+        with np.errstate(over="ignore", invalid="ignore"):
+            closed = a + b @ gain
+        finite = np.all(np.isfinite(closed))
+        radius = float(np.max(np.abs(np.linalg.eigvals(closed)))) if finite else np.inf
         if not radius < 1.0:
             raise DesignError(
                 f"parameter {name}: spectral radius {radius:.6f} of the closed loop at vertex {vertex}, "
