@@ -169,7 +169,9 @@ class NominalGain:
 
 
 def nominal_gain(problem: NominalProblem, state: np.ndarray, outside: np.ndarray | None = None) -> NominalGain:
-    """Return the gain with the least worst-case cost from ``state`` (paper eq. 32 to eq. 35), verified after solving.
+    """Return the gain with the smallest worst-case cost from ``state``, verified after solving.
+
+    Paper eq. 32, eq. 33, eq. 34, eq. 35; of the co-designed model eq. 49, eq. 50, eq. 51, eq. 52.
 
     Args:
         problem: Vertices, weights and input bounds.
