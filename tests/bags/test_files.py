@@ -1,6 +1,5 @@
 import struct
 import tracemalloc
-from collections.abc import Callable
 from pathlib import Path
 
 import lz4.frame
@@ -15,32 +14,32 @@ from hsv.bags.reader import Bag
 from hsv.base.errors import RecordingError
 
 
-def files_of(folder: Path, *names: str) -> tuple[list[str], list[str]]:
+def files_of(folder, *names):
     for name in names:
         (folder / name).touch()
     found, missing = find_files(folder)
     return [path.name for path in found], missing
 
 
-def test_files_of_a_split_bag_are_in_order_and_gaps_named(tmp_path: Path) -> None:
+def test_files_of_a_split_bag_are_in_order_and_gaps_named(tmp_path):
     found = files_of(tmp_path, "run_10.mcap", "run_0.mcap", *(f"run_{n}.mcap" for n in range(2, 10)))
     assert found == (["run_0.mcap", *(f"run_{n}.mcap" for n in range(2, 11))], ["run_1.mcap"])
 
 
-def test_a_number_that_is_a_date_is_no_place_in_a_sequence(tmp_path: Path) -> None:
+def test_a_number_that_is_a_date_is_no_place_in_a_sequence(tmp_path):
     assert files_of(tmp_path, "flight_20261122.mcap") == (["flight_20261122.mcap"], [])
     assert files_of(tmp_path, "flight_20261123.mcap") == (["flight_20261122.mcap", "flight_20261123.mcap"], [])
 
 
-def record(opcode: Opcode, body: bytes) -> bytes:
+def record(opcode, body):
     return struct.pack("<BQ", opcode, len(body)) + body
 
 
-def message(data: bytes) -> bytes:
+def message(data):
     return record(Opcode.MESSAGE, struct.pack("<HIQQ", 1, 0, 0, 0) + data)
 
 
-def in_chunks(packed: Callable[[bytes], bytes], name: bytes, contents: list[bytes]) -> bytes:
+def in_chunks(packed, name, contents):
     chunks = b""
     for content in contents:
         data = packed(content)
@@ -51,9 +50,7 @@ def in_chunks(packed: Callable[[bytes], bytes], name: bytes, contents: list[byte
 
 @pytest.mark.parametrize(("name", "packed"), [("zstd", zstandard.compress), long("lz4", lz4.frame.compress)])
 @pytest.mark.parametrize("inside", ["the file", "a chunk", "many chunks", "many messages"])
-def test_what_unpacks_to_far_more_than_it_is_is_refused(
-    tmp_path: Path, name: str, packed: Callable[[bytes], bytes], inside: str
-) -> None:
+def test_what_unpacks_to_far_more_than_it_is_is_refused(tmp_path, name, packed, inside):
     zeros = bytes(2 * MAX_UNPACKED)
     part = zeros[: MAX_UNPACKED // 4]
     flown = (Path(__file__).parents[2] / "bags" / "reference" / "case1" / "case1_0.mcap").read_bytes()

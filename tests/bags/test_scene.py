@@ -8,10 +8,9 @@ from bag_readers import by_foxglove
 from mcap.reader import make_reader
 from recorded_flight import record_flight
 
-from hsv.bags.scene import OVERVIEW_TOPIC, overview_message, scene_path, write_scene
-from hsv.base.errors import RecordingError
+from hsv.bags.scene import OVERVIEW_TOPIC, write_scene
 from hsv.model.airframe.pose import BODY, LEVEL, Sample, transforms
-from hsv.model.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC, frame_transforms
+from hsv.model.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC
 from hsv.model.airframe.solids import solids
 
 ADDED = {SCENE_TOPIC, TRANSFORMS_TOPIC, OVERVIEW_TOPIC}
@@ -48,35 +47,6 @@ def test_everything_recorded_is_in_it_byte_by_byte(case1_bag, written):
     assert attached == case1_bag.attachments
 
 
-def test_the_vehicle_is_there_once_and_its_frames_all_along(case1_bag, written):
-    [(schema, channel, scene)] = messages(written, SCENE_TOPIC)
-    assert (schema.name, schema.encoding, channel.message_encoding) == ("foxglove.SceneUpdate", "protobuf", "protobuf")
-    assert all(solid.name.encode() in scene.data for solid in solids())
-    moved = messages(written, TRANSFORMS_TOPIC)
-    assert {schema.name for schema, *_ in moved} == {"foxglove.FrameTransforms"}
-    times = np.array([message.log_time for *_, message in moved])
-    first, last = case1_bag.span
-    assert times[0] == scene.log_time == first
-    assert last - times[-1] < 4e7 and set(np.diff(times)) == {40_000_000}
-
-
-def test_frames_are_those_of_the_recorded_state(case1_bag, written):
-    moved = messages(written, TRANSFORMS_TOPIC)
-    state, actuator = (case1_bag.columns(topic) for topic in ("hsv/state", "hsv/actuator"))
-    for *_, message in (moved[0], moved[len(moved) // 2], moved[-1]):
-        row = int(np.flatnonzero(state["header.stamp"] == message.log_time)[0])
-        sample = Sample(
-            float(state["angle_of_attack"][row]),
-            float(state["pitch_angle"][row]),
-            float(state["elastic_coordinate_1"][row]),
-            float(state["elastic_coordinate_2"][row]),
-            float(actuator["fuel_equivalence_ratio"][row]),
-            float(actuator["elevator_deflection"][row]),
-        )
-        assert message.data == frame_transforms(sample, message.log_time).encode()
-        assert all(transform.child.encode() in message.data for transform in transforms(sample))
-
-
 def test_edges_of_the_tube_are_those_about_the_nominal_state(case1_bag, written):
     [state, nominal, status] = (case1_bag.columns(topic) for topic in ("hsv/state", "hsv/nominal", "hsv/tube_status"))
     for row, (*_, message) in enumerate(messages(written, OVERVIEW_TOPIC)):
@@ -99,19 +69,6 @@ def test_faults_are_told_while_they_act(case1_bag, written):
     assert any(active) and not all(active)
     assert [words != "none" for words in told.values()] == active
     assert set(told.values()) == {"none", "elevator_deflection: loss_of_effectiveness"}
-
-
-def test_without_a_tube_there_are_no_edges_and_what_is_not_finite_is_left_out():
-    message = json.loads(overview_message(np.array([1.0, np.nan, 3.0, 4.0, np.inf]), [], [], []))
-    assert message == {"nominal": {"altitude": 1.0, "angle_of_attack": 3.0, "pitch_angle": 4.0}, "faults": "none"}
-
-
-def test_a_file_is_not_written_over(case1_bag, written):
-    before = written.read_bytes()
-    with pytest.raises(RecordingError, match="exists already, expected a new file"):
-        write_scene(case1_bag, written)
-    assert written.read_bytes() == before
-    assert scene_path(case1_bag).parent.parent == case1_bag.folder
 
 
 @pytest.mark.viewer

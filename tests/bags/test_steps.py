@@ -1,17 +1,12 @@
 """Rows of the same step, and what is said of bags that lack steps."""
 
-from __future__ import annotations
-
 import tracemalloc
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hsv.bags.description import INTERFACE_VERSION
 from hsv.bags.reader import Bag
-from hsv.bags.recover import RECOVERED
 from hsv.bags.steps import bag_warnings, expected_stamps, irregularities, joined
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import RecordingError
@@ -22,7 +17,7 @@ PERIOD = 20_000_000
 LACKS = " lacks 1 of 3 steps, the first at t ="
 
 
-def _bag(kit: SimpleNamespace, path: Path, state: list[int], forces: list[int], **custom: str) -> Bag:
+def _bag(kit, path, state, forces, **custom):
     writer = BagWriter(path / "bag", [kit.topic(name, kind) for name, kind in KINDS.items()], custom)
     for topic, steps in ((STATE, state), (FORCES, forces)):
         for step in steps:
@@ -32,7 +27,7 @@ def _bag(kit: SimpleNamespace, path: Path, state: list[int], forces: list[int], 
     return Bag(path / "bag")
 
 
-def test_a_whole_bag_is_joined_as_it_is(kit: SimpleNamespace, tmp_path: Path) -> None:
+def test_a_whole_bag_is_joined_as_it_is(kit, tmp_path):
     bag = _bag(kit, tmp_path, list(range(5)), list(range(5)))
     rows = joined(bag, (STATE, FORCES))
     assert rows[STATE] is bag.columns(STATE) and rows[FORCES] is bag.columns(FORCES)
@@ -50,9 +45,7 @@ def test_a_whole_bag_is_joined_as_it_is(kit: SimpleNamespace, tmp_path: Path) ->
     ],
     ids=["hole", "end", "swapped", "twice", "both"],
 )
-def test_rows_are_joined_by_their_steps(
-    kit: SimpleNamespace, tmp_path: Path, state: list[int], forces: list[int], common: list[int], said: list[str]
-) -> None:
+def test_rows_are_joined_by_their_steps(kit, tmp_path, state, forces, common, said):
     bag = _bag(kit, tmp_path, state, forces)
     rows = joined(bag, (STATE, FORCES))
     for topic in KINDS:
@@ -64,21 +57,13 @@ def test_rows_are_joined_by_their_steps(
     assert irregularities(bag) == said
 
 
-def test_the_end_of_a_bag_that_is_cut_off_may_be_ragged(kit: SimpleNamespace, tmp_path: Path) -> None:
-    assert irregularities(_bag(kit, tmp_path, [0, 1, 2, 3], [0, 1, 2], **RECOVERED)) == []
-    holes = _bag(kit, tmp_path / "more", [0, 1, 2, 3], [0, 2], **RECOVERED)
-    assert irregularities(holes) == [f"{FORCES} lacks 1 of 3 steps, the first at t = 0.02 s"]
-
-
-def test_no_common_step_is_refused(kit: SimpleNamespace, tmp_path: Path) -> None:
+def test_no_common_step_is_refused(kit, tmp_path):
     with pytest.raises(RecordingError, match="holds no complete step"):
         joined(_bag(kit, tmp_path, [0], [1]), (STATE, FORCES))
 
 
 @pytest.mark.parametrize("announced", [{"last_step": 400_000_000}, {"period": -1.0}, {"period": float("nan")}])
-def test_a_bag_that_tells_of_more_steps_than_any_flight_has_is_not_believed(
-    kit: SimpleNamespace, tmp_path: Path, announced: dict[str, float]
-) -> None:
+def test_a_bag_that_tells_of_more_steps_than_any_flight_has_is_not_believed(kit, tmp_path, announced):
     kinds = {STATE: KINDS[STATE], "/hsv/run": "hsv_msgs/msg/Run"}
     writer = BagWriter(tmp_path / "bag", [kit.topic(name, kind) for name, kind in kinds.items()])
     values = {"last_step": 2, "period": 0.02, "interface_version": INTERFACE_VERSION, **announced}

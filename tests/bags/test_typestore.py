@@ -4,11 +4,6 @@ from hsv.bags.typestore import message_types
 from hsv.base.errors import RecordingError
 
 
-def test_types_are_those_of_the_definitions():
-    store = message_types([("a/msg/B", "uint8 ON = 1\nfloat64 x\n")], "bag")
-    assert store.fielddefs["a/msg/B"][0] == [("ON", "uint8", 1)]
-
-
 @pytest.mark.parametrize(
     ("text", "why"),
     [

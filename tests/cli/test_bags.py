@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 from changed_bags import changed_bag
-from flown_bags import flown_bag, parameters
 from marking import long
 from mcap.reader import make_reader
+from recorded_flight import record_flight
 
 from hsv.bags.metadata import FILE_NAME
 from hsv.bags.parameter_sections import ParameterSections
@@ -27,7 +27,7 @@ RESULTS = {
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
-    return flown_bag(tmp_path_factory.mktemp("bags") / "flown")
+    return record_flight(tmp_path_factory.mktemp("bags") / "flown", duration=12.0, fault=6.0).folder
 
 
 @pytest.fixture
@@ -48,11 +48,11 @@ def test_replay_says_one_line_a_process(hsv, bag):
 
 
 def test_replay_names_process_step_and_field(hsv, bag, tmp_path):
-    design, _ = parameters(12.0, 6.0)
-    gain = list(design["feedback.gain"])
+    design = ParameterSections.parse(Bag(bag).text("design.yaml"), "design.yaml")
+    gain = list(design.shared["feedback.gain"])
     gain[9 + 3] *= 1.0 + 1e-6
     file = tmp_path / "under_test.yaml"
-    file.write_text(ParameterSections(design | {"feedback.gain": gain}).to_yaml())
+    file.write_text(design.updated({"feedback.gain": gain}).to_yaml())
     done = hsv("replay", str(bag), "--parameters", str(file))
     assert done.code == 1
     (line,) = [line for line in done.out.splitlines() if "identical" not in line]
@@ -70,7 +70,7 @@ def test_what_a_replay_over_dds_needs_is_looked_for_before_it_starts(hsv, bag):
 def test_diff_names_the_first_difference_and_the_largest_with_units(hsv, bag, tmp_path):
     same = hsv("diff", str(bag), str(bag))
     assert same.code == 0 and same.out == "5409 messages: identical\n" and same.err == ""
-    other = flown_bag(tmp_path / "other", fault=8.0)
+    other = record_flight(tmp_path / "other", duration=12.0, fault=8.0).folder
     done = hsv("diff", str(bag), str(other))
     assert done.code == 1
     assert done.out.startswith("first difference at t = 6.00 s: step 300 /hsv/actuator elevator_deflection")
@@ -95,7 +95,7 @@ def test_info_tells_what_happened(hsv, bag):
     out = hsv("info", str(bag)).out
     assert "loss_of_effectiveness 0.9 of elevator_deflection, from 6 s to the end" in " ".join(out.split())
     assert "saturation   0 steps" in out and "largest level" in out
-    assert "design.yaml (" in out and "scenario     short" in out
+    assert "design.yaml (" in out and "scenario     case1" in out
 
 
 def test_recover_completes_a_truncated_bag(hsv, bag, tmp_path):
@@ -211,8 +211,8 @@ def test_a_topic_of_another_type_or_definition(hsv, bag, tmp_path, words, topic,
 
 def test_definitions_may_have_the_line_ends_of_windows_or_be_empty(hsv, bag, tmp_path):
     def written(topic):
-        if topic.name == "/rosout":
-            return replace(topic, type="std_msgs/msg/Empty", definition="")
+        if topic.name == "/diagnostics":
+            return replace(topic, name="/other", type="std_msgs/msg/Empty", definition="")
         return replace(topic, definition=topic.definition.replace("\n", "\r\n"))
 
     made = changed_bag(bag, tmp_path / "made", written)

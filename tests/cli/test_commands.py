@@ -126,20 +126,14 @@ def test_json_has_no_numbers_that_json_lacks(capsys):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (
-            ("trim", "--altitude", "85000"),
-            "altitude = '85000': the unit is missing, expected a finite quantity such",
-        ),
+        (("trim", "--altitude", "85000"), "altitude = '85000': the unit is missing, expected a finite quantity such"),
         (("trim", "--acceleration", "4 ft/s"), "acceleration = '4 ft/s': wrong unit"),
         (("trim", "--velocity", "nan ft/s"), "velocity = 'nan ft/s': "),
         (
             ("trim", "--acceleration", "100 ft/s^2"),
             "altitude = '85000 ft', velocity = '7702.0808 ft/s', acceleration = '100 ft/s^2': trim needs fuel",
         ),
-        (
-            ("trim", "--climb-rate", "10 km/s"),
-            "altitude = '85000 ft', velocity = '7702.0808 ft/s', climb_rate = '10 k",
-        ),
+        (("trim", "--climb-rate", "10 km/s"), "altitude = '85000 ft', velocity = '7702.0808 ft/s', climb_rate = '10 k"),
         (("trim", "--coupling", "strong"), "coupling = 'strong': expected one of paper_like, derived"),
         (("trim", "--vehicle", "parkr"), "vehicle 'parkr': expected one of parker, "),
         (
@@ -197,11 +191,7 @@ def test_a_word_that_is_nearly_right_is_answered_with_the_right_one(hsv, words, 
         ('"85500 ft"', '"865000 ft"', "initial.altitude = '865000 ft': expected 85000 ft to 86500 ft"),
         ('"200 s"', '"200.01 s"', "duration = 200.01 s: expected a whole number of periods, 0.02 s each"),
         ('"baseline"', '"absent"', "design = 'absent': no such file"),
-        (
-            '"baseline"',
-            '"wrong.yaml"',
-            "wrong.yaml: parameter period = 1: expected double from 0.0001 to 1 s",
-        ),
+        ('"baseline"', '"wrong.yaml"', "wrong.yaml: parameter period = 1: expected double from 0.0001 to 1 s"),
     ],
 )
 def test_a_bad_scenario_or_design_is_refused_before_anything_is_written(hsv, tmp_path, command, old, new, message):

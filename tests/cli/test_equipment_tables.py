@@ -24,17 +24,11 @@ GUST = '[gust]\nstarts = ["5 s", "8 s"]\n'
 WRONG = [
     (FAULT + 'type = "baias"', "sensor_freeze (did you mean 'bias'?)"),
     (FAULT, "fault[0].type: missing"),
-    (
-        FAULT.replace("_deflection", "") + 'type = "bias"\noffset = "1 deg"',
-        "fault[0].channel = 'elevator': expected",
-    ),
+    (FAULT.replace("_deflection", "") + 'type = "bias"\noffset = "1 deg"', "fault[0].channel = 'elevator': expected"),
     (FAULT + 'type = "bias"', "fault[0].offset: missing, expected offset for bias"),
     (FAULT + 'type = "bias"\noffset = "1 m"', "fault[0].offset = '1 m': wrong unit, expected a finite quantity"),
     (FAULT + 'type = "bias"\noffset = { uniform = ["0 deg", "90 deg"] }', "expected all values from -30 to 30 deg"),
-    (
-        FAULT + 'type = "delay"\nsteps = { uniform = [1.5, 4] }',
-        "expected uniform = [least, largest], both whole num",
-    ),
+    (FAULT + 'type = "delay"\nsteps = { uniform = [1.5, 4] }', "expected uniform = [least, largest], both whole num"),
     (FAULT + 'type = "delay"\nsteps = 1.5', "fault[0].steps = 1.5: expected a whole number from 1 to 50"),
     (FAULT + 'type = "stop_limit"\nlower = "10 deg"\nupper = "-10 deg"', "expected at most upper, -10 deg"),
     (FAULT + 'type = "lock_in_place"\nrandom_on = "1 s"', "fault[0].random_off = 0 s: expected above 0 s where random"),
@@ -43,10 +37,7 @@ WRONG = [
     (FAULT + 'type = "reversal"\nintermittent_duty = "25 %"', "no effect, expected an intermittent_period above 0 s"),
     ('[fault]\ntype = "lock_in_place"', "fault = {'type': 'lock_in_place'}: expected a list of tables"),
     (ELEVATOR + 'set = "elevator_500"', "expected one of ideal, elevator_50, elevator_150, elevator_20, "),
-    (
-        ELEVATOR + "order = 1",
-        "actuator.elevator_deflection.natural_frequency: none given, expected one for an order",
-    ),
+    (ELEVATOR + "order = 1", "actuator.elevator_deflection.natural_frequency: none given, expected one for an order"),
     (ELEVATOR + 'set = "elevator_50"\nstop = ["10 deg", "20 deg"]', "elevator_deflection.stop: 2 values, expected one"),
     (
         ELEVATOR + 'order = 1\nnatural_frequency = "50 rad/s"\ndamping_ratio = 0.7',

@@ -27,6 +27,6 @@ def test_control_characters_are_shown_and_not_sent_to_the_terminal(capsys):
     terminal = type(output.console)(file=io.StringIO(), force_terminal=True, highlight=False, width=200)
     terminal.print(title, soft_wrap=True)
     output.report_error(title)
-    for shown in (terminal.file.getvalue(), capsys.readouterr().err):  # type: ignore[attr-defined]
+    for shown in (terminal.file.getvalue(), capsys.readouterr().err):
         assert not set("\x1b\x07\x08\x9b\x7f\r\u202e\u200b\u2028\u2066") & set(shown)
         assert r"\x1b[31mred\x1b]0;title" in shown and r"\x9b2J" in shown

@@ -1,6 +1,5 @@
 """What a command prints for people: metrics in words and groups, one verdict, units, at most 80 columns."""
 
-import math
 import re
 
 import pytest
@@ -8,10 +7,7 @@ from marking import long
 
 from hsv.api import fly
 from hsv.base.units import UnitSystem, duration_in_words, significant
-from hsv.cli.design import HALF_WIDTHS, _steps
-from hsv.cli.output import console, quantity_table
-from hsv.control.checks import load_subject
-from hsv.control.design import find_design
+from hsv.cli.output import console
 from hsv.flight.limits import verdict_sentence, verdicts
 from hsv.flight.metrics import Group
 from hsv.flight.scenario import load_scenario
@@ -65,15 +61,6 @@ def test_groups_come_in_the_order_of_reading_with_degrees_and_percent(hsv):
     assert rows["elevator deflection maximum"][:2] == ["14.6", "deg"]
 
 
-def test_units_of_json_are_strict_si_unless_the_papers_are_asked_for(hsv):
-    default, si, paper = (
-        hsv("trim", *options, "--json").json for options in ((), ("--units", "si"), ("--units", "paper"))
-    )
-    assert default == si
-    assert paper["angle_of_attack_deg"] == pytest.approx(math.degrees(si["angle_of_attack_rad"]))
-    assert "rad" in hsv("trim", "--units", "si").out and "rad" not in hsv("trim").out
-
-
 def test_a_number_has_three_digits_and_all_before_its_point():
     values = (0.0123456, 1.23456, 12.3456, 123.456, 26060.4, 1.23456e7, -99.96, 0.0)
     assert [significant(v) for v in values] == ["0.0123", "1.23", "12.3", "123", "26060", "1.23e+07", "-100", "0"]
@@ -104,17 +91,3 @@ def test_colours_are_for_terminals_and_not_where_they_are_not_wanted(hsv, monkey
     assert "\x1b[32m" in hsv("simulate", "case1").out
     monkeypatch.setattr(console, "no_color", True)
     assert "\x1b[32m" not in hsv("simulate", "case1").out
-
-
-@pytest.mark.parametrize(
-    ("units", "expected"),
-    [("metric", ("12.9", "1.99", "deg/s")), ("si", ("12.9", "0.0347", "rad/s")), ("paper", ("42.5", "1.99", "deg/s"))],
-)
-def test_half_widths_of_a_set_are_in_the_units_asked_for(capsys, units, expected):
-    system = UnitSystem(units)
-    rows = [("as certified", (12.95, 3.67, 0.0347, 0.0335, 0.0614, 0.194, 0.229))]
-    console.print(quantity_table("set", HALF_WIDTHS, rows, system))
-    assert {*expected} <= set(capsys.readouterr().out.split())
-    console.print(_steps(load_subject(find_design("adjustable")).certificate, system))
-    [line] = [line for line in capsys.readouterr().out.splitlines() if "gains, |u_n|" in line]
-    assert line.rstrip().endswith("rad" if units == "si" else "deg")

@@ -1,13 +1,10 @@
 """The commands of pages run as one script, and the scenarios on pages are scenarios."""
 
-from __future__ import annotations
-
 import re
-from pathlib import Path
 
 import pytest
 from node_processes import Processes
-from page_blocks import ROOT, Block, blocks, indented
+from page_blocks import ROOT, blocks, indented
 from ros_domain import own_environment
 
 from hsv.flight.scenario import load_scenario, scenario_at_means, scenario_table, scenario_text
@@ -16,6 +13,7 @@ HERE = {
     "docs/assumptions.md": (),
     "docs/explanation/certificates.md": (),
     "docs/governor.md": (),
+    "docs/hardware.md": (),
     "docs/montecarlo.md": (),
     "docs/python.md": (
         "cp -rL examples/lqr lqr",
@@ -28,6 +26,7 @@ HERE = {
         "cp offline_design/baseline.yaml my.yaml",
         "cp src/hsv/hsv/flight/scenarios/case1.toml my.toml",
     ),
+    "docs/vehicle.md": (),
     "offline_design/README.md": (),
 }
 """Pages whose commands this file runs as one script, with what it needs before."""
@@ -50,12 +49,12 @@ PLAYER = "ros2 run hsv_bringup player BAG --rate 5 --topics /hsv/state /hsv/nomi
 """Command that is not run here, because it waits for nodes; tests/graph/test_player.py runs the player."""
 
 
-def all_blocks(page: str) -> list[Block]:
+def all_blocks(page):
     """Return the blocks of a page but those that are directives of the site."""
     return [block for block in blocks(page) + indented(page) if not block.language.startswith("{")]
 
 
-def is_commands(block: Block) -> bool:
+def is_commands(block):
     """Tell whether a block without a language is one of commands."""
     return (
         block.language in ("", "sh")
@@ -64,7 +63,7 @@ def is_commands(block: Block) -> bool:
 
 
 @pytest.mark.parametrize(("page", "first_line"), sorted(SCENARIOS))
-def test_scenarios_on_pages_are_scenarios(page: str, first_line: str, tmp_path: Path) -> None:
+def test_scenarios_on_pages_are_scenarios(page, first_line, tmp_path):
     [block] = [block for block in all_blocks(page) if block.first_line == first_line]
     path = tmp_path / "printed.toml"
     path.write_text(block.text if "extends" in block.text else f'extends = "case1"\n{block.text}', encoding="utf-8")
@@ -75,12 +74,17 @@ def test_scenarios_on_pages_are_scenarios(page: str, first_line: str, tmp_path: 
 
 @pytest.mark.long
 @pytest.mark.parametrize("page", sorted(HERE))
-def test_commands_of_the_page_run(page: str, tmp_path: Path) -> None:
+def test_commands_of_the_page_run(page, tmp_path):
     for name in ("offline_design", "src", "examples", "tools"):
         (tmp_path / name).symlink_to(ROOT / name)
+    for block in all_blocks(page):
+        if block.file:
+            (tmp_path / block.file).write_text(block.text, encoding="utf-8")
     script = [*HERE[page]]
     script += [block.text for block in all_blocks(page) if is_commands(block) and block.first_line != PLAYER]
     text = "\n".join(script)
+    if page == "docs/hardware.md":  # a fault needs a flight, and a certificate takes minutes
+        text = re.sub(r"^hsv (fault|certify) .*", "", text, flags=re.MULTILINE)
     for more, fewer in FEWER.items():
         text = text.replace(more, fewer)
     for command in NEGATIVE:

@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +12,7 @@ import page_blocks
 import pytest
 from marking import long
 
-from hsv.model.faults.table import FAULT_KINDS, read_fault
+from hsv.model.faults.table import FAULT_KINDS
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = ["python.md", long("vehicle.md"), "hardware.md"]
@@ -83,43 +82,9 @@ def test_numbers_of_the_page_on_the_notch_filter_hold():
         exec(compile(block, "notch.md", "exec"), {})
 
 
-@pytest.mark.long
-def test_commands_of_the_page_take_a_vehicle_from_its_file_to_a_certified_flight(tmp_path):
-    write_files("vehicle.md", tmp_path)
-    (tmp_path / "offline_design").symlink_to(DOCS.parent / "offline_design")
-    commands = re.findall(r"^    (hsv .*)$", (DOCS / "vehicle.md").read_text(encoding="utf-8"), re.MULTILINE)
-    assert {"hsv design mine_design.toml", "hsv verify mine_design.yaml", "hsv simulate flight.toml"} <= {*commands}
-    for command in commands:
-        ran = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True)
-        assert ran.returncode == 0, f"{command}: {ran.stderr}"
-
-
 def test_the_page_on_hardware_has_every_type_of_fault_in_the_order_in_which_they_act():
     rows = re.findall(
         r"^\| (\w+) \| (\w+(?:, \w+)*) \|$", (DOCS / "hardware.md").read_text(encoding="utf-8"), re.MULTILINE
     )
     listed = [(side, kind) for side, kinds in rows for kind in kinds.split(", ")]
     assert listed == [(kind.side, name) for name, kind in FAULT_KINDS.items()]
-
-
-def test_faults_that_the_page_on_hardware_injects_are_faults():
-    commands = re.findall(
-        r"^    hsv fault inject (.*)$", (DOCS / "hardware.md").read_text(encoding="utf-8"), re.MULTILINE
-    )
-    injected = [shlex.split(command.partition(" --duration")[0]) for command in commands]
-    assert [str(read_fault(channel, kind, parameters)) for channel, kind, *parameters in injected] == [
-        "oscillation amplitude 0.5 deg, frequency 2 Hz of elevator_deflection",
-        "loss_of_effectiveness 0.8 of elevator_deflection",
-    ]
-
-
-@pytest.mark.long
-def test_commands_of_the_page_on_hardware_run(tmp_path):
-    write_files("hardware.md", tmp_path)
-    # Those of hsv certify take minutes each, and end with 1 where they say "not certified".
-    page = (DOCS / "hardware.md").read_text(encoding="utf-8")
-    commands = re.findall(r"^    (hsv (?!fault |certify ).*)$", page, re.MULTILINE)
-    assert [command.split()[1] for command in commands] == ["list", "list", *["montecarlo"] * 3]
-    for command in commands:
-        ran = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True)
-        assert ran.returncode == 0, f"{command}: {ran.stderr}"

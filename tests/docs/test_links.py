@@ -4,18 +4,11 @@ import re
 import subprocess
 from pathlib import Path
 
+import page_blocks
 import pytest
 
-ROOT = Path(__file__).parents[2]
-PAGES = sorted(
-    ROOT / name
-    for name in subprocess.run(
-        ["git", "-C", str(ROOT), "ls-files", "--cached", "--others", "--exclude-standard", "*.md"],
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout.split()
-)
+ROOT = page_blocks.ROOT
+PAGES = [ROOT / page for page in page_blocks.PAGES]
 LINK = re.compile(r"!?\[(?:[^\[\]]|\[[^\]]*\])*\]\(([^()\s]+)\)")
 
 
@@ -60,7 +53,7 @@ def test_every_page_of_the_documentation_is_in_a_table_of_contents():
     assert listed >= {str(page.relative_to(ROOT / "docs")) for page in PAGES if page.is_relative_to(ROOT / "docs")}
 
 
-def test_what_the_commands_of_the_readme_write_is_ignored_by_git() -> None:
+def test_what_the_commands_of_the_readme_write_is_ignored_by_git():
     written = re.findall(r"--(?:bag|out) ((?!docs/)\w+/[^\s`]+)", (ROOT / "README.md").read_text(encoding="utf-8"))
     written += ["bags/case1_20260101T000000Z", "campaigns/case1.parquet", "tutorial/first", "resilience/report.html"]
     names = [path if Path(path).suffix else f"{path}/" for path in written]

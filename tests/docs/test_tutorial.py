@@ -1,10 +1,7 @@
 """The tutorial's pages, typed from top to bottom as a newcomer does: what they print, save and draw."""
 
-from __future__ import annotations
-
 import doctest
 import re
-from pathlib import Path
 
 import pytest
 from node_processes import Processes
@@ -28,12 +25,12 @@ OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 MARK = "=== block "
 
 
-def test_every_page_of_the_tutorial_is_typed() -> None:
+def test_every_page_of_the_tutorial_is_typed():
     assert {page.stem for page in (ROOT / "docs" / "tutorial").glob("*.md")} == {*PAGES}
 
 
 @pytest.mark.parametrize("page", [pytest.param(page, marks=marks) for page, marks in PAGES.items()])
-def test_the_page_does_what_it_says(page: str, tmp_path: Path, pictures: Path) -> None:
+def test_the_page_does_what_it_says(page, tmp_path, pictures):
     for name in READ:
         (tmp_path / name).symlink_to(ROOT / name)
     steps = blocks(f"docs/tutorial/{page}.md")

@@ -52,16 +52,6 @@ def counts(text):
     return [int(number) for line in lines for number in re.findall(r"[1-9]\d*", line)]
 
 
-@pytest.mark.long
-@pytest.mark.skipif(bool(MISSING), reason=f"no {' and no '.join(MISSING)}")
-def test_the_firmware_is_that_of_the_design_asked_for_last(checkout):
-    made = []
-    for design in ("baseline", "smooth", "baseline"):
-        subprocess.run(["make", "-s", "-C", EXAMPLE, f"DESIGN={design}"], cwd=checkout, check=True)
-        made.append((checkout / EXAMPLE / "build" / "firmware.elf").read_bytes())
-    assert made[0] == made[2] != made[1]
-
-
 def test_without_cross_compiler_or_emulator_there_is_one_line(checkout):
     ran = subprocess.run(
         ["make", "-s", "-C", EXAMPLE, "CC_ARM=no-such-gcc"], cwd=checkout, capture_output=True, text=True, check=False

@@ -12,13 +12,13 @@ from zlib import crc32
 import hypothesis
 import pyarrow.parquet as pq
 import pytest
-from flown_bags import flown_bag, write_bag
+from changed_bags import changed_bag
 from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from mutations import Mutated, flipped, mutated
 from node_processes import short_scenario
+from recorded_flight import record_flight
 
-from hsv.bags.description import TOPICS
 from hsv.bags.info import describe
 from hsv.bags.reader import Bag
 from hsv.bags.recover import recover
@@ -73,15 +73,13 @@ def fuzz(request: pytest.FixtureRequest) -> Fuzz:
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return flown_bag(tmp_path_factory.mktemp("flown") / "bag", duration=0.2, fault=0.1)
+    return record_flight(tmp_path_factory.mktemp("flown") / "bag", duration=0.2, fault=0.1).folder
 
 
 @pytest.fixture(scope="module")
 def small_bag(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the same without the parameters, which take most of its space."""
-    flown = Bag(bag)
-    tracks = {role: flown.track(role) for role in TOPICS if role in flown.roles}
-    return write_bag(tmp_path_factory.mktemp("small") / "bag", tracks, {}, {})
+    return changed_bag(bag, tmp_path_factory.mktemp("small") / "bag", attachments=None)
 
 
 @pytest.fixture(scope="module")

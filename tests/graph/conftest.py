@@ -1,10 +1,5 @@
 """Graphs of real node processes, each on a ROS domain of its own and on this machine only."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 from node_processes import Processes
 from ros_domain import own_environment
@@ -12,14 +7,14 @@ from short_campaigns import planned, results, short  # noqa: F401 (fixtures)
 
 
 @pytest.fixture
-def ros_environment() -> Iterator[dict[str, str]]:
+def ros_environment():
     """Return the environment of processes on a domain that nobody else uses."""
     with own_environment() as environment:
         yield environment
 
 
 @pytest.fixture(scope="module")
-def shared_processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
+def shared_processes(tmp_path_factory):
     """Start processes for all tests of a module, in one folder, on a domain of their own."""
     with own_environment() as environment:
         started = Processes(environment, tmp_path_factory.mktemp("graph"))
@@ -28,7 +23,7 @@ def shared_processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Proce
 
 
 @pytest.fixture
-def processes(ros_environment: dict[str, str], tmp_path: Path) -> Iterator[Processes]:
+def processes(ros_environment, tmp_path):
     """Start processes in a temporary folder, on a domain of their own."""
     started = Processes(ros_environment, tmp_path)
     yield started

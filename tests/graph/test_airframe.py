@@ -1,13 +1,10 @@
 """The vehicle drawn beside a running graph: markers where the state says, and a flight that knows nothing of it."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
-from node_processes import Processes, short_scenario
+from node_processes import short_scenario
 from waiting import wait_until
 
 from hsv.bags.flight import flight_fingerprint
@@ -23,14 +20,14 @@ pytestmark = pytest.mark.graph
 SEGMENTS = [solid.name for solid in solids() if "body" in solid.name]
 
 
-def messages(path: Path) -> list[dict[str, str]]:
+def messages(path):
     """Return what the command has printed, without what it says while it waits and a line that is not whole."""
     lines = path.read_text().splitlines(keepends=True)
     return [json.loads(line) for line in lines if line.startswith("{") and line.endswith("\n")]
 
 
 @pytest.mark.long
-def test_markers_follow_the_state_of_a_flight_that_is_not_changed(processes: Processes) -> None:
+def test_markers_follow_the_state_of_a_flight_that_is_not_changed(processes):
     scenario = short_scenario(processes.folder, duration=4, fault=1)
     node = processes.start("ros2", "run", "hsv_bringup", "airframe", "--ros-args", "-p", "rate:=5.0")
     received = processes.folder / "markers"

@@ -1,7 +1,5 @@
 """What the documentation says of the graph is what the graph is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from hsv.bags.description import RECORDER, TOPICS, graph
@@ -10,12 +8,12 @@ from hsv.graph.reference import reference
 ROOT = Path(__file__).parents[2]
 
 
-def test_parameter_page_is_up_to_date() -> None:
+def test_parameter_page_is_up_to_date():
     page = (ROOT / "docs" / "parameters.md").read_text(encoding="utf-8")
     assert page == reference(), "run: python -m hsv.graph.reference > docs/parameters.md"
 
 
-def test_page_names_every_topic_with_its_type_and_ends() -> None:
+def test_page_names_every_topic_with_its_type_and_ends():
     page = (ROOT / "docs" / "graph.md").read_text(encoding="utf-8").partition("| topic | type | from | to |")[2]
     rows = page.lstrip("\n").split("\n\n")[0].splitlines()[1:]
     assert len(rows) == len(TOPICS)

@@ -1,7 +1,5 @@
 """What can be said of the launch file without launch; with it: test_full_installation.py."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import sys
@@ -15,13 +13,13 @@ INSTALLED = {"launch", "launch_ros", "ament_index_python"}
 """What every ROS 2 installation has that can launch a file."""
 
 
-def arguments() -> set[str]:
+def arguments():
     """Return the names of the launch arguments."""
     [table] = [node.value for node in TREE.body if isinstance(node, ast.Assign) and node.targets[0].id == "ARGUMENTS"]
     return set(ast.literal_eval(table))
 
 
-def test_it_imports_nothing_that_an_installation_without_the_bench_lacks() -> None:
+def test_it_imports_nothing_that_an_installation_without_the_bench_lacks():
     imported = set()
     for node in ast.walk(TREE):
         if isinstance(node, ast.Import):
@@ -33,7 +31,7 @@ def test_it_imports_nothing_that_an_installation_without_the_bench_lacks() -> No
     assert imported - INSTALLED <= sys.stdlib_module_names
 
 
-def test_it_has_an_argument_for_every_option_of_hsv_run() -> None:
+def test_it_has_an_argument_for_every_option_of_hsv_run():
     of_the_terminal = {"every", "json", "strict", "verbose"}
     options = set(inspect.signature(run).parameters) - of_the_terminal
     assert arguments() >= options

@@ -1,29 +1,28 @@
 """What the launcher refuses before it starts anything."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
 
 import pytest
 
-from hsv.bags.description import COMPOSED, ROOT, TUBE_MPC, NodeDescription
+from hsv.bags.description import COMPOSED, ROOT, TUBE_MPC
 from hsv.base.errors import ParameterError, RunError
 from hsv.graph.exclusive import claim
 from hsv.graph.launcher import Launcher
+from hsv.graph.snapshot import Snapshot
 
 # A number that no graph can have and no other test run takes: only its name is held.
 DOMAIN = 10**9 + os.getpid()
 
 
-def launcher(namespace: str = ROOT, *nodes: NodeDescription) -> Launcher:
+def launcher(namespace=ROOT, *nodes):
     """Return a launcher that has nothing to start, or is refused before it starts it."""
     return Launcher(nodes, [], lambda step: None, lambda node, text: None, namespace=namespace)
 
 
 @pytest.fixture
-def domain(monkeypatch: pytest.MonkeyPatch) -> None:
+def domain(monkeypatch):
     """Make this process believe that it is in :data:`DOMAIN`."""
     monkeypatch.setattr("hsv.graph.exclusive.LAST_DOMAIN", DOMAIN)
     monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
@@ -31,7 +30,7 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("domain")
 @pytest.mark.parametrize("namespace", [ROOT, "/veh1", "/a" * 90])
-def test_domain_and_namespace_belong_to_one_run(namespace: str) -> None:
+def test_domain_and_namespace_belong_to_one_run(namespace):
     with launcher(namespace):
         with pytest.raises(RunError, match=f"another run has ROS_DOMAIN_ID={DOMAIN}"), launcher(namespace):
             pass
@@ -41,7 +40,7 @@ def test_domain_and_namespace_belong_to_one_run(namespace: str) -> None:
 
 @pytest.mark.usefixtures("domain")
 @pytest.mark.parametrize("node", [TUBE_MPC, COMPOSED], ids=lambda node: node.name)
-def test_a_node_that_runs_by_hand_is_named(node: NodeDescription) -> None:
+def test_a_node_that_runs_by_hand_is_named(node):
     held = claim("topic", DOMAIN, "/veh1/hsv/command")
     assert held is not None and claim("topic", DOMAIN, "/veh1/hsv/command") is None
     refused = "publishes /veh1/hsv/command already: expected no other tube_mpc there"
@@ -53,22 +52,31 @@ def test_a_node_that_runs_by_hand_is_named(node: NodeDescription) -> None:
 
 
 @pytest.mark.parametrize("text", ["seven", "-1", "300", "025", "1.0"])
-def test_a_domain_is_a_decimal_number_that_dds_has(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+def test_a_domain_is_a_decimal_number_that_dds_has(monkeypatch, text):
     monkeypatch.setenv("ROS_DOMAIN_ID", text)
     with pytest.raises(ParameterError, match=f"ROS_DOMAIN_ID='{text}': expected a whole number from 0 to"), launcher():
         pass
 
 
-def test_discovery_must_be_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_discovery_must_be_on(monkeypatch):
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     with pytest.raises(ParameterError, match="ROS_AUTOMATIC_DISCOVERY_RANGE='OFF': expected LOCALHOST"), launcher():
         pass
 
 
-def test_a_network_is_needed() -> None:
+def test_a_network_is_needed():
     isolated = ("unshare", "--map-root-user", "--net")
     if subprocess.run([*isolated, "true"], check=False).returncode:
         pytest.skip("this machine permits no network of its own")
     words = [sys.executable, "-c", "from hsv.graph.exclusive import ros_domain; ros_domain()"]
     done = subprocess.run([*isolated, *words], capture_output=True, text=True, check=False)
     assert "ParameterError: network interface lo: down, expected up" in done.stderr
+
+
+def test_a_line_about_the_flight_is_read_as_it_was_written_and_no_other_is_taken_for_one():
+    for told in (
+        Snapshot(120.5, 26200.0, -1.2, 0.06, ("elevator_deflection bias",)),
+        Snapshot(0.0, 1.0, 2.0, None, ()),
+    ):
+        assert Snapshot.read(told.line) == told
+    assert Snapshot.read("step 50 of 10000") is Snapshot.read("[INFO] recording to bags/x") is Snapshot.read("") is None

@@ -1,17 +1,17 @@
 """A flight that is watched: with viewers of every kind it is the same flight, and what they ask of it is recorded."""
 
+import json
 import os
 import re
 import signal
 import socket
 import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
 from live_clients import FoxgloveClient, PageClient, addresses, assert_as_recorded, assert_without_gap
-from node_processes import Processes, children, recorded_steps, short_scenario
-from waiting import output_of, wait_until
+from node_processes import children, fly_until, short_scenario
+from waiting import exit_code_of, output_of, wait_until
 
 from hsv.bags.flight import flight_fingerprint
 from hsv.bags.reader import Bag
@@ -28,7 +28,7 @@ LIVE = ("--live", "--live-port", "0", "--no-report")
 class Watched:
     """A live flight, and what it has printed."""
 
-    def __init__(self, processes: Processes, *words: str | Path) -> None:
+    def __init__(self, processes, *words):
         self.log = processes.folder / "live.txt"
         with self.log.open("w") as output:
             self.popen = processes.start("hsv", "run", *words, *LIVE, output=output)
@@ -36,17 +36,17 @@ class Watched:
         self.page, self.port = addresses(self.text)
 
     @property
-    def text(self) -> str:
+    def text(self):
         return self.log.read_text()
 
-    def land(self) -> None:
+    def land(self):
         """Wait for the end, which must be a good one."""
         wait_until(lambda: self.popen.poll() is not None, [self.popen.pid])
         assert self.popen.returncode == 0, self.text
 
 
 @pytest.mark.long
-def test_five_viewers_one_of_whom_never_reads_change_no_bit(processes: Processes, tmp_path: Path) -> None:
+def test_five_viewers_one_of_whom_never_reads_change_no_bit(processes, tmp_path):
     scenario = short_scenario(tmp_path, duration=20)
     watched = Watched(processes, scenario, "--bag", tmp_path / "bag", "--real-time-factor", "10")
     readers = [FoxgloveClient(watched.port) for _ in range(2)]
@@ -75,7 +75,7 @@ def test_five_viewers_one_of_whom_never_reads_change_no_bit(processes: Processes
     assert late.status["limits"]["fuel_equivalence_ratio"] == [0.0, 1.5]
 
 
-def test_what_the_page_asks_is_acknowledged_and_recorded(processes: Processes, tmp_path: Path) -> None:
+def test_what_the_page_asks_is_acknowledged_and_recorded(processes, tmp_path):
     scenario = short_scenario(tmp_path, duration=3600, fault=3000)
     watched = Watched(processes, scenario, "--bag", tmp_path / "bag", "--real-time-factor", "2")
     page = PageClient(watched.page)
@@ -91,7 +91,6 @@ def test_what_the_page_asks_is_acknowledged_and_recorded(processes: Processes, t
     paused = page.ask("pause", paused="true")
     # Nothing is flown any more from the acknowledged step on.
     assert paused["message"].startswith(f"paused = true from step {paused['step']} on")
-    wait_until(lambda: recorded_steps(tmp_path / "bag") >= paused["step"] - 50, [watched.popen.pid])
     while not page.status["settings"].get("paused"):
         assert page.read()
     resumed = page.ask("pause", paused="false")
@@ -103,11 +102,7 @@ def test_what_the_page_asks_is_acknowledged_and_recorded(processes: Processes, t
     while f"{fault} has ended" not in [event["words"] for event in page.status["events"]]:
         assert page.read()
     assert (f"{fault} begins", injected["step"]) in [(e["words"], e["step"]) for e in page.status["events"]]
-    wait_until(
-        lambda: recorded_steps(tmp_path / "bag") > cleared["step"] + 50,
-        [watched.popen.pid],
-        lambda: recorded_steps(tmp_path / "bag"),
-    )
+    fly_until(watched.popen, tmp_path / "bag", cleared["step"] + 50)
     watched.popen.send_signal(signal.SIGINT)
     wait_until(lambda: watched.popen.poll() is not None, [watched.popen.pid])
     active = [message.step for _, message in Bag(tmp_path / "bag").decode("/hsv/actuator") if message.active]
@@ -115,7 +110,7 @@ def test_what_the_page_asks_is_acknowledged_and_recorded(processes: Processes, t
 
 
 @pytest.mark.long
-def test_at_real_time_pace_nothing_is_missed(processes: Processes, tmp_path: Path) -> None:
+def test_at_real_time_pace_nothing_is_missed(processes, tmp_path):
     watched = Watched(processes, short_scenario(tmp_path, duration=20), "--bag", tmp_path / "bag")
     client = FoxgloveClient(watched.port)
     watched.land()
@@ -126,7 +121,7 @@ def test_at_real_time_pace_nothing_is_missed(processes: Processes, tmp_path: Pat
 
 @pytest.mark.long
 @pytest.mark.parametrize("composed", [(), ("--composed",)], ids=["separate", "composed"])
-def test_at_full_speed_a_stopped_live_node_holds_nobody_up(processes: Processes, tmp_path: Path, composed) -> None:
+def test_at_full_speed_a_stopped_live_node_holds_nobody_up(processes, tmp_path, composed):
     scenario = short_scenario(tmp_path, duration=120)
     words = [scenario, "--bag", tmp_path / "bag", "--real-time-factor", "0", *composed]
     watched = Watched(processes, *words)
@@ -139,7 +134,7 @@ def test_at_full_speed_a_stopped_live_node_holds_nobody_up(processes: Processes,
     assert 0 < len(client.messages["/hsv/state"]) < len(bag.times("/hsv/state"))
 
 
-def test_a_port_in_use_ends_it_before_anything_has_begun(processes: Processes, tmp_path: Path) -> None:
+def test_a_port_in_use_ends_it_before_anything_has_begun(processes, tmp_path):
     with socket.socket() as held:
         held.bind(("127.0.0.1", 0))
         held.listen()
@@ -152,7 +147,7 @@ def test_a_port_in_use_ends_it_before_anything_has_begun(processes: Processes, t
 
 
 @pytest.mark.long
-def test_a_live_node_that_is_killed_takes_no_flight_with_it(processes: Processes, tmp_path: Path) -> None:
+def test_a_live_node_that_is_killed_takes_no_flight_with_it(processes, tmp_path):
     watched = Watched(processes, short_scenario(tmp_path), "--bag", tmp_path / "bag")
     os.kill(children(watched.popen.pid)["live"], signal.SIGKILL)
     watched.land()
@@ -161,23 +156,21 @@ def test_a_live_node_that_is_killed_takes_no_flight_with_it(processes: Processes
 
 
 @pytest.mark.long
-def test_beside_a_running_graph_it_shows_what_is_left_of_the_flight(processes: Processes, tmp_path: Path) -> None:
-    words = ["--bag", tmp_path / "bag", "--real-time-factor", "2", "--no-report"]
-    flight = processes.start("hsv", "run", short_scenario(tmp_path, duration=3600), *words)
-    wait_until(lambda: recorded_steps(tmp_path / "bag") > 50, [flight.pid], lambda: recorded_steps(tmp_path / "bag"))
-    log = tmp_path / "live.txt"
-    with log.open("w") as output:
-        live = processes.start(
-            "ros2", "run", "hsv_bringup", "live", "--ros-args", "-p", "live.port:=0", "-p", "live.page_port:=0",
-            output=output,
-        )  # fmt: skip
-    wait_until(lambda: "live data" in log.read_text() or live.poll() is not None, [live.pid])
-    page = PageClient(addresses(log.read_text())[0])
-    while len(page.data) < 5_000:
-        assert page.read()
-    assert page.times(len(LIVE_CURVES))[0] > 0.5
-    assert page.status["settings"]["real_time_factor"] == 2.0
-    flight.send_signal(signal.SIGINT)
-    while page.status["ending"] is None:
-        assert page.read()
-    assert page.status["ending"]["how"] == "broken off"
+def test_a_flight_is_watched_to_its_end_and_its_bits_are_the_same(processes, tmp_path):
+    scenario, bag, said = short_scenario(tmp_path, duration=16, fault=1), tmp_path / "bag", tmp_path / "watched"
+    words = ("--real-time-factor", "0.02", "--no-report", "--bag", bag, "--composed")
+    flying = processes.start("hsv", "run", scenario, *words)
+    fly_until(flying, bag, 1)
+    with said.open("w") as output:
+        watching = processes.start("hsv", "watch", "--json", output=output)
+    # The flight takes its time until somebody sees it, however long that one starts.
+    wait_until(lambda: "{" in said.read_text(), [watching.pid])
+    assert processes.run("hsv", "set", "real_time_factor", "2").returncode == 0
+    assert exit_code_of(watching) == 0 == exit_code_of(flying), said.read_text()
+    rows = [json.loads(line) for line in said.read_text().splitlines() if line.startswith("{")]
+    times = [row["time"] for row in rows]
+    assert len(rows) > 2 and times == sorted(set(times)) and times[-1] <= 16.0
+    last = rows[-1]
+    assert last["faults"] == ["elevator_deflection loss_of_effectiveness"]
+    assert 0.0 <= last["tube_level"] <= 1.0 and 26000.0 < last["altitude"] < 26400.0 and last["velocity_error"] < 0.0
+    assert flight_fingerprint(Bag(bag)) == fly(assemble_flight(load_scenario(str(scenario)))).fingerprint

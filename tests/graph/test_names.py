@@ -1,22 +1,17 @@
 """Graphs that are moved and remapped, duplicates of their nodes, and their parameters dumped and loaded again."""
 
-from __future__ import annotations
-
 import json
 import re
-import subprocess
 import sys
-from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
 import parameter_dump
 import pytest
-from injected_fault import FUEL, last_line
-from node_processes import Processes, recorded_steps, short_scenario
+from node_processes import last_line, recorded_steps, short_scenario
 from waiting import output_of, wait_until
 
-from hsv.bags.description import FAULT_INJECTOR, NOTCH_FILTER, PLANT, RECORDER, TUBE_MPC, NodeDescription, graph
+from hsv.bags.description import FAULT_INJECTOR, NOTCH_FILTER, PLANT, RECORDER, TUBE_MPC, graph
 from hsv.bags.flight import flight_fingerprint, state_columns
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import complete_steps
@@ -27,6 +22,8 @@ from hsv.graph.launcher import parameter_arguments
 from hsv.graph.preparation import RunOptions, prepare
 
 pytestmark = pytest.mark.graph
+
+FUEL = "fuel_equivalence_ratio"
 
 DURATION = 11.0
 """Seconds; a replay wants ten in which the controller does something."""
@@ -46,9 +43,7 @@ REMAPPED = [
 """Of all topics and services some: given to every node, as they are only remapped where they are used."""
 
 
-def by_hand(
-    processes: Processes, nodes: Sequence[NodeDescription], arguments: Mapping[str, Sequence[str]]
-) -> dict[str, subprocess.Popen[str]]:
+def by_hand(processes, nodes, arguments):
     """Start nodes one by one, with the arguments of each under its name."""
     return {
         node.name: processes.start("ros2", "run", node.package, node.executable, "--ros-args", *arguments[node.name])
@@ -57,7 +52,7 @@ def by_hand(
 
 
 @pytest.mark.long
-def test_two_graphs_in_one_domain(processes: Processes) -> None:
+def test_two_graphs_in_one_domain(processes):
     scenario = short_scenario(processes.folder, DURATION, 3)
     words = ("hsv", "run", scenario, "--no-report", "--json", "--bag")
     first = processes.start(*words, processes.folder / "first", "--namespace", "/lab/veh1")
@@ -77,7 +72,7 @@ def test_two_graphs_in_one_domain(processes: Processes) -> None:
 
 
 @pytest.mark.long
-def test_remapped_by_hand_with_duplicates_and_parameters_dumped(processes: Processes) -> None:
+def test_remapped_by_hand_with_duplicates_and_parameters_dumped(processes):
     folder = processes.folder
     alone = processes.start("ros2", "run", "hsv_ctrl", "notch_filter", "--ros-args", "-r", "__ns:=/alone")
     # Nothing that is done to this flight comes too late; it is interrupted.
@@ -112,7 +107,7 @@ def test_remapped_by_hand_with_duplicates_and_parameters_dumped(processes: Proce
     _fly_dumped(processes)
 
 
-def _ask(processes: Processes) -> None:
+def _ask(processes):
     """Find the nodes by their roles; what is changed is as it was before."""
     injected = processes.run("hsv", "fault", "inject", FUEL, "loss_of_effectiveness", "1")
     assert injected.returncode == 0 and f"1 of {FUEL} from step " in last_line(injected), injected.stdout
@@ -123,7 +118,7 @@ def _ask(processes: Processes) -> None:
     assert FUEL in [fault["channel"] for fault in json.loads(last_line(listed))["active"]]
 
 
-def _refuse_duplicates(processes: Processes, files: Sequence[str]) -> None:
+def _refuse_duplicates(processes, files):
     """Start everything a second time beside the flight; each ends by itself with one line."""
     second = [
         processes.start("ros2", "run", node.package, node.executable, "--ros-args", *files, *REMAPPED, *words)
@@ -145,7 +140,7 @@ def _refuse_duplicates(processes: Processes, files: Sequence[str]) -> None:
     assert not (processes.folder / "other").exists()
 
 
-def _fly_dumped(processes: Processes) -> None:
+def _fly_dumped(processes):
     """Fly with the dumped parameters, and simulated time for all who do not make it, which changes no bit."""
     folder = processes.folder
     arguments = {

@@ -1,20 +1,16 @@
 """Custom controllers over DDS: a class, a function in C, and a node that knows only the messages."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from injected_fault import last_line
 from marking import long
-from node_processes import Processes, fly_until, short_scenario
+from node_processes import Processes, fly_until, last_line, short_scenario
 from ros_domain import own_environment
 from waiting import exit_code_of, output_of, wait_until
 
@@ -33,7 +29,7 @@ SHORT = 'extends = "{example}"\nfault = []\nduration = "{duration} s"\n{more}\n'
 
 
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+def installed(tmp_path_factory):
     """Build the example's node as a workspace of its own; return what an environment needs to find all examples."""
     folder = tmp_path_factory.mktemp("workspace")
     shutil.copytree(EXAMPLES / "node", folder / "src", ignore=shutil.ignore_patterns("build", "install", "log"))
@@ -50,21 +46,21 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 @pytest.fixture
-def processes(installed: dict[str, str], tmp_path: Path) -> Iterator[Processes]:
+def processes(installed, tmp_path):
     with own_environment() as environment:
         started = Processes(environment | installed, tmp_path)
         yield started
         started.stop()
 
 
-def scenario(folder: Path, example: str, more: str = "", duration: float = 11.0) -> Path:
+def scenario(folder, example, more="", duration=11.0):
     """Write a shortened scenario of an example."""
     path = folder / f"{example}.toml"
     path.write_text(SHORT.format(example=EXAMPLES / SCENARIOS[example], more=more, duration=duration))
     return path
 
 
-def flown(processes: Processes, path: Path, name: str, *words: str) -> Bag:
+def flown(processes, path, name, *words):
     # On a busy machine a node may be silent for longer than a person would wait.
     command = ("hsv", "run", path, "--no-report", "--step-timeout", "30", "--bag", processes.folder / name)
     done = processes.run(*command, *words)
@@ -74,7 +70,7 @@ def flown(processes: Processes, path: Path, name: str, *words: str) -> Bag:
 
 @pytest.mark.long
 @pytest.mark.parametrize("place", ["hsv_lqr:Lqr", "lqr_in_c:LqrInC"])
-def test_a_class_and_a_function_in_c_fly_as_in_process(processes: Processes, place: str) -> None:
+def test_a_class_and_a_function_in_c_fly_as_in_process(processes, place):
     path = scenario(processes.folder, "lqr", f'controller = "{place}"')
     simulated = processes.run("hsv", "simulate", path)
     assert simulated.returncode == 0, simulated.stdout
@@ -89,7 +85,7 @@ def test_a_class_and_a_function_in_c_fly_as_in_process(processes: Processes, pla
 
 
 @pytest.mark.long
-def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes: Processes) -> None:
+def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes):
     path = scenario(processes.folder, "node")
     bags = [flown(processes, path, "started")]
     # Late: all others wait for it.
@@ -115,7 +111,7 @@ def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes: P
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("pace", ["1", "0"], ids=["real time", "full speed"])
 @pytest.mark.parametrize("controller", ["tube_mpc", "node:hsv_example_node/regulator"])
-def test_commands_in_flight_beside_four_busy_processes(processes: Processes, controller: str, pace: str) -> None:
+def test_commands_in_flight_beside_four_busy_processes(processes, controller, pace):
     busy = [processes.start(sys.executable, "-c", "while True: pass") for _ in range(4)]
     path = short_scenario(processes.folder, duration=3600, fault=6)
     path.write_text(f'controller = "{controller}"\n{path.read_text()}')
@@ -148,7 +144,7 @@ def test_commands_in_flight_beside_four_busy_processes(processes: Processes, con
         ("nan", f"/regulator, step {WRONG_STEP}: elevator_deflection = nan, expected a finite number"),
     ],
 )
-def test_a_node_that_goes_wrong_is_named_and_the_bag_is_whole(processes: Processes, how: str, words: str) -> None:
+def test_a_node_that_goes_wrong_is_named_and_the_bag_is_whole(processes, how, words):
     path = scenario(processes.folder, "node", 'controller = "node:"')
     foreign = processes.start(sys.executable, WRONG, how, str(WRONG_STEP))
     done = processes.run("hsv", "run", path, "--composed", "--no-report", "--bag", processes.folder / how)
@@ -161,7 +157,7 @@ def test_a_node_that_goes_wrong_is_named_and_the_bag_is_whole(processes: Process
 
 
 @pytest.mark.long
-def test_a_controller_that_is_slow_is_named(processes: Processes) -> None:
+def test_a_controller_that_is_slow_is_named(processes):
     path = scenario(processes.folder, "lqr", 'controller = "wrong_controller:SlowLqr"')
     words = ("--step-timeout", "3", "--no-report", "--bag", processes.folder / "slow")
     done = processes.run("hsv", "run", path, *words)
@@ -177,14 +173,14 @@ def test_a_controller_that_is_slow_is_named(processes: Processes) -> None:
         long("[regulator]\ngain = 1.0", "regulator: unknown table, expected none: a node brings its own parameters"),
     ],
 )
-def test_what_cannot_fly_is_refused_in_a_line(processes: Processes, more: str, words: str) -> None:
+def test_what_cannot_fly_is_refused_in_a_line(processes, more, words):
     done = processes.run("hsv", "run", scenario(processes.folder, "node", more), "--bag", processes.folder / "bag")
     assert done.returncode == 2 and words in last_line(done) and len(done.stdout.splitlines()) == 1, done.stdout
     assert not (processes.folder / "bag").exists()
 
 
 @pytest.mark.long
-def test_two_controllers_end_the_run(processes: Processes) -> None:
+def test_two_controllers_end_the_run(processes):
     # Paced, so that the second joins before the flight is over, however long its start takes.
     path = scenario(processes.folder, "node", 'controller = "node:"', duration=200.0)
     for name in ("one", "two"):
@@ -195,9 +191,3 @@ def test_two_controllers_end_the_run(processes: Processes) -> None:
     assert done.returncode == 1, done.stdout
     [said] = [line for line in done.stdout.splitlines() if "publish /hsv/command: expected one controller" in line]
     assert "/one" in said or "/two" in said
-
-
-@pytest.mark.long
-def test_a_node_does_not_fly_in_process(processes: Processes) -> None:
-    done = processes.run("hsv", "simulate", scenario(processes.folder, "node"))
-    assert done.returncode == 2 and "a node of its own, expected hsv run" in last_line(done), done.stdout

@@ -1,21 +1,14 @@
 """What a node tells ROS of its parameters: types, ranges, words; and what may be changed in flight."""
 
-from __future__ import annotations
-
 import math
 import sys
-from collections.abc import Iterator
 
 import pytest
 import rclpy
 from rclpy.context import Context
-from rclpy.node import Node
-from rclpy.parameter import Parameter as RosParameter
 from ros_domain import own_domain
 
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
-from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter
 from hsv.graph.node_parameters import NODE_PARAMETERS
 from hsv_node.parameters import declare
 
@@ -25,7 +18,7 @@ ALL = {p.name: p for table in (*NODE_PARAMETERS.values(), LOCKSTEP_PARAMETERS) f
 
 
 @pytest.fixture(scope="module")
-def context() -> Iterator[Context]:
+def context():
     """Return a context in a domain of its own."""
     with own_domain() as domain:
         made = Context()
@@ -35,7 +28,7 @@ def context() -> Iterator[Context]:
 
 
 @pytest.fixture(scope="module")
-def declared(context: Context) -> Iterator[Node]:
+def declared(context):
     """Return a node with every parameter of every node."""
     node = rclpy.create_node("declared", context=context)
     declare(node, ALL.values())
@@ -44,7 +37,7 @@ def declared(context: Context) -> Iterator[Node]:
 
 
 @pytest.mark.parametrize("parameter", ALL.values(), ids=ALL)
-def test_descriptors_are_complete_and_values_typed(declared: Node, parameter: Parameter) -> None:
+def test_descriptors_are_complete_and_values_typed(declared, parameter):
     descriptor = declared.describe_parameter(parameter.name)
     value = declared.get_parameter(parameter.name)
     assert value.type_.name.lower() == parameter.kind and descriptor.type == value.type_.value
@@ -57,26 +50,3 @@ def test_descriptors_are_complete_and_values_typed(declared: Node, parameter: Pa
     for given in ranges:
         found = [end for end in (given.from_value, given.to_value) if abs(end) < min(sys.float_info.max, 2**63 - 1)]
         assert found == ends
-
-
-@pytest.mark.parametrize(
-    ("table_value", "given", "words"),
-    [
-        (0.0, 200, "= 200: expected double (write 200.0)"),
-        ([0.5], [1, 2], "= [1, 2]: expected double array of finite numbers (write [1.0, 2.0])"),
-        ([], [1], "= [1]: expected double array of finite numbers (write [1.0])"),
-        ([0.5], ["a"], "= ['a']: expected double array of finite numbers"),
-        (1, 1.0, "= 1.0: expected integer"),
-        ("a", True, "= True: expected string"),
-        (True, 1, "= 1: expected bool"),
-    ],
-)
-def test_a_wrong_type_says_what_to_write(context: Context, table_value: object, given: object, words: str) -> None:
-    overrides = [RosParameter("given", value=given)]
-    node = rclpy.create_node("wrong", context=context, parameter_overrides=overrides)
-    try:
-        with pytest.raises(ParameterError) as refused:
-            declare(node, [Parameter("given", table_value, "for the test")])  # type: ignore[arg-type]
-        assert str(refused.value) == f"parameter given {words}"
-    finally:
-        node.destroy_node()

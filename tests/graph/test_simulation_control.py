@@ -1,7 +1,5 @@
 """A flight under the ROS 2 standard for simulators: a client that knows nothing else pauses, steps and resets it."""
 
-from __future__ import annotations
-
 import json
 import sys
 import textwrap
@@ -10,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from marking import long
-from node_processes import Processes, short_scenario
+from node_processes import short_scenario
 from waiting import exit_code_of, output_of
 
 from hsv.bags.flight import flight_fingerprint
@@ -29,9 +27,7 @@ STOPPED, OK, FAILED, UNSUPPORTED, ALREADY, INCORRECT = 0, 1, 4, 0, 101, 103
 @pytest.mark.parametrize(
     ("scenario", "pace", "how"), [("short", 0.2, ["--composed"]), long("short", 0.2, []), long("case1", 1, [])]
 )
-def test_pause_steps_reset_and_the_whole_flight_again(
-    processes: Processes, scenario: str, pace: float, how: list[str]
-) -> None:
+def test_pause_steps_reset_and_the_whole_flight_again(processes, scenario, pace, how):
     flown = short_scenario(processes.folder) if scenario == "short" else scenario
     bag = processes.folder / "flown"
     words = (*how, "--bag", bag, "--paused", "--real-time-factor", str(pace), "--no-report")
@@ -60,7 +56,7 @@ def test_pause_steps_reset_and_the_whole_flight_again(
     assert_each_has_its_own(before, Bag(bag))
 
 
-def assert_each_has_its_own(*bags: Bag) -> None:
+def assert_each_has_its_own(*bags):
     """Assert that every bag has one run, announced before its reference, and the nodes that were ready for it."""
     runs = [list(bag.decode("/hsv/run")) for bag in bags]
     assert [len(run) for run in runs] == [1] * len(bags)
@@ -105,7 +101,7 @@ RESET_BEFORE_A_STEP = textwrap.dedent(
 )
 
 
-def test_a_reset_before_the_first_step_is_recorded(processes: Processes) -> None:
+def test_a_reset_before_the_first_step_is_recorded(processes):
     done = processes.run(sys.executable, "-c", RESET_BEFORE_A_STEP)
     assert done.returncode == 0, done.stdout
     for name, run_id in (("flown_reset_1", "first"), ("flown", "second")):
@@ -116,7 +112,7 @@ def test_a_reset_before_the_first_step_is_recorded(processes: Processes) -> None
         assert len(bag.messages("/hsv/reference")) == 1
 
 
-def test_quitting_ends_the_run_as_an_interruption_does(processes: Processes) -> None:
+def test_quitting_ends_the_run_as_an_interruption_does(processes):
     program = (
         "import rclpy; from simulation_interfaces.srv import SetSimulationState as S; rclpy.init();"
         "n = rclpy.create_node('c'); c = n.create_client(S, 'hsv/set_simulation_state'); c.wait_for_service();"

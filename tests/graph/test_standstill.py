@@ -1,7 +1,5 @@
 """What is told from slow: standing still, and using no processor time."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -9,13 +7,11 @@ import sys
 import time
 from pathlib import Path
 
-import pytest
-
 from hsv.graph import standstill as module
 from hsv.graph.standstill import Standstill, processor_time, processor_time_of
 
 
-def test_time_counts_while_nothing_changes_and_a_gap_between_looks_little(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_time_counts_while_nothing_changes_and_a_gap_between_looks_little(monkeypatch):
     now = 100.0
     monkeypatch.setattr(module.time, "monotonic", lambda: now)
     standstill = Standstill()
@@ -33,7 +29,7 @@ def test_time_counts_while_nothing_changes_and_a_gap_between_looks_little(monkey
 LOOKS_AROUND = "import time\nprint(flush=True)\nwhile True: time.sleep(0.05)"
 
 
-def test_processor_time_grows_for_a_process_that_looks_around_and_not_for_a_stopped_one() -> None:
+def test_processor_time_grows_for_a_process_that_looks_around_and_not_for_a_stopped_one():
     with subprocess.Popen([sys.executable, "-c", LOOKS_AROUND], stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         process.stdout.readline()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from marking import long
-from node_processes import Processes, short_scenario
+from node_processes import short_scenario
 
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import complete_steps
@@ -26,26 +26,16 @@ COMPOSED = ("--composed",)
     ("how", "words", "node", "said"),
     [
         ("fault", COMPOSED, "plant", "/hsv/actuator: active[0]: fault.type = 'stuk': expected one of "),
-        long("fault", APART, "plant", "/hsv/actuator: active[0]: fault.type = 'stuk': expected one of "),
-        long(
-            *("value", APART, "plant"),
-            "/hsv/actuator: active[0]: fault.parameter_values: 0 values, expected 1, one for each name",
-        ),
+        long("value", APART, "plant", "/hsv/actuator: active[0]: fault.parameter_values: 0 values, expected 1, one"),
         long("estimate", APART, "tube_mpc", "/hsv/filtered_state: estimate: 1 numbers, expected 9, or none"),
-        long("estimate", COMPOSED, "tube_mpc", "/hsv/filtered_state: estimate: 1 numbers, expected 9, or none"),
-        long(
-            *("states", APART, "tube_mpc"),
-            "/hsv/filtered_state: filter_state: 4 numbers, expected 2 of the notch filter flown, or none",
-        ),
-        long("gain", APART, "tube_mpc", "/hsv/nominal: gain: 9 numbers, expected 18, or none"),
+        long("states", APART, "tube_mpc", "/hsv/filtered_state: filter_state: 4 numbers, expected 2 of the notch filt"),
+        long("gain", COMPOSED, "tube_mpc", "/hsv/nominal: gain: 9 numbers, expected 18, or none"),
         long("command", APART, "fault_injector", "/hsv/command: hsv_msgs/msg/ControlInput: "),
         long("measurement", APART, "", "/hsv/measurement: hsv_msgs/msg/Measurement: "),
         long("measurement", COMPOSED, "", "/hsv/measurement: hsv_msgs/msg/Measurement: "),
     ],
 )
-def test_a_message_that_no_block_can_take_ends_the_run_by_topic_and_field(
-    processes: Processes, how: str, words: tuple[str, ...], node: str, said: str
-) -> None:
+def test_a_message_that_no_block_can_take_ends_the_run_by_topic_and_field(processes, how, words, node, said):
     bag = processes.folder / how
     disturber = processes.start(sys.executable, DISTURBER, how, str(FROM_STEP))
     # Paced, so that the wrong message of a step comes before the right one.

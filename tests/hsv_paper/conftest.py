@@ -1,8 +1,3 @@
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-
 import pytest
 from ran import Ran
 
@@ -10,13 +5,11 @@ from hsv_paper.cli import main
 
 
 @pytest.fixture
-def hsv_paper(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Callable[..., Ran]:
+def hsv_paper(monkeypatch, capsys, tmp_path):
     """Run the command as the console script does, in an empty folder and in this process."""
     monkeypatch.chdir(tmp_path)
 
-    def run(*words: str) -> Ran:
+    def run(*words):
         monkeypatch.setattr("sys.argv", ["hsv-paper", *words])
         with pytest.raises(SystemExit) as caught:
             main()

@@ -1,13 +1,5 @@
 import pytest
 
-from hsv.cli.output import console
-from hsv_paper.claims.page import CONTROLLERS, METRICS, Rank
-from hsv_paper.claims.table import GROUPS, Finding, Reading
-from hsv_paper.cli import print_claims
-
-READINGS = Reading("first", 0.5, "1", at_most=1.0), Reading("second", 2.0, "1", at_most=1.0)
-RANKS = {metric: {name: Rank(123456.0, 2e5, 1, 2) for name in CONTROLLERS} for metric in METRICS}
-
 
 @pytest.mark.long
 def test_a_figure_is_drawn_with_its_page(hsv_paper, tmp_path):
@@ -25,15 +17,6 @@ def test_a_figure_that_is_none_of_the_paper_s_is_named(hsv_paper):
     ran = hsv_paper("figures", "--only", "7")
     assert ran.code == 2
     assert ran.error == "only = 7: expected one of 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17"
-
-
-@pytest.mark.long
-def test_a_study_is_plotted_and_printed_as_json(hsv_paper, tmp_path):
-    ran = hsv_paper("sensitivity", "notch", "--coarseness", "20", "--out", "plots", "--json")
-    assert (ran.code, ran.err) == (0, "")
-    assert ran.json["study"] == "notch"
-    assert ran.json["tables"][0][0]["loop"] == "paper-like coupling, nominal"
-    assert (tmp_path / "plots" / "notch.png").is_file()
 
 
 @pytest.mark.long
@@ -83,34 +66,3 @@ def test_a_folder_that_could_not_be_made_is_refused_before_anything_is_drawn(hsv
     ran = hsv_paper(*words, "--out", folder)
     assert ran.code == 2
     assert ran.error == f"out = {folder!r}: cannot be written, expected a folder or the name of a new one"
-
-
-@pytest.mark.parametrize("page", ["absent/claims.md", "/proc/claims.md", "."])
-def test_claims_refuse_a_page_that_could_not_be_written_before_they_fly(hsv_paper, page):
-    ran = hsv_paper("claims", "--out", page)
-    assert ran.code == 2
-    assert ran.error == f"out = {page!r}: cannot be written, expected a file in an existing folder"
-
-
-@pytest.fixture
-def printed(monkeypatch, capsys):
-    monkeypatch.setattr(console, "width", 80)
-    judged = {group: [Finding(claim, READINGS, "It is so.") for claim in claims] for group, claims in GROUPS.items()}
-
-    print_claims(judged, RANKS)
-    return [line.rstrip() for line in capsys.readouterr().out.splitlines()]
-
-
-def test_every_claim_is_one_whole_line_of_a_terminal(printed):
-    for claims in GROUPS.values():
-        for claim in claims:
-            [line] = [line for line in printed if line.startswith(f"{claim.name} ")]
-            assert line.endswith("holds under conditions")
-    assert f"Of {sum(map(len, GROUPS.values()))} claims, 0 hold, " in " ".join(printed)
-    assert max(map(len, printed)) <= 80
-
-
-def test_limits_are_a_command_of_their_own(hsv_paper):
-    ran = hsv_paper("sensitivity", "limits")
-    assert ran.error.startswith("sensitivity = 'limits': expected one of coupling, ")
-    assert hsv_paper("limits", "--coarseness", "0.1").error == "coarseness = 0.1: expected 1 to 100"

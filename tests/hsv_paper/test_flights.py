@@ -8,18 +8,6 @@ from hsv.model.vehicle import load_vehicle
 from hsv_paper.flights import Flights, Point, fly_over
 
 
-def test_a_flight_in_process_is_flown_once_and_not_kept(tmp_path):
-    flights = Flights(tmp_path / "flights")
-    flight = flights["case1"]
-    assert flights["case1"] is flight
-    assert not list(tmp_path.iterdir())
-    again = fly(assemble(flight_parameters(load_scenario("case1")))).data()
-    for name in ("state", "reference", "deviation", "command", "unlimited", "gain_index"):
-        assert np.array_equal(getattr(flight, name), getattr(again, name)), name
-    assert flight.fault_start == again.fault_start
-    assert np.array_equal(flight.time, again.time)
-
-
 def short(**changes):
     values = {**flight_parameters(load_scenario("case1")), "duration": 4.0, "fault.starts": [1.0]}
     return values | {name.replace("__", "."): value for name, value in changes.items()}

@@ -10,7 +10,6 @@ from hsv.flight.assembly import assemble, assemble_flight, flight_parameters
 from hsv.flight.closed_loop import fly
 from hsv.flight.corners import corners
 from hsv.flight.governed import governed
-from hsv.flight.metrics import flight_metrics
 from hsv.flight.scenario import load_scenario, parse_scenario
 from hsv.model.dynamics import advance, transitions
 from hsv.model.trim import trim
@@ -30,18 +29,8 @@ from hsv_paper.limits.problems import (
     turning_limit,
 )
 from hsv_paper.limits.replay import fly_optimum
-from hsv_paper.limits.study import (
-    BLEND,
-    PERIODS,
-    STUDY,
-    deepest_fault,
-    fastest_transfer,
-    least_survived,
-    needed_effectiveness,
-    settling_times,
-)
+from hsv_paper.limits.study import BLEND, PERIODS, deepest_fault, fastest_transfer, least_survived, settling_times
 from hsv_paper.linear_loop import START, TARGET
-from hsv_paper.study import Scope
 
 ROOT = Path(__file__).parents[2]
 ENVELOPE = load_vehicle()
@@ -59,6 +48,17 @@ def disturbed(count, seed=1):
     return state, inputs, random.uniform(0.02, 0.1, count), random.integers(2, 10, count)
 
 
+def slope_along(j, reach, part, state, inputs, period, substeps):
+    """Return the central difference of what ``transitions`` returns along state, input or period ``j``."""
+    change = np.zeros(12)
+    change[j] = reach
+    above, below = (
+        transitions(state + s * change[:9], inputs + s * change[9:11], period + s * change[11], substeps, VEHICLE)[part]
+        for s in (1.0, -1.0)
+    )
+    return (above - below) / (2.0 * reach)
+
+
 def test_transitions_are_those_of_the_flights_integrator_with_its_derivatives():
     state, inputs, period, substeps = disturbed(4)
     end, slope = transitions(state, inputs, period, substeps, VEHICLE)
@@ -66,16 +66,7 @@ def test_transitions_are_those_of_the_flights_integrator_with_its_derivatives():
         x = advance(state[k], inputs[k], VEHICLE, period[k], int(substeps[k]))
         assert end[k] == pytest.approx(x, rel=1e-14, abs=1e-14)
     for j, size in enumerate((*STATE_SCALE, *INPUT_SCALE, 0.02)):
-        reach = 1e-4 * size
-        change = np.zeros(12)
-        change[j] = reach
-        above, below = (
-            transitions(state + s * change[:9], inputs + s * change[9:11], period + s * change[11], substeps, VEHICLE)[
-                0
-            ]
-            for s in (1.0, -1.0)
-        )
-        difference = (above - below) / (2.0 * reach)
+        difference = slope_along(j, 1e-4 * size, 0, state, inputs, period, substeps)
         assert size * slope[:, :, j] / STATE_SCALE == pytest.approx(size * difference / STATE_SCALE, abs=1e-6)
 
 
@@ -86,27 +77,12 @@ def test_curvature_is_the_change_of_the_derivatives():
     assert found == pytest.approx(found.transpose(0, 2, 1))
     scale = np.array([*STATE_SCALE, *INPUT_SCALE, 0.02])
     for j in (2, 4, 9, 10, 11):
-        change = np.zeros(12)
-        change[j] = 1e-3 * scale[j]
-        above, below = (
-            transitions(state + s * change[:9], inputs + s * change[9:11], period + s * change[11], substeps, VEHICLE)[
-                1
-            ]
-            for s in (1.0, -1.0)
-        )
-        difference = np.einsum("ki,kij->kj", weights, above - below) / (2.0 * change[j])
+        slope = slope_along(j, 1e-3 * scale[j], 1, state, inputs, period, substeps)
+        difference = np.einsum("ki,kij->kj", weights, slope)
         curved = [0, 1, 2, 3, 4, 9, 10, 11]
         assert (found[:, j] * scale * scale[j])[:, curved] == pytest.approx(
             (difference * scale * scale[j])[:, curved], abs=1e-6
         )
-
-
-def test_a_finer_mesh_keeps_states_and_inputs():
-    point = straight(transfer(VEHICLE, 10, settling=False), 12.0)
-    fine = point.finer(3)
-    assert np.array_equal(fine.state[::3], point.state)
-    assert np.array_equal(fine.input[1::3], point.input)
-    assert fine.state[0, :2] == pytest.approx(START) and fine.state[-1, :2] == pytest.approx(TARGET)
 
 
 @pytest.mark.long
@@ -213,21 +189,9 @@ def flown(scenario, **changes):
     return fly(assemble({**flight_parameters(load_scenario(scenario)), **changes})).data()
 
 
-def test_settling_times_of_a_step_are_the_metrics():
-    flight = flown("case1")
-    metrics = flight_metrics(flight)
-    assert settling_times(flight) == pytest.approx(
-        [metrics["altitude_settling_time"], metrics["velocity_settling_time"]]
-    )
-
-
 def test_settling_times_of_a_ramp_count_from_its_beginning():
     """As docs/governor.md prints them."""
     assert settling_times(flown("case1_governed")) == pytest.approx([29.0, 28.8], abs=0.05)
-
-
-def test_a_flight_that_is_too_short_has_not_settled():
-    assert np.array_equal(settling_times(flown("case1", duration=50.0)) < np.inf, [True, False])
 
 
 def test_the_page_has_what_the_controllers_reach():
@@ -235,23 +199,3 @@ def test_the_page_has_what_the_controllers_reach():
     flown = fly(assemble_flight(parse_scenario(governed("case1", BLEND).text, "case1")))
     assert f"{max(settling_times(flown.data())):.1f}" in page_of_limits
     assert f"loses the nominal vehicle below {least_survived('case1'):.3f}," in page_of_limits
-
-
-def test_elevator_is_needed_to_turn_and_to_hold():
-    limits = np.array([[0.6, 0.4, 0.3, 0.5], [0.6, 0.2, 0.3, 0.1]])
-    assert needed_effectiveness(limits).tolist() == [[0.4, 0.5], [0.3, 0.2]]
-
-
-@pytest.mark.long
-def test_a_coarse_study_has_its_page_and_numbers(tmp_path):
-    told = []
-    outcome = STUDY.run(Scope(8.0, tmp_path, lambda *what: told.append(what)))
-    text = STUDY.page(outcome)
-    assert text.startswith("# Physical limits: Fastest transfer and deepest fault") and "{" not in text
-    settling, optima, over_all = outcome.tables
-    assert [row["flown"] for row in optima] == ["recovers"] * 3
-    assert len(outcome.figure.axes) == 6
-    assert "| case1_governed | 29 | 28.8 | 2.9 |" in text
-    assert min(row["later, times the least"] for row in settling) > 1.0
-    assert [row["nominal"] for row in over_all[:2]] == [0.406, 0.391]
-    assert told[-1] == ("done", 4, 4)

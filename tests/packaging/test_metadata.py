@@ -26,13 +26,13 @@ OF_ROS = {"ament_index_python"}
 """Imported where a ROS workspace is sourced only."""
 
 
-def extra_of(requirement: Requirement) -> str:
+def extra_of(requirement):
     """Return the extra that a requirement belongs to, "all" left out; "" if it is always installed."""
     found = re.search(r'extra == "(\w+)"', str(requirement.marker or ""))
     return found[1] if found else ""
 
 
-def imported() -> set[str]:
+def imported():
     """Return the modules outside the standard library that the package imports, wherever and whenever it does."""
     found = set(BY_NAME)
     for path in SOURCES.rglob("*.py"):
@@ -44,7 +44,7 @@ def imported() -> set[str]:
     return found - sys.stdlib_module_names - {"hsv"} - OF_ROS
 
 
-def test_every_import_is_of_a_declared_distribution_and_every_distribution_is_used() -> None:
+def test_every_import_is_of_a_declared_distribution_and_every_distribution_is_used():
     by_module = packages_distributions()
     used: dict[str, set[str]] = {}
     for module in imported():
@@ -58,7 +58,7 @@ def test_every_import_is_of_a_declared_distribution_and_every_distribution_is_us
 
 
 @pytest.mark.parametrize("lock", ["constraints.txt", "constraints-jazzy.txt"])
-def test_bounds_have_two_sides_and_hold_the_pins(lock: str) -> None:
+def test_bounds_have_two_sides_and_hold_the_pins(lock):
     lines = (ROOT / lock).read_text(encoding="utf-8").splitlines()
     pins = {pin.name: pin for pin in map(Requirement, (line for line in lines if not line.startswith("#")))}
     for requirement in DECLARED:
@@ -106,7 +106,7 @@ WITHOUT = {
 
 
 @pytest.mark.long
-def test_flights_and_bags_need_no_extra_and_a_missing_one_is_named(tmp_path: Path) -> None:
+def test_flights_and_bags_need_no_extra_and_a_missing_one_is_named(tmp_path):
     command = [sys.executable, "-c", WITHOUT_EXTRAS, *WITHOUT]
     ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     expected = []
@@ -117,7 +117,7 @@ def test_flights_and_bags_need_no_extra_and_a_missing_one_is_named(tmp_path: Pat
     assert ran.stderr.splitlines() == expected and ran.returncode == 0
 
 
-def test_every_shipped_scenario_has_its_design_in_the_package() -> None:
+def test_every_shipped_scenario_has_its_design_in_the_package():
     from hsv.flight.scenario import load_scenario
 
     designs = {path.stem for path in (SOURCES / "designs").glob("*.yaml")}

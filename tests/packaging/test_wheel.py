@@ -3,8 +3,6 @@
 Needs a package index; where there is none, the tests say so and are skipped.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -12,7 +10,6 @@ import subprocess
 import sys
 import tarfile
 import tomllib
-from collections.abc import Callable
 from importlib.metadata import PathDistribution
 from pathlib import Path
 from zipfile import Path as ZipPath
@@ -28,7 +25,7 @@ BUILD_SDIST = "import sys; from setuptools import build_meta; print(build_meta.b
 pytestmark = pytest.mark.long
 
 
-def run(*command: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+def run(*command, cwd=None):
     """Run a command with nothing of this process' environment but how it reaches a package index."""
     handed_on = {
         name: value for name, value in os.environ.items() if name.startswith("PIP_") or "proxy" in name.lower()
@@ -37,14 +34,14 @@ def run(*command: object, cwd: Path | None = None) -> subprocess.CompletedProces
     return subprocess.run([str(word) for word in command], cwd=cwd, env=env, capture_output=True, text=True)
 
 
-def checked(*command: object, cwd: Path | None = None) -> str:
+def checked(*command, cwd=None):
     ran = run(*command, cwd=cwd)
     assert ran.returncode == 0, f"{command}: {ran.stdout}{ran.stderr}"
     return ran.stdout
 
 
 @pytest.fixture(scope="module")
-def index() -> None:
+def index():
     """Skip where pip finds no package index."""
     asked = run(sys.executable, "-m", "pip", "index", "versions", "setuptools")
     if asked.returncode:
@@ -52,7 +49,7 @@ def index() -> None:
 
 
 @pytest.fixture(scope="module")
-def sdist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def sdist(tmp_path_factory):
     """Build the source distribution from a copy of the sources, with the link that leads out of them."""
     folder = tmp_path_factory.mktemp("sources")
     made = shutil.ignore_patterns("__pycache__", "*.egg-info", "build")
@@ -63,7 +60,7 @@ def sdist(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def wheel(sdist: Path, index: None) -> Path:
+def wheel(sdist, index):
     """Build the wheel from the source distribution alone."""
     folder = sdist.parent / "wheel"
     checked(sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", folder, sdist)
@@ -72,10 +69,10 @@ def wheel(sdist: Path, index: None) -> Path:
 
 
 @pytest.fixture
-def environment(tmp_path: Path) -> Callable[..., Path]:
+def environment(tmp_path):
     """Return a function that makes a bare virtual environment, installs into it, and returns its ``bin``."""
 
-    def make(*words: object) -> Path:
+    def make(*words):
         checked(sys.executable, "-m", "venv", tmp_path / "venv")
         folder = tmp_path / "venv" / "bin"
         checked(folder / "python3", "-m", "pip", "install", "--quiet", *words)
@@ -85,14 +82,14 @@ def environment(tmp_path: Path) -> Callable[..., Path]:
     return make
 
 
-def fly(folder: Path, cwd: Path) -> None:
+def fly(folder, cwd):
     """Fly Case 1 and check that it is the published flight."""
     table = tomllib.loads((ROOT / "src/hsv/hsv/flight/fingerprints.toml").read_text(encoding="utf-8"))
     flown = json.loads(checked(folder / "hsv", "simulate", "case1", "--json", cwd=cwd))
     assert flown["fingerprint"] == table["case1"]["fingerprint"]
 
 
-def test_both_distributions_hold_every_file_of_the_package(sdist: Path, wheel: Path) -> None:
+def test_both_distributions_hold_every_file_of_the_package(sdist, wheel):
     listed = checked("git", "-C", ROOT, "ls-files", "src/hsv/hsv", "offline_design").split()
     link = "src/hsv/hsv/designs"
     expected = {name.replace("offline_design", link).removeprefix("src/hsv/") for name in listed if name != link}
@@ -107,7 +104,7 @@ def test_both_distributions_hold_every_file_of_the_package(sdist: Path, wheel: P
     assert wheel.stem.split("-")[2:4] == ["cp311", "abi3"]  # one for every Python from 3.11 on
 
 
-def test_a_bare_environment_flies_and_reports(wheel: Path, environment: Callable[..., Path], tmp_path: Path) -> None:
+def test_a_bare_environment_flies_and_reports(wheel, environment, tmp_path):
     folder = environment(wheel)
     fly(folder, tmp_path)
     words = ("report", BAG, "--out", tmp_path / "report.html")
@@ -120,7 +117,7 @@ def test_a_bare_environment_flies_and_reports(wheel: Path, environment: Callable
     assert "</html>" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
-def test_the_oldest_libraries_allowed_do(wheel: Path, environment: Callable[..., Path], tmp_path: Path) -> None:
+def test_the_oldest_libraries_allowed_do(wheel, environment, tmp_path):
     (metadata,) = (path for path in ZipPath(wheel).iterdir() if path.name.endswith(".dist-info"))
     oldest = tmp_path / "oldest.txt"
     with oldest.open("w", encoding="utf-8") as stream:

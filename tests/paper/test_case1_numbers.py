@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 from flights import components
 
@@ -133,10 +132,3 @@ def test_integral_action_removes_the_offset_of_a_wrong_mass(flown):
         assert abs(m["altitude_end_error"]) < 0.5 * FOOT
     off = flight_metrics(fly(components("case1_integral_light", integral__rate=0.0)).data())
     assert abs(off["altitude_end_error"]) > 10 * FOOT
-
-
-def test_without_fault_the_flight_ends_at_its_command():
-    values = {"fault__parameters": ["effectiveness=1.0"]}
-    h = fly(components("case1", **values)).history
-    reference = fly(components("case1", duration=0.02)).reference
-    assert np.abs(h.state[-1] - reference)[:2].max() < 0.05

@@ -1,54 +1,36 @@
 """Readers of bags that other people wrote: each gives topic, time in nanoseconds and message as plain data."""
 
-from __future__ import annotations
-
 import json
 import math
 import shutil
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from rosbags.highlevel import AnyReader
 
 from hsv.bags.reader import Bag
 from hsv.bags.typestore import as_dict
 
 NPM = Path(__file__).parents[1] / "viewers" / "npm"
 
-Messages = Iterator[tuple[str, int, Any]]
 
-
-def ours(bag: Path) -> Messages:
+def ours(bag):
     opened = Bag(bag)
     for topic, recorded in opened.topics.items():
         for time, message in opened.decode(topic):
             yield topic, time, as_dict(opened.types.fielddefs, recorded.type, message)
 
 
-def by_rosbags(bag: Path) -> Messages:
-    with AnyReader([bag]) as reader:
-        types = reader.typestore.fielddefs
-        for connection, time, data in reader.messages():
-            yield (
-                connection.topic,
-                time,
-                as_dict(types, connection.msgtype, reader.deserialize(data, connection.msgtype)),
-            )
-
-
-def by_mcap_ros2(bag: Path) -> Messages:
+def by_mcap_ros2(bag):
     with next(bag.glob("*.mcap")).open("rb") as stream:
         for item in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
             yield item.channel.topic, item.message.log_time, _plain(item.decoded_message)
 
 
-def by_foxglove(bag: Path) -> Messages:
+def by_foxglove(bag):
     node = shutil.which("node")
     if not node or not (NPM / "node_modules").is_dir():
         pytest.skip(f"no {'node_modules' if node else 'node'}; make test-viewers installs it")
@@ -62,14 +44,13 @@ def by_foxglove(bag: Path) -> Messages:
 
 
 READERS = [
-    pytest.param(by_rosbags, id="rosbags"),
     pytest.param(by_mcap_ros2, id="mcap-ros2-support"),
     pytest.param(by_foxglove, id="foxglove", marks=pytest.mark.viewer),
 ]
 """For parametrized tests."""
 
 
-def assert_equal(expected: Messages, actual: Messages) -> int:
+def assert_equal(expected, actual):
     """Assert that both read the same, whatever the order of topics; return the number of messages."""
     first, second = _by_topic(expected), _by_topic(actual)
     assert first.keys() == second.keys()
@@ -82,14 +63,14 @@ def assert_equal(expected: Messages, actual: Messages) -> int:
     return count
 
 
-def _by_topic(messages: Messages) -> dict[str, list[tuple[int, Any]]]:
-    sorted_out: dict[str, list[tuple[int, Any]]] = {}
+def _by_topic(messages):
+    sorted_out = {}
     for topic, time, message in messages:
         sorted_out.setdefault(topic, []).append((time, message))
     return sorted_out
 
 
-def _alike(a: Any, b: Any) -> bool:
+def _alike(a, b):
     if isinstance(a, dict):
         return a.keys() == b.keys() and all(_alike(a[key], b[key]) for key in a)
     if isinstance(a, list):
@@ -100,7 +81,7 @@ def _alike(a: Any, b: Any) -> bool:
     return bool(a == b) or (isinstance(a, float) and math.isnan(a) and math.isnan(b))
 
 
-def _plain(value: Any) -> Any:
+def _plain(value):
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, list | tuple):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
@@ -34,25 +33,25 @@ class Original:
     attachments: dict[str, bytes]
 
     @cached_property
-    def messages(self) -> Messages:
+    def messages(self):
         return _together(self.chunks.values())
 
-    def whole(self, damaged: bytes) -> Messages:
+    def whole(self, damaged):
         """Return the messages of all chunks that stand in ``damaged`` as they were written."""
         return _together(messages for chunk, messages in self.chunks.items() if chunk in damaged)
 
-    def defines(self, damaged: bytes) -> bool:
+    def defines(self, damaged):
         """Return whether the definitions are whole somewhere: in the first chunk, or after the last."""
         chunks = list(self.chunks)
         end = self.data.index(chunks[-1]) + len(chunks[-1])
         return chunks[0] in damaged or self.data[end:] in damaged
 
 
-def _together(parts: Iterable[Messages]) -> Messages:
+def _together(parts):
     return Counter(chain.from_iterable(part.elements() for part in parts))
 
 
-def original(folder: Path) -> Original:
+def original(folder):
     """Read a whole bag with the package's own readers."""
     data = next(folder.glob("*.mcap")).read_bytes()
     with next(folder.glob("*.mcap")).open("rb") as stream:
@@ -73,7 +72,7 @@ def original(folder: Path) -> Original:
     return Original(folder, data, chunks, attachments)
 
 
-def damaged(source: Original, target: Path, seed: int) -> tuple[str, bytes]:
+def damaged(source, target, seed):
     """Write the bag, damaged, to the directory ``target``; return what was done and the bytes that are left."""
     random = np.random.default_rng(seed)
     data = bytearray(source.data)
@@ -98,6 +97,6 @@ def damaged(source: Original, target: Path, seed: int) -> tuple[str, bytes]:
     return f"{kind} (seed {seed})", bytes(data)
 
 
-def found_in(bag: object) -> Messages:
+def found_in(bag):
     """Return the messages that ``bag``, a :class:`hsv.bags.reader.Bag`, has found."""
-    return Counter((topic, data) for topic in bag.topics for _, data in bag.messages(topic))  # type: ignore[attr-defined]
+    return Counter((topic, data) for topic in bag.topics for _, data in bag.messages(topic))

@@ -2,12 +2,11 @@
 
 import resource
 import sys
-from collections.abc import Iterator
 from contextlib import contextmanager
 
 
 @contextmanager
-def files_no_larger_than(size: int) -> Iterator[None]:
+def files_no_larger_than(size):
     """Let no file of this process grow beyond ``size`` bytes."""
     limits, written = resource.getrlimit(resource.RLIMIT_FSIZE), sys.dont_write_bytecode
     # Python would cut the bytecode of what it imports meanwhile to that size, and later processes trip over it.

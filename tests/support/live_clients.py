@@ -1,19 +1,15 @@
 """Clients of the live view, on another WebSocket library than the servers': one for each of the two protocols."""
 
-from __future__ import annotations
-
 import json
 import re
 import struct
 import threading
 from collections import defaultdict
-from typing import Any
 
 import numpy as np
-from websocket import WebSocket, WebSocketException, create_connection
+from websocket import WebSocketException, create_connection
 
 from hsv.bags.description import TOPICS, resolved
-from hsv.bags.reader import Bag
 
 _MESSAGE = struct.Struct("<BIQ")
 """Of foxglove.sdk.v1: 1 for message data, number of the subscription, log time (ns); the message follows."""
@@ -25,12 +21,12 @@ LATER = 60.0
 class FoxgloveClient:
     """Subscribes every topic of a server that speaks ``foxglove.sdk.v1``, and keeps what comes until it is left."""
 
-    def __init__(self, port: int, *, reads: bool = True) -> None:
+    def __init__(self, port, *, reads=True):
         self._socket = create_connection(f"ws://127.0.0.1:{port}", LATER, subprotocols=["foxglove.sdk.v1"])
         self.protocol = self._socket.getsubprotocol()
-        self.channels: dict[int, dict[str, Any]] = {}
-        self.sessions: list[str] = []
-        self.messages: dict[str, list[tuple[int, bytes]]] = defaultdict(list)
+        self.channels = {}
+        self.sessions = []
+        self.messages = defaultdict(list)
         """Log time (ns) and bytes, by topic."""
         self._thread = threading.Thread(target=self._read, daemon=True)
         while not self.channels:
@@ -38,22 +34,22 @@ class FoxgloveClient:
         if reads:
             self._thread.start()
 
-    def wait(self) -> None:
+    def wait(self):
         """Wait until the server has left."""
         self._thread.join()
 
-    def leave(self) -> None:
+    def leave(self):
         """Leave without a word."""
         self._socket.sock.close()
 
-    def _read(self) -> None:
+    def _read(self):
         try:
             while data := self._socket.recv():
                 self._take(data)
         except (WebSocketException, OSError):
             pass  # the server has left
 
-    def _take(self, data: str | bytes) -> None:
+    def _take(self, data):
         if isinstance(data, bytes):
             kind, number, time = _MESSAGE.unpack_from(data)
             if kind == 1:
@@ -71,31 +67,31 @@ class FoxgloveClient:
 class PageClient:
     """Does what the page does: gathers rows and status, asks, and waits for the answers."""
 
-    def __init__(self, url: str, *, origin: str | None = "", token: str | None = None) -> None:
+    def __init__(self, url, *, origin="", token=None):
         """Connect to the page of an address as the start prints it; without an ``origin``, as that page itself."""
         found = re.fullmatch(r"(http://([^/]+))/#token=(.+)", url)
         assert found, url
         self.token = found[3] if token is None else token
-        self._socket: WebSocket = create_connection(
+        self._socket = create_connection(
             f"ws://{found[2]}/flight",
             LATER,
             origin=found[1] if origin == "" else origin,
             suppress_origin=origin is None,
         )
-        self.status: dict[str, Any] = {}
-        self._blocks: list[bytes] = []
-        self.answers: list[dict[str, Any]] = []
+        self.status = {}
+        self._blocks = []
+        self.answers = []
 
     @property
-    def data(self) -> bytes:
+    def data(self):
         """All rows, one after the other."""
         return b"".join(self._blocks)
 
-    def times(self, columns: int) -> np.ndarray:
+    def times(self, columns):
         """Return the times (s) of the rows, of so many columns beside the time."""
         return np.frombuffer(self.data, "<f4").reshape(-1, 1 + columns)[:, 0]
 
-    def read(self) -> bool:
+    def read(self):
         """Take the next message; return whether there was one."""
         try:
             data = self._socket.recv()
@@ -116,11 +112,11 @@ class PageClient:
                     self.answers.append(said)
         return True
 
-    def ask(self, command: str, **fields: str) -> dict[str, Any]:
+    def ask(self, command, **fields):
         """Return the answer to a command."""
         return self.send(json.dumps({"id": 1, "token": self.token, "command": command, **fields}))
 
-    def send(self, text: str) -> dict[str, Any]:
+    def send(self, text):
         """Return the answer to a request, whatever it is."""
         self._socket.send(text)
         before = len(self.answers)
@@ -128,19 +124,19 @@ class PageClient:
             assert self.read(), "the server has left"
         return self.answers[-1]
 
-    def leave(self) -> None:
+    def leave(self):
         """Leave without a word."""
         self._socket.sock.close()
 
 
-def addresses(text: str) -> tuple[str, int]:
+def addresses(text):
     """Return the address of the page and the port for Foxglove, of what the start has printed."""
     page, data = re.search(r"live page: (\S+)", text), re.search(r"live data: ws://127\.0\.0\.1:(\d+)", text)
     assert page and data, text
     return page[1], int(data[1])
 
 
-def assert_as_recorded(client: FoxgloveClient, bag: Bag) -> None:
+def assert_as_recorded(client, bag):
     """Every step topic has messages of the bag, byte by byte and in its order; a client that is slow may miss some."""
     for topic in TOPICS:
         received = client.messages[resolved(topic)]
@@ -150,7 +146,7 @@ def assert_as_recorded(client: FoxgloveClient, bag: Bag) -> None:
         assert all(recorded[stamp] == data for stamp, data in received), topic
 
 
-def assert_without_gap(client: FoxgloveClient, bag: Bag) -> None:
+def assert_without_gap(client, bag):
     """Every step topic has what the bag has, byte by byte, from the time on at which the client was there."""
     for topic in TOPICS:
         recorded = list(bag.messages(topic))

@@ -1,14 +1,12 @@
 """Real node processes for the graph tests: starting, finding and ending them."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 from contextlib import suppress
 from pathlib import Path
-from typing import IO
 
-from waiting import output_of, parents, wait_until
+import psutil
+from waiting import output_of, wait_until
 
 from hsv.bags.reader import Bag
 from hsv.base.errors import RecordingError
@@ -39,9 +37,7 @@ start = "{fault} s"
 """
 
 
-def short_scenario(
-    folder: Path, duration: float = 5, fault: float = 3, coupling: str = "paper_like", notch: bool = True
-) -> Path:
+def short_scenario(folder, duration=5, fault=3, coupling="paper_like", notch=True):
     """Write a shortened Case 1 and return its path."""
     path = folder / "short.toml"
     path.write_text(SHORT.format(duration=duration, fault=fault, coupling=coupling, notch=str(notch).lower()))
@@ -51,12 +47,12 @@ def short_scenario(
 class Processes:
     """Starts processes and leaves none behind."""
 
-    def __init__(self, environment: dict[str, str], folder: Path) -> None:
+    def __init__(self, environment, folder):
         self.environment = environment
         self.folder = folder
-        self._started: list[subprocess.Popen[str]] = []
+        self._started = []
 
-    def start(self, *command: str | Path, output: IO[str] | int = subprocess.PIPE) -> subprocess.Popen[str]:
+    def start(self, *command, output=subprocess.PIPE):
         """Start a command with its output in a pipe, or in ``output``."""
         popen = subprocess.Popen(
             [str(word) for word in command],
@@ -69,13 +65,13 @@ class Processes:
         self._started.append(popen)
         return popen
 
-    def run(self, *command: str | Path) -> subprocess.CompletedProcess[str]:
+    def run(self, *command):
         """Run a command to its end and return exit code and output."""
         popen = self.start(*command)
         output = output_of(popen)
         return subprocess.CompletedProcess(popen.args, popen.returncode, output)
 
-    def stop(self) -> None:
+    def stop(self):
         """End what still runs."""
         for number in (signal.SIGINT, signal.SIGKILL):
             running = [popen for popen in self._started if popen.poll() is None]
@@ -85,7 +81,7 @@ class Processes:
                 wait_until(lambda: all(popen.poll() is not None for popen in self._started), [p.pid for p in running])
 
 
-def recorded_steps(bag: Path) -> int:
+def recorded_steps(bag):
     """Return how many steps are on the disk."""
     try:
         return len(Bag(bag).times("hsv/state"))
@@ -93,28 +89,38 @@ def recorded_steps(bag: Path) -> int:
         return 0  # not begun yet
 
 
-def fly_until(flight: subprocess.Popen[str], bag: Path, steps: int) -> None:
+def fly_until(flight, bag, steps):
     """Wait until so many steps of a flight are on the disk.
 
     Raises:
         AssertionError: The flight has ended before.
     """
 
-    def flown() -> bool:
+    def flown():
         assert flight.poll() is None, flight.communicate()[0]
         return recorded_steps(bag) >= steps
 
     wait_until(flown, [flight.pid], lambda: recorded_steps(bag))
 
 
-def children(pid: int) -> dict[str, int]:
+def children(pid):
     """Return the node processes below ``hsv run`` with process id ``pid``, by executable name."""
     found = {}
-    for child in [child for child, parent in parents().items() if parent == pid]:
-        try:
-            words = Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
-        except OSError:
-            continue
-        if b"--ros-args" in words:
-            found[Path(words[words.index(b"--ros-args") - 1].decode()).name] = child
+    for child in psutil.Process(pid).children():
+        with suppress(psutil.Error):
+            words = child.cmdline()
+            if "--ros-args" in words:
+                found[Path(words[words.index("--ros-args") - 1]).name] = child.pid
     return found
+
+
+def last_line(done):
+    """Return the last line that a command has printed; those before tell for whom it waited.
+
+    Or that Fast DDS takes another port of its shared memory: the names of these are the same in all domains of a
+    machine, and another process may hold one just then.
+    """
+    *before, last = done.stdout.splitlines()
+    others = [line for line in before if "Failed init_port fastrtps_port" not in line]
+    assert all(line.startswith("waiting for ") for line in others), done.stdout
+    return str(last)

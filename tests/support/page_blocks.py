@@ -31,23 +31,23 @@ class Block(NamedTuple):
     text: str
 
     @property
-    def first_line(self) -> str:
+    def first_line(self):
         """Its first line, without a remark behind ``#``."""
         return re.sub(r"\s+#\s.*$", "", self.text.partition("\n")[0])
 
     @property
-    def file(self) -> str | None:
+    def file(self):
         """Name of the file that the page tells to save it as: that in its first line."""
         return match[1] if (match := _FILE.match(self.text)) else None
 
 
-def blocks(page: str, language: str = "") -> list[Block]:
+def blocks(page, language=""):
     """Return the fenced blocks of a page, in order, all or those of one language."""
     text = (ROOT / page).read_text(encoding="utf-8")
     return [found for found in map(Block._make, _FENCED.findall(text)) if language in ("", found.language)]
 
 
-def indented(page: str) -> list[Block]:
+def indented(page):
     """Return the indented blocks of a page, in order, without their indentation."""
     text = _FENCED.sub("", (ROOT / page).read_text(encoding="utf-8"))
     return [Block("", re.sub("^    ", "", match[0], flags=re.MULTILINE)) for match in _INDENTED.finditer(text)]

@@ -1,12 +1,9 @@
 """What holds of every page in the browser, whatever it shows."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Callable
 
 import pytest
-from browser import Browser
 
 Show = Callable[[], None]
 
@@ -31,9 +28,7 @@ class PageChecks:
 
     @pytest.mark.parametrize("scheme", ["light", "dark"])
     @pytest.mark.parametrize("width", WIDTHS)
-    def test_there_are_no_barriers(
-        self, browser: Browser, screen: Callable[..., None], show: Show, width: int, scheme: str
-    ) -> None:
+    def test_there_are_no_barriers(self, browser, screen, show, width, scheme):
         screen(width, scheme)
         show()
         channels = browser.run("return getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)")
@@ -41,17 +36,13 @@ class PageChecks:
         assert browser.barriers() == []
 
     @pytest.mark.parametrize("width", WIDTHS)
-    def test_nothing_is_wider_than_the_screen(
-        self, browser: Browser, screen: Callable[..., None], show: Show, width: int
-    ) -> None:
+    def test_nothing_is_wider_than_the_screen(self, browser, screen, show, width):
         screen(width)
         show()
         assert browser.run("return document.documentElement.scrollWidth") <= width
         assert width < WIDTHS[0] or browser.run(BEYOND) == []
 
-    def test_on_paper_it_is_light_without_controls_and_plots_fit(
-        self, browser: Browser, screen: Callable[..., None], show: Show
-    ) -> None:
+    def test_on_paper_it_is_light_without_controls_and_plots_fit(self, browser, screen, show):
         screen(WIDTHS[0], "dark")
         show()
         browser.media(media="print", features=[{"name": "prefers-color-scheme", "value": "dark"}])
@@ -62,7 +53,7 @@ class PageChecks:
         printed = browser.driver.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})
         assert base64.b64decode(printed["data"]).startswith(b"%PDF")
 
-    def test_it_opens_quietly(self, browser: Browser, show: Show) -> None:
+    def test_it_opens_quietly(self, browser, show):
         browser.console()
         show()
         assert browser.console() == []

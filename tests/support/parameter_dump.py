@@ -1,21 +1,18 @@
 """Script of a process of its own, DIRECTORY NODE [NODE...]: writes parameters as ``ros2 param dump`` does."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 
 import rclpy
 import yaml
 from rcl_interfaces.srv import GetParameters, ListParameters
-from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 
 
-def dump(node: Node, name: str) -> str:
+def dump(node, name):
     """Return the parameters of node ``name`` (its full name) in the form of the genuine command."""
 
-    def call(kind: type, service: str, request: object) -> object:
+    def call(kind, service, request):
         client = node.create_client(kind, f"{name}/{service}")
         while not client.wait_for_service(1.0):
             pass
@@ -23,14 +20,14 @@ def dump(node: Node, name: str) -> str:
         rclpy.spin_until_future_complete(node, future)
         return future.result()
 
-    names = sorted(call(ListParameters, "list_parameters", ListParameters.Request()).result.names)  # type: ignore[attr-defined]
-    values = call(GetParameters, "get_parameters", GetParameters.Request(names=names)).values  # type: ignore[attr-defined]
-    tree: dict[str, object] = {}
+    names = sorted(call(ListParameters, "list_parameters", ListParameters.Request()).result.names)
+    values = call(GetParameters, "get_parameters", GetParameters.Request(names=names)).values
+    tree = {}
     for full, value in zip(names, values, strict=True):
         *groups, last = full.split(".")
         branch = tree
         for group in groups:
-            branch = branch.setdefault(group, {})  # type: ignore[assignment]
+            branch = branch.setdefault(group, {})
         plain = parameter_value_to_python(value)
         branch[last] = plain.tolist() if hasattr(plain, "tolist") else plain
     return yaml.dump({name: {"ros__parameters": tree}}, default_flow_style=False)

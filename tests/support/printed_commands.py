@@ -1,7 +1,5 @@
 """The commands that the documentation prints: lines of indented blocks, and spans of code that are whole commands."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path
@@ -14,7 +12,7 @@ _PLACEHOLDER = re.compile(r"\b(?!UTC)[A-Z]{3,}\b|\.\.\.$")
 """Of a form, not of a command."""
 
 
-def printed(page: str) -> list[str]:
+def printed(page):
     """Return the commands of a page, in order, each once, without what is said about them behind ``#``."""
     text = re.sub(r"^```.*?^```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
     found = [(match.start(), _without_remark(match.group(1))) for match in _BLOCK.finditer(text)]
@@ -25,21 +23,21 @@ def printed(page: str) -> list[str]:
     return list(dict.fromkeys(commands))
 
 
-def the_printed(page: str, beginning: str) -> str:
+def the_printed(page, beginning):
     """Return the one command of ``page`` that begins so."""
     [command] = [command for command in printed(page) if command.startswith(beginning)]
     return command
 
 
-def _whole(words: list[str]) -> bool:
+def _whole(words):
     return len(words) > (3 if words[0] == "ros2" else 2) and not words[2].startswith("-")
 
 
-def _without_remark(line: str) -> str:
+def _without_remark(line):
     return re.sub(r"\s+#\s.*$", "", line)
 
 
-def _program(command: str) -> str:
+def _program(command):
     whole = command.count("'") % 2 == 0 and not command.endswith("\\")  # else it goes on in the next line
     words = shlex.split(command, comments=False) if whole else command.split()
     while words and re.fullmatch(r"[A-Z_]+=\S*", words[0]):

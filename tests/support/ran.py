@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Any
 
 
 @dataclass
@@ -16,11 +15,11 @@ class Ran:
     code: int
 
     @property
-    def json(self) -> Any:
+    def json(self):
         return json.loads(self.out)
 
     @property
-    def error(self) -> str:
+    def error(self):
         """The one line of an error; nothing else may have been printed."""
         assert self.err.startswith("hsv: error: "), self.err
         assert self.err.endswith("\n")

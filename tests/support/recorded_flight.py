@@ -1,13 +1,11 @@
 """A bag as `hsv run` leaves it, flown in this process: the graph's own processes, messages and parameters."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Any
 
+import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from rosbags.typesys.store import Typestore
 
+from hsv.bags.definitions import definition, type_hash
 from hsv.bags.description import STATE, TOPICS, resolved
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
@@ -15,36 +13,37 @@ from hsv.bags.replay.engine import fly
 from hsv.bags.topic import Qos, Topic
 from hsv.bags.typestore import blank
 from hsv.bags.writer import BagWriter
-from hsv.control.design import find_design, find_file
+from hsv.control.design import find_file
 from hsv.flight.assembly import flight_parameters
 from hsv.flight.scenario import parse_scenario, scenario_text
+from hsv.model.faults.injector import FaultInjector
 
 MESSAGES = Path(__file__).parents[2] / "ros_ws" / "src" / "hsv_msgs" / "msg"
 LOG, DIAGNOSTICS = "rcl_interfaces/msg/Log", "diagnostic_msgs/msg/DiagnosticArray"
+NOTHING = {}
 
 
-def message_types() -> Typestore:
+def message_types():
     """Return the message types of ROS 2 and ours."""
     store = get_typestore(Stores.ROS2_JAZZY)
-    types: dict[str, Any] = {}
+    types = {}
     for path in sorted(MESSAGES.glob("*.msg")):
         types |= get_types_from_msg(path.read_text(), f"hsv_msgs/msg/{path.stem}")
     store.register(types)
     return store
 
 
-def record_flight(
-    directory: Path,
-    scenario: str = "case1",
-    duration: float = 20.0,
-    fault: float = 8.0,
-    log: tuple[tuple[float, int, str], ...] = (),
-    **changes: Any,
-) -> Bag:
+def record_flight(directory, scenario="case1", duration=20.0, fault=8.0, log=(), in_flight=NOTHING, **changes):
     """Fly a shipped scenario, shortened, and record it to a new bag.
 
-    `log` holds time, level and text of lines that tube_mpc says in flight, on /rosout and /diagnostics. Changed
-    parameters of the design are written with __ for the dot.
+    Args:
+        directory: The bag.
+        scenario: A scenario of 200 s whose fault begins at 100 s.
+        duration: Its new duration (s).
+        fault: The new start of its fault (s).
+        log: Time, level and text of lines that tube_mpc says in flight, on /rosout and /diagnostics.
+        in_flight: By step: what is done to the fault injector before it.
+        changes: Changed parameters of the design, written with __ for the dot.
     """
     text = scenario_text(scenario).replace('"200 s"', f'"{duration} s"').replace('"100 s"', f'"{fault} s"')
     flown = parse_scenario(text, scenario)
@@ -52,34 +51,35 @@ def record_flight(
     values = flight_parameters(flown) | changed
     types = message_types()
     kinds = {resolved(role): kind for role, kind in TOPICS.items()} | {"/rosout": LOG, "/diagnostics": DIAGNOSTICS}
-    topics = [
-        Topic(name, kind, types.generate_msgdef(kind, ros_version=2)[0], types.hash_rihs01(kind), Qos())
-        for name, kind in kinds.items()
-    ]
+    topics = [Topic(name, kind, definition(kind), type_hash(kind), Qos()) for name, kind in kinds.items()]
     custom = {"run_id": "1f" * 16, "scenario": flown.name, "title": flown.title, "commit": "ab" * 20}
     writer = BagWriter(directory, topics, custom | {"design": flown.design, "seed": "none"})
     design = {name: value for name, value in values.items() if name not in flown.parameters()}
     writer.attach("scenario.toml", "text/plain", text.encode())
     writer.attach("scenario.yaml", "text/plain", ParameterSections(flown.parameters()).to_yaml().encode())
     writer.attach("design.yaml", "text/plain", ParameterSections(design).to_yaml().encode())
-    certificate = find_file(flown.design, ".certificate.json")
-    assert certificate.parent == find_design(flown.design).parent
-    writer.attach("certificate.json", "application/json", certificate.read_bytes())
+    writer.attach("certificate.json", "application/json", find_file(flown.design, ".certificate.json").read_bytes())
     for time, level, said in log:
         _say(writer, types, round(time * 1e9), level, said)
-    _fly(writer, types, values)
+    tracks = fly(types, "tube_mpc", ParameterSections(values | _injected(values, in_flight)), lambda *_: None)
+    for row, stamp in enumerate(tracks[STATE].times):
+        for topic in TOPICS:
+            writer.write(resolved(topic), stamp, tracks[topic].data[row])
     writer.close()
     return Bag(directory)
 
 
-def _fly(writer: BagWriter, types: Typestore, values: dict[str, Any]) -> None:
-    tracks = fly(types, "tube_mpc", ParameterSections(values), lambda *_: None)
-    for row, time in enumerate(tracks[STATE].times):
-        for topic in TOPICS:
-            writer.write(resolved(topic), time, tracks[topic].data[row])
+def _injected(values, in_flight):
+    """Return the fault parameters of a flight in which something was done to the fault injector."""
+    injector = FaultInjector.from_parameters(values)
+    for step in range(max(in_flight, default=0) + 1):
+        if step in in_flight:
+            in_flight[step](injector)
+        injector.step(step, np.zeros(2))
+    return injector.parameters()
 
 
-def _say(writer: BagWriter, types: Typestore, time: int, level: int, text: str) -> None:
+def _say(writer, types, time, level, text):
     line = blank(types, LOG)
     line.level, line.name, line.msg = level, "tube_mpc", text
     writer.write("/rosout", time, bytes(types.serialize_cdr(line, LOG)))

@@ -8,11 +8,8 @@ the last whose ports lie below those that Linux hands out by itself, from 32768 
 who choose them by hand.
 """
 
-from __future__ import annotations
-
 import os
 import socket
-from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
 DOMAINS = range(100, 40, -1)
@@ -20,13 +17,13 @@ PARTICIPANTS = 32
 """More than two graphs with all that listen to them."""
 
 
-def first_port(domain: int) -> int:
+def first_port(domain):
     """Return the first of the ports of a ROS domain."""
     return 7400 + 250 * domain
 
 
 @contextmanager
-def own_domain() -> Iterator[int]:
+def own_domain():
     """Yield the number of a domain that is nobody else's while the block runs.
 
     Raises:
@@ -45,13 +42,13 @@ def own_domain() -> Iterator[int]:
 
 
 @contextmanager
-def own_environment() -> Iterator[dict[str, str]]:
+def own_environment():
     """Yield the environment of processes on such a domain, on this machine only."""
     with own_domain() as domain:
         yield os.environ | {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
 
-def look_for_others(domain: int) -> None:
+def look_for_others(domain):
     """Raise an OSError if a participant or ``hsv run`` is on the domain."""
     with ExitStack() as tried:
         tried.enter_context(_bound(socket.AF_UNIX, socket.SOCK_DGRAM, f"\0hsv_domain_{domain}"))
@@ -59,10 +56,10 @@ def look_for_others(domain: int) -> None:
             tried.enter_context(_bound(socket.AF_INET, socket.SOCK_DGRAM, ("", port)))
 
 
-def _bound(family: socket.AddressFamily, kind: socket.SocketKind, address: object) -> socket.socket:
+def _bound(family, kind, address):
     bound = socket.socket(family, kind)
     try:
-        bound.bind(address)  # type: ignore[arg-type]
+        bound.bind(address)
     except OSError:
         bound.close()
         raise

@@ -1,9 +1,6 @@
 """Copies of bags as the tools of rosbag2 write them: recorded at wall time, split, compressed, converted."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import lz4.frame
 import numpy as np
@@ -16,25 +13,21 @@ from rosbags.rosbag2 import Writer as RosbagsWriter
 WALL_TIME = 1_795_000_000 * 10**9
 """Nanoseconds since 1970 at which a recording begins."""
 
-COMPRESS: dict[str, Callable[[bytes], bytes]] = {
-    "": bytes,
-    "zstd": zstandard.ZstdCompressor().compress,
-    "lz4": lz4.frame.compress,
-}
+COMPRESS = {"": bytes, "zstd": zstandard.ZstdCompressor().compress, "lz4": lz4.frame.compress}
 
 Stored = Callable[[list[tuple[str, int]]], Sequence[int]]
 """From topics and log times of the source to the rows that are recorded, in the order in which they are stored."""
 
 
-def everything(messages: list[tuple[str, int]]) -> Sequence[int]:
+def everything(messages):
     return range(len(messages))
 
 
-def out_of_order(messages: list[tuple[str, int]]) -> Sequence[int]:
+def out_of_order(messages):
     return np.random.default_rng(6).permutation(len(messages)).tolist()
 
 
-def wall_times(count: int, begin: int) -> np.ndarray:
+def wall_times(count, begin):
     """Return when so many messages of a flight are received from ``begin`` on: in their order, and unevenly."""
     passed = np.cumsum(np.random.default_rng(5).integers(1_000, 4_000_000, count))
     return np.uint64(begin) + passed.astype(np.uint64)
@@ -44,22 +37,14 @@ NUMBERS = {"keep_last": 1, "reliable": 1, "transient_local": 1, "volatile": 2, "
 """Numbers that rosbag2 of Humble and Iron writes for the words of a quality of service."""
 
 
-def numbered(profiles: list[dict[str, object]]) -> list[dict[str, object]]:
+def numbered(profiles):
     """Return the profiles of a topic as Humble and Iron write them."""
     return [{key: NUMBERS.get(str(value), value) for key, value in profile.items()} for profile in profiles]
 
 
 def recorded(
-    source: Path,
-    target: Path,
-    *,
-    files: int = 1,
-    compressed: str = "",
-    chunks: CompressionType = CompressionType.NONE,
-    stored: Stored = everything,
-    begin: int | None = WALL_TIME,
-    qos: Callable[[list[dict[str, object]]], list[dict[str, object]]] = list,
-) -> Path:
+    source, target, *, files=1, compressed="", chunks=CompressionType.NONE, stored=everything, begin=WALL_TIME, qos=list
+):
     """Write ``source`` as ``ros2 bag record`` does: no attachments, no checksums, log time is the wall's.
 
     Args:
@@ -115,7 +100,7 @@ def recorded(
     return target
 
 
-def converted(source: Path, target: Path, mode: CompressionMode = CompressionMode.NONE) -> Path:
+def converted(source, target, mode=CompressionMode.NONE):
     """Convert a bag with the ``rosbags`` package, which keeps messages and nothing else."""
     writer = RosbagsWriter(target, version=9, storage_plugin=StoragePlugin.MCAP)
     writer.set_compression(mode, CompressionFormat.ZSTD)
@@ -126,7 +111,7 @@ def converted(source: Path, target: Path, mode: CompressionMode = CompressionMod
                 c.msgtype,
                 msgdef=c.msgdef.data,
                 rihs01=c.digest,
-                offered_qos_profiles=c.ext.offered_qos_profiles,  # type: ignore[union-attr]
+                offered_qos_profiles=c.ext.offered_qos_profiles,
             )
             for c in reader.connections
         }
@@ -135,5 +120,5 @@ def converted(source: Path, target: Path, mode: CompressionMode = CompressionMod
     return target
 
 
-def _information(bag: Path) -> dict:
+def _information(bag):
     return yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]

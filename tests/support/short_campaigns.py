@@ -1,15 +1,9 @@
 """Campaigns of short flights."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import pytest
 from node_processes import short_scenario
 
-from hsv.flight.campaign.campaign import Campaign, plan
+from hsv.flight.campaign.campaign import plan
 from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.store import ResultStore
@@ -17,16 +11,16 @@ from hsv.flight.campaign.summary import Results
 
 
 @pytest.fixture(scope="session")
-def short(tmp_path_factory: pytest.TempPathFactory) -> str:
+def short(tmp_path_factory):
     """Return the path of a scenario of 3 s with a fault at 2 s."""
     return str(short_scenario(tmp_path_factory.mktemp("scenario"), duration=3, fault=2))
 
 
 @pytest.fixture(scope="session")
-def planned(short: str) -> Callable[..., Campaign]:
+def planned(short):
     """Plan a campaign of short flights."""
 
-    def make(**settings: Any) -> Campaign:
+    def make(**settings):
         return plan(
             short,
             **{"samples": 44, "seed": 3, "factors": {"fault[0].start": ("1 s", "2.5 s")}, "commit": "test"} | settings,
@@ -36,7 +30,7 @@ def planned(short: str) -> Callable[..., Campaign]:
 
 
 @pytest.fixture(scope="session")
-def results(planned: Callable[..., Campaign], tmp_path_factory: pytest.TempPathFactory) -> Results:
+def results(planned, tmp_path_factory):
     """Return the results of a campaign that nothing disturbed."""
     out = tmp_path_factory.mktemp("campaign") / "short.parquet"
     run_campaign(planned(), ResultStore(out, planned()), Executor())
@@ -44,6 +38,6 @@ def results(planned: Callable[..., Campaign], tmp_path_factory: pytest.TempPathF
 
 
 @pytest.fixture
-def out(tmp_path: Path) -> Path:
+def out(tmp_path):
     """Return where results may go."""
     return tmp_path / "result.parquet"

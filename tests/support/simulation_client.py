@@ -1,10 +1,7 @@
 """A client of simulation_interfaces that knows nothing else of the bench: pauses, steps, resets; prints what it saw."""
 
-from __future__ import annotations
-
 import json
 import time
-from typing import Any
 
 import rclpy
 from hsv_msgs.msg import VehicleState
@@ -25,36 +22,36 @@ SERVICES = {
 rclpy.init()
 node = rclpy.create_node("simulation_client")
 clients = {kind: node.create_client(kind, name) for kind, name in SERVICES.items()}
-seen: list[VehicleState] = []
+seen = []
 node.create_subscription(VehicleState, "hsv/state", seen.append, qos_profile_sensor_data)
 
 
-def call(kind: Any, **fields: Any) -> Any:
+def call(kind, **fields):
     clients[kind].wait_for_service()
     future = clients[kind].call_async(kind.Request(**fields))
     rclpy.spin_until_future_complete(node, future)
     return future.result()
 
 
-def go(state: int) -> int:
+def go(state):
     return int(call(srv.SetSimulationState, state=SimulationState(state=state)).result.result)
 
 
-def paused_at() -> VehicleState:
+def paused_at():
     """Return the last state once the flight is paused and no further state arrives."""
     while call(srv.GetSimulationState).state.state != SimulationState.STATE_PAUSED or last_is_new():
         time.sleep(0.05)
     return seen[-1]
 
 
-def last_is_new() -> bool:
+def last_is_new():
     count, end = len(seen), time.monotonic() + 0.5
     while time.monotonic() < end:
         rclpy.spin_once(node, timeout_sec=0.05)
     return len(seen) != count or not seen
 
 
-told: dict[str, Any] = {"features": list(call(srv.GetSimulatorFeatures).features.features)}
+told = {"features": list(call(srv.GetSimulatorFeatures).features.features)}
 told["at first"] = call(srv.GetSimulationState).state.state
 told["pause while stopped"] = go(SimulationState.STATE_PAUSED)
 told["steps at first"] = call(srv.StepSimulation, steps=1000).result.result

@@ -1,28 +1,22 @@
 """Waiting as long as there is progress: on a busy machine everything may take any time, and still it goes on."""
 
-from __future__ import annotations
-
 import subprocess
 import time
-from collections.abc import Callable, Iterable
-from pathlib import Path
+from contextlib import suppress
 
-from hsv.graph.standstill import Standstill, processor_time
+import psutil
+
+from hsv.graph.standstill import Standstill
 
 QUIET = 60.0
 """Seconds without progress after which a test gives up."""
 
 _PAUSE = 0.1
 _LOOK = 1.0
-"""Seconds between two looks at the progress: all processes of the machine are looked through."""
+"""Seconds between two looks at the progress."""
 
 
-def wait_until(
-    done: Callable[[], object],
-    pids: Iterable[int] = (),
-    progress: Callable[[], object] = lambda: None,
-    pause: Callable[[float], object] = time.sleep,
-) -> None:
+def wait_until(done, pids=(), progress=lambda: None, pause=time.sleep):
     """Return when ``done`` returns something true.
 
     Args:
@@ -44,17 +38,16 @@ def wait_until(
         pause(_PAUSE)
 
 
-def output_of(popen: subprocess.Popen[str]) -> str:
+def output_of(popen):
     """Return what a process writes until it ends; while there is progress it may take its time."""
     said = ""
 
-    def ended() -> bool:
+    def ended():
         nonlocal said
-        try:
+        with suppress(subprocess.TimeoutExpired):
             said, _ = popen.communicate(timeout=_LOOK)
-        except subprocess.TimeoutExpired:
-            return False
-        return True
+            return True
+        return False
 
     try:
         wait_until(ended, [popen.pid], pause=lambda _: None)
@@ -64,32 +57,19 @@ def output_of(popen: subprocess.Popen[str]) -> str:
     return said
 
 
-def exit_code_of(popen: subprocess.Popen[str]) -> int:
+def exit_code_of(popen):
     """Return the exit code of a process once it has ended."""
     wait_until(lambda: popen.poll() is not None, [popen.pid])
     return int(popen.returncode)
 
 
-def used(pids: Iterable[int]) -> float:
+def used(pids):
     """Return the processor time (s) that these processes and all that they have started have used so far."""
-    below: dict[int, list[int]] = {}
-    for pid, parent in parents().items():
-        below.setdefault(parent, []).append(pid)
-    family, to_come = set[int](), list(pids)
-    while to_come:
-        pid = to_come.pop()
-        family.add(pid)
-        to_come += below.get(pid, [])
-    return sum(processor_time(pid) or 0.0 for pid in family)
-
-
-def parents() -> dict[int, int]:
-    """Return the parent of every process on this machine."""
-    found = {}
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            try:
-                found[int(entry.name)] = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
-            except (OSError, IndexError):
-                continue  # it has just ended
-    return found
+    seconds = 0.0
+    for pid in pids:
+        with suppress(psutil.Error):
+            process = psutil.Process(pid)
+            for each in (process, *process.children(recursive=True)):
+                with suppress(psutil.Error):  # it has just ended
+                    seconds += each.cpu_times().user + each.cpu_times().system
+    return seconds

@@ -1,7 +1,5 @@
 """The examples' regulators, which go wrong: ``python3 wrong_controller.py killed|hung|wrong_step|nan STEP``."""
 
-from __future__ import annotations
-
 import math
 import os
 import signal
@@ -28,7 +26,7 @@ class SlowLqr(Lqr):
         return super().step(inputs)
 
 
-def main(how: str, step: int) -> None:
+def main(how, step):
     """Fly, and go wrong."""
     rclpy.init()
     node = Regulator()

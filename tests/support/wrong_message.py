@@ -1,9 +1,6 @@
 """A node that disturbs a flight: ``python3 wrong_message.py HOW STEP``, with one of :data:`WRONG` from that step on."""
 
-from __future__ import annotations
-
 import sys
-from typing import Any
 
 import rclpy
 from hsv_msgs.msg import Actuator, ControlInput, Fault, FilteredState, Measurement, NominalState
@@ -11,7 +8,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 
 LOSS = {"channel": "elevator_deflection", "type": "loss_of_effectiveness"}
-WRONG: dict[str, tuple[str, Any]] = {
+WRONG = {
     "fault": ("hsv/actuator", Actuator(active=[Fault(channel="elevator_deflection", type="stuk")], since=[1])),
     "value": ("hsv/actuator", Actuator(active=[Fault(**LOSS, parameter_names=["effectiveness"])], since=[1])),
     "estimate": ("hsv/filtered_state", FilteredState(estimate=[1.0])),
@@ -23,15 +20,15 @@ WRONG: dict[str, tuple[str, Any]] = {
 """Topic and message; of the last two, as of no other, the end is missing."""
 
 
-def main(how: str, step: int) -> None:
+def main(how, step):
     """Send the message for every step from ``step`` on, as soon as that begins."""
     rclpy.init()
     node = rclpy.create_node("disturber")
     deep = QoSProfile(depth=256)
     topic, message = WRONG[how]
-    publishers: list[Any] = []
+    publishers = []
 
-    def disturb(measured: Measurement) -> None:
+    def disturb(measured):
         if not publishers:  # in flight: before it, two that publish the command are refused
             publishers.append(node.create_publisher(type(message), topic, deep))
         if measured.step >= step:

@@ -78,13 +78,6 @@ def test_a_checkout_that_is_not_set_up_says_so(name, tmp_path):
     assert result.stderr.count("\n") == 1
 
 
-def test_the_wrong_shell_is_told():
-    result = shell("sh", f". '{ROOT}/env.sh'")
-    if Path("/bin/sh").resolve().name != "bash":
-        assert result.returncode != 0
-        assert "bash or zsh" in result.stderr
-
-
 @pytest.mark.parametrize("name", SHELLS)
 def test_an_interactive_shell_completes_the_words_of_the_command(name):
     asked = "complete -p hsv" if name == "bash" else "echo $_comps[hsv]"

@@ -1,7 +1,5 @@
 """The documentation's generated reference has every command, message and package."""
 
-from __future__ import annotations
-
 import pkgutil
 import re
 from pathlib import Path
@@ -10,7 +8,6 @@ from typer.main import get_command
 
 import hsv
 import reference_pages
-import repository_pages
 from hsv.cli.entry import COMMANDS
 from hsv.cli.main import application
 
@@ -34,12 +31,6 @@ def test_every_command_has_a_section_with_all_its_options():
     assert "...\n" not in re.sub(r"^\$ .*", "", page, flags=re.MULTILINE)
 
 
-def test_every_message_and_service_is_there_as_it_is_defined():
-    page = reference_pages.messages()
-    for file in (*ROOT.glob("ros_ws/src/hsv_msgs/msg/*.msg"), *ROOT.glob("ros_ws/src/hsv_msgs/srv/*.srv")):
-        assert f"### {file.stem}\n\n```text\n{file.read_text(encoding='utf-8')}```\n" in page
-
-
 def test_every_package_and_module_of_the_library_is_on_its_page():
     page = (ROOT / "docs" / "reference" / "modules.md").read_text(encoding="utf-8")
     listed = re.findall(r"^   (hsv\.\w+)$", page, re.MULTILINE)
@@ -48,17 +39,3 @@ def test_every_package_and_module_of_the_library_is_on_its_page():
     assert {*listed} == there and len(listed) == len(there)
     assert "hsv.design.sets.invariant_set" in reference_pages.modules_of("hsv.design")
     assert reference_pages.modules_of("hsv.base.units") == []
-
-
-def test_links_of_pages_lead_to_pages():
-    files = repository_pages.included()
-    readme = repository_pages.text_of("readme", (ROOT / "docs" / "readme.md").read_text(), files)
-    assert "](errata.md)" in readme and "](contributing.md)" in readme
-    example = repository_pages.text_of("examples/lqr", (ROOT / "docs" / "examples" / "lqr.md").read_text(), files)
-    assert "](../python.md)" in example and "](../../examples/lqr/hsv_lqr/__init__.py)" in example
-    own = repository_pages.text_of(
-        "tutorial/a", "[one](../../README.md#topics) [two](https://x.org) [three](b.md)", files
-    )
-    assert own == "[one](../readme.md#topics) [two](https://x.org) [three](b.md)"
-    folders = repository_pages.text_of("a", "[`core`](../src/hsv/hsv/core), [lqr](../examples/lqr)", files)
-    assert folders == "`core`, [lqr](examples/lqr.md)"

@@ -1,7 +1,5 @@
 """The version of a release: all files, or none."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path
@@ -16,13 +14,13 @@ from release import released
 ROOT = Path(__file__).parents[2]
 
 
-def manifests(root: Path) -> list[Path]:
+def manifests(root):
     """Return the manifest of every package of a checkout."""
     return sorted([*root.glob("src/*/package.xml"), *root.glob("ros_ws/src/hsv_*/package.xml")])
 
 
 @pytest.fixture
-def checkout(tmp_path: Path) -> Path:
+def checkout(tmp_path):
     """A copy of the files that a release changes, with something in every changelog to release."""
     for manifest in manifests(ROOT):
         folder = tmp_path / manifest.parent.relative_to(ROOT)
@@ -40,7 +38,7 @@ def checkout(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_every_file_has_the_version_afterwards(checkout: Path) -> None:
+def test_every_file_has_the_version_afterwards(checkout):
     for path, text in released(checkout, "90.1.2", "2030-04-05").items():
         path.write_text(text, encoding="utf-8")
     for manifest in manifests(checkout):
@@ -54,13 +52,13 @@ def test_every_file_has_the_version_afterwards(checkout: Path) -> None:
 
 
 @pytest.mark.parametrize("version", ["1.2", "v1.2.3", "0.0.1", ""])
-def test_a_version_that_is_none_or_not_above_is_refused(checkout: Path, version: str) -> None:
+def test_a_version_that_is_none_or_not_above_is_refused(checkout, version):
     with pytest.raises(ValueError, match=r"^version = "):
         released(checkout, version, "2030-04-05")
 
 
 @pytest.mark.parametrize("name", ["CHANGELOG.md", "src/hsv/CHANGELOG.rst", "CITATION.cff"])
-def test_a_file_with_nothing_to_release_is_named(checkout: Path, name: str) -> None:
+def test_a_file_with_nothing_to_release_is_named(checkout, name):
     (checkout / name).write_text("empty\n", encoding="utf-8")
     with pytest.raises(ValueError, match=re.escape(str(checkout / name))):
         released(checkout, "90.1.2", "2030-04-05")

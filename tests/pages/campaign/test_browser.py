@@ -40,11 +40,6 @@ def ends(browser, name, axis):
     return browser.run("return document.getElementById(arguments[0])._fullLayout[arguments[1]].range", name, axis)
 
 
-def test_every_plot_is_drawn(opened):
-    drawn = "return [...document.querySelectorAll('.plot')].every((plot) => plot.querySelector('.main-svg'))"
-    assert opened.run(drawn)
-
-
 def test_units_are_switched_in_text_and_plots(opened, results):
     seconds = ends(opened, "plot-scatter_fault[0].start", "xaxis")
     for name in ("plot-envelope_altitude_error", "plot-histogram_altitude_end_error"):

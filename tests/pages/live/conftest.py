@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from recorded_flight import message_types, record_flight
 
 from hsv.bags.description import TOPICS, resolved
-from hsv.bags.reader import Bag
 from hsv.pages.layouts import foxglove_layout
 from hsv.pages.live.hub import Hub
 from hsv.pages.live.server import PageServer
@@ -20,13 +17,13 @@ Message = tuple[str, int, bytes]
 
 
 @pytest.fixture(scope="session")
-def bag(tmp_path_factory: pytest.TempPathFactory) -> Bag:
+def bag(tmp_path_factory):
     """Four seconds of Case 1 whose fault begins at two."""
     return record_flight(tmp_path_factory.mktemp("bags") / "flown", duration=4.0, fault=2.0)
 
 
 @pytest.fixture(scope="session")
-def messages(bag: Bag) -> list[Message]:
+def messages(bag):
     """All step messages in the order in which a step is recorded."""
     by_time: dict[int, list[Message]] = {}
     for topic in TOPICS:
@@ -36,20 +33,20 @@ def messages(bag: Bag) -> list[Message]:
 
 
 @pytest.fixture(scope="session")
-def decode() -> Callable[[str, bytes], Any]:
+def decode():
     types = message_types()
     return lambda topic, data: types.deserialize_cdr(data, TOPICS[topic])
 
 
 @pytest.fixture
-def hub(decode: Callable[[str, bytes], Any]) -> Hub:
+def hub(decode):
     hub = Hub(decode, {"title": "a flight", "bag": str(Path("bags", "flown"))})
     hub.start_run("1f" * 16, 0.02, 200)
     return hub
 
 
 @pytest.fixture
-def server(hub: Hub) -> Iterator[PageServer]:
+def server(hub):
     server = PageServer(0, hub, foxglove_layout(resolved))
     yield server
     server.close()

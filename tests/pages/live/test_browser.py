@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from live_clients import FoxgloveClient, addresses, assert_without_gap
+from live_clients import addresses
 from node_processes import Processes, recorded_steps, short_scenario
 from page_checks import PageChecks
 from ros_domain import own_environment
@@ -123,15 +123,6 @@ class TestPage(PageChecks):
     """As all pages."""
 
 
-def test_without_the_token_it_shows_and_asks_nothing(browser, endless):
-    flight, page = endless
-    look(browser, flight, page.partition("#")[0])
-    assert browser.run("return document.querySelector('fieldset.flight').disabled")
-    assert "token" in browser.run("return document.getElementById('answer').textContent")
-    browser.run("live.ask('pause', { paused: 'true' })")
-    assert_refused(browser, flight)
-
-
 @pytest.mark.parametrize("button", ["pause", "set_pace", "set_tau", "inject", "clear"])
 def test_with_another_token_every_button_is_answered_with_a_reason(browser, endless, button):
     flight, page = endless
@@ -150,12 +141,3 @@ def assert_refused(browser, flight):
     status = browser.run("return live.status")
     assert not status["settings"]["paused"] and status["settings"]["real_time_factor"] == 1
     assert [fault["channel"] for fault in status["faults"]] == ["elevator_deflection"]
-
-
-@pytest.mark.long
-def test_two_hundred_seconds_at_real_time_pace_lack_nothing(processes, tmp_path):
-    flight, _, port = fly(processes, "case1", "--bag", tmp_path / "bag", "--no-report")
-    client = FoxgloveClient(port)
-    wait_until(lambda: flight.poll() is not None, [flight.pid])
-    client.wait()
-    assert_without_gap(client, Bag(tmp_path / "bag"))

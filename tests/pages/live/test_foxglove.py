@@ -55,10 +55,3 @@ def test_a_latched_topic_is_sent_to_a_client_that_comes_late_and_to_no_other(ser
     for client in clients:
         wait_until(lambda client=client: client.messages["/hsv/actuator"][-1][0] == 4)
         assert client.messages["/hsv/actuator"] == [*sent, (4, b"three")]
-
-
-def test_a_new_run_begins_a_new_session(server):
-    client = FoxgloveClient(server.port)
-    server.start_run()
-    wait_until(lambda: len(client.sessions) == 2)
-    assert client.sessions[0] != client.sessions[1]

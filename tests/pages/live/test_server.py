@@ -107,33 +107,3 @@ def test_whoever_comes_late_gets_all_and_then_what_is_new(hub, server, messages)
     assert rows(late, hub, 201)[:100].tolist() == first.tolist()
     assert rows(early, hub, 201).tolist() == late.times(len(LIVE_CURVES)).tolist()
     assert late.status["title"] == "a flight" and late.status["run"]["last_step"] == 200
-
-
-def test_a_new_run_is_shown_alone(hub, server, messages):
-    client = PageClient(server.url)
-    fly(hub, server, messages)
-    rows(client, hub, 201)
-    hub.start_run("2e" * 16, 0.02, 200)
-    fly(hub, server, messages[: 10 * A_STEP])
-    while client.status["run"]["id"] != "2e" * 16 or len(client.data) > 10 * 4 * (1 + len(LIVE_CURVES)):
-        assert client.read()
-    rows(client, hub, 10)
-
-
-@pytest.mark.long
-def test_who_never_reads_holds_nobody_up(hub, server, messages):
-    idle = [PageClient(server.url) for _ in range(2)]
-    client = PageClient(server.url)
-    for _ in range(20):
-        # Far more than the system keeps for them.
-        hub.start_run("2e" * 16, 0.02, 200)
-        hub.update(limits={"padding": ["x" * 100_000]})
-        fly(hub, server, messages)
-    while client.status.get("limits") != {"padding": ["x" * 100_000]} or len(client.data) < 201 * 4:
-        assert client.read()
-    for left in idle:
-        left.leave()
-    hub.end(1, 200)
-    server.publish()
-    while client.status["ending"] is None:
-        assert client.read()

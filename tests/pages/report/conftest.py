@@ -1,30 +1,25 @@
 """Flights recorded in this process."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from recorded_flight import record_flight
 
-from hsv.bags.reader import Bag
 from hsv.flight.assembly import flight_parameters
 from hsv.flight.scenario import load_scenario
 
 
 @pytest.fixture(scope="session")
-def bags(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bags(tmp_path_factory):
     return tmp_path_factory.mktemp("bags")
 
 
 @pytest.fixture(scope="session")
-def quiet(bags: Path) -> Bag:
+def quiet(bags):
     """A flight in which nothing happens but the fault."""
     return record_flight(bags / "quiet")
 
 
 @pytest.fixture(scope="session")
-def loud(bags: Path, quiet: Bag) -> Bag:
+def loud(bags, quiet):
     """Less fuel than wanted and too narrow a set: commands are limited, the tube is left, warnings are given."""
     design = flight_parameters(load_scenario("case1"))
     level = quiet.columns("/hsv/tube_status")["level"]

@@ -82,38 +82,6 @@ def test_plots_hold_what_the_bags_hold(opened, flights, units):
                 np.testing.assert_allclose(seen["x"], SAMPLES * 0.02, rtol=1e-6)
 
 
-def test_the_tube_is_drawn_around_the_error(opened, flights):
-    opened.click("[name=units][value=si]")
-    status = flights[1].columns("/hsv/tube_status")
-    curves = drawn(opened, error_panel(2))
-    for sign, label in ((1.0, "c + z"), (-1.0, "c − z")):
-        edge = status["tube_centre"][0, 2] + sign * status["tube_half_width"][0, 2]
-        np.testing.assert_allclose(curves[f"case1 (loud), {label}"]["y"], edge, rtol=1e-6)
-
-
-def test_units_change_titles_and_tables_too(opened):
-    def visible(css_class):
-        return opened.run(
-            "return [...document.querySelectorAll(arguments[0])].filter((e) => e.getClientRects().length).length",
-            f"figcaption .{css_class}, #metrics .{css_class}",
-        )
-
-    assert visible("metric") and not visible("si:not(.metric)")
-    for units in ("paper", "si"):
-        opened.click(f"[name=units][value={units}]")
-        assert visible(units) and not visible(f"metric:not(.{units})")
-
-
-def test_runs_and_kinds_of_curves_are_switched(opened):
-    altitude = PANELS[0]
-    every = set(drawn(opened, altitude))
-    opened.click("[name=run][value='1']")
-    one = set(drawn(opened, altitude))
-    assert one == {name for name in every if "loud" not in name} and one < every
-    opened.click("[name=kind][value=nominal]")
-    assert set(drawn(opened, altitude)) == {name for name in one if "nominal" not in name}
-
-
 def test_zooming_one_plot_zooms_all(opened):
     assert x_ranges(opened) == {(0.0, 20.0)}
     opened.run("Plotly.relayout('plot-altitude', {'xaxis.range[0]': 7.5, 'xaxis.range[1]': 9})")
@@ -121,18 +89,9 @@ def test_zooming_one_plot_zooms_all(opened):
     assert x_ranges(opened) == {(7.5, 9.0)}
     assert opened.run(
         "return [document.querySelector('[name=from]').value, document.querySelector('[name=to]').value]"
-    ) == [
-        "7.5",
-        "9",
-    ]
+    ) == ["7.5", "9"]
     opened.click("[name=all]")
     assert x_ranges(opened) == {(0.0, 20.0)}
-
-
-def test_the_time_window_can_be_typed(opened):
-    opened.driver.find_element("css selector", "[name=from]").send_keys("8\t")
-    opened.settle()
-    assert x_ranges(opened) == {(8.0, 20.0)}
 
 
 def state(browser):
@@ -177,24 +136,6 @@ def test_the_address_says_what_is_shown_and_shows_it(opened, page):
     assert "from=" not in opened.driver.current_url
 
 
-def test_an_address_that_says_nonsense_shows_the_page(browser, page):
-    browser.driver.get("about:blank")
-    browser.driver.get(f"{page.as_uri()}#nowhere&units=cubits&from=x&other=1")
-    browser.settle()
-    assert browser.run("return document.documentElement.dataset.units") == "metric"
-    assert x_ranges(browser) == {(0.0, 20.0)} and browser.console() == []
-
-
-def test_differences_are_those_of_the_bags_and_follow_the_units(opened, flights):
-    opened.click("[name=units][value=paper]")
-    first, second = (bag.columns("/hsv/state")["altitude"][SAMPLES] for bag in flights)
-    (curve,) = opened.run(
-        "return document.getElementById('plot-difference_altitude').data.map((d) => arguments[0].map((i) => d.y[i]))",
-        SAMPLES.tolist(),
-    )
-    np.testing.assert_allclose(curve, (second - first) / 0.3048, rtol=2e-7, atol=1e-12)
-
-
 def test_the_keyboard_reaches_everything(opened):
     reached = """
         const all = "a[href], button, input, select, summary, [tabindex]";
@@ -236,27 +177,16 @@ def test_faults_limits_and_excursions_are_shaded(opened):
 
 
 @pytest.mark.parametrize("scenarios", [["case1"], ["case1", "case1_no_notch", "case1_derived"]], ids=len)
-def test_whole_flights_make_a_small_page_and_its_time_is_told(
-    browser, bags, screen, tmp_path, pictures, record_property, capsys, scenarios
-):
+def test_whole_flights_make_a_small_page(browser, bags, screen, tmp_path, pictures, capsys, scenarios):
     flown = [record_flight(bags / f"{len(scenarios)}_{name}", name, 200.0, 100.0) for name in scenarios]
     page = tmp_path / "whole.html"
     screen(1280)
     write_report(flown, page)
+    seconds = browser.open(page)
+    painted = browser.run("return performance.getEntriesByName('first-contentful-paint')[0].startTime / 1000")
     size = page.stat().st_size / MEGABYTE
-    # The best of three: what else the machine does is not the page's doing.
-    first = "return performance.getEntriesByName('first-contentful-paint')[0].startTime / 1000"
-    times = [(browser.open(page), browser.run(first)) for _ in range(3)]
-    seconds, painted = map(min, zip(*times, strict=True))
-    record_property("page_megabytes", size)
-    record_property("page_first_picture_seconds", painted)
-    record_property("page_open_seconds", seconds)
     with capsys.disabled():
-        print(
-            f"\nreport of {len(flown)} flights: {size:.2f} MB, first picture after {painted:.2f} s, "
-            f"all plots drawn after {seconds:.2f} s"
-        )
-    assert browser.console() == []
-    assert size < 5.0
+        print(f"\n{len(flown)} flights: {size:.2f} MB, first picture {painted:.2f} s, all drawn {seconds:.2f} s")
+    assert browser.console() == [] and size < 5.0
     if len(flown) == 3:
         browser.picture(pictures / "report.png")

@@ -1,6 +1,3 @@
-import pytest
-from recorded_flight import record_flight
-
 from hsv.bags.info import describe
 from hsv.pages.events import Event, flight_events
 
@@ -36,15 +33,3 @@ def test_leaving_the_tube_is_an_event(loud):
 def test_what_log_and_diagnostics_both_say_is_one_event_and_repetition_is_joined(loud):
     assert of_kind(loud, "warning") == [Event(3.0, 4.0, "warning", "tube_mpc: <b>unusual</b>", "tube_mpc")]
     assert of_kind(loud, "error") == [Event(9.0, 9.0, "error", "tube_mpc: worse", "tube_mpc")]
-
-
-def test_events_are_in_the_order_of_time(loud):
-    starts = [event.start for event in flight_events(loud, describe(loud))]
-    assert starts == sorted(starts) and len(starts) >= 4
-
-
-@pytest.mark.long
-def test_a_lost_flight_is_an_error_event(tmp_path):
-    bag = record_flight(tmp_path / "lost", "case1_derived_no_notch", duration=200.0, fault=100.0)
-    (event,) = of_kind(bag, "error")
-    assert "diverged" in event.text and event.start == bag.columns("/hsv/state")["header.stamp"][-1] * 1e-9

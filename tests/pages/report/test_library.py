@@ -15,10 +15,6 @@ def test_it_has_the_version_of_the_npm_package():
     assert f"plotly.js (basic - minified) v{version}\n" in LIBRARY.read_text(encoding="utf-8")[:200]
 
 
-def test_its_licence_is_next_to_it():
-    assert "MIT License" in LIBRARY.parent.joinpath("LICENSE").read_text(encoding="utf-8")
-
-
 @pytest.mark.viewer
 def test_it_is_the_file_of_npm():
     published = NPM / "node_modules" / PACKAGE

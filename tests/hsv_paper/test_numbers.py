@@ -1,0 +1,50 @@
+"""Numbers that claims rest on: sets, levels, disturbances and the peaks of the modes."""
+
+import numpy as np
+import pytest
+
+from hsv.control.checks import load_subject
+from hsv.control.design import find_design
+from hsv.control.notch_filter import NotchSection
+from hsv_paper.box import infeasibility
+from hsv_paper.claims.numbers import kept_of_level, largest_disturbances
+from hsv_paper.designs import certificate
+from hsv_paper.modes import peak_falls
+
+
+def test_no_box_exists_for_the_baseline():
+    subject = load_subject(find_design("baseline"))
+    polytope, delta = subject.design.polytope, subject.stated("tube.disturbance.boxes.delta")
+    closed = polytope.A + polytope.B @ subject.design.feedback_gain
+    proof = infeasibility(closed, 0.5 * np.subtract(delta["upper"], delta["lower"]))
+    assert proof.multipliers.min() >= 0.0 and proof.gain > 0.0
+    assert proof.column <= 1e-9
+    assert proof.radius == pytest.approx(1.296, abs=1e-3)
+    # Where absolute values contract nothing is proved.
+    assert infeasibility(np.array([[[0.5, 0.2], [-0.1, 0.6]]]), np.ones(2)).column > 0.1
+
+
+def test_what_loses_a_step_s_share_of_its_level_decreases():
+    A = np.array([[[0.5, 0.0], [0.0, 0.5]], [[0.0, 0.9], [0.0, 0.0]]])
+    B = np.zeros((2, 2, 1))
+    assert kept_of_level(A, B, np.zeros((1, 2)), np.eye(2)) == pytest.approx(0.81)
+    # The same map seen in another metric grows: a shape decides, not the poles alone.
+    assert kept_of_level(A, B, np.zeros((1, 2)), np.diag([4.0, 1.0])) > 1.0
+
+
+def test_disturbances_of_a_flight_lie_in_the_set_that_was_certified():
+    bounds = certificate("baseline")["tube"]["disturbance"]["channels"]
+    found = largest_disturbances("case1", [{}, {"mass": 0.1, "moment_of_inertia": -0.1}])
+    assert found.keys() == bounds.keys()
+    for name, values in found.items():
+        assert np.all(values <= max(-bounds[name]["lower"], bounds[name]["upper"]))
+
+
+def test_the_fall_is_from_peak_to_peak_though_the_peak_moves():
+    falls = peak_falls([NotchSection(15.0, 0.02, 15.0, 0.5)])
+    first, second = falls["first"], falls["second"]
+    assert (first.before.frequency, first.after.frequency) == pytest.approx((15.64, 15.86), abs=0.01)
+    assert (first.decibel, second.decibel) == pytest.approx((19.4, 6.7), abs=0.05)
+    assert (first.natural_frequency, second.natural_frequency) == pytest.approx((15.89, 19.47), abs=0.01)
+    derived = peak_falls([], "derived")
+    assert [derived[mode].before.frequency for mode in ("first", "second")] == pytest.approx([13.7, 18.8], abs=0.05)
