@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,23 +45,12 @@ MOST_WORKERS = 8
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Return how many processes test (``-n auto``): one for every core that nothing else uses, and one at least.
+    """Return how many processes test (``-n auto``): one for every core, and half as many again for graphs.
 
-    Half as many again test graphs, whose nodes start one after the other and wait for one another.
+    The nodes of a graph start one after the other and wait for one another.
     """
-    cores = len(os.sched_getaffinity(0))
-    free = max(1, min(cores - _running(), MOST_WORKERS))
-    return free + free // 2 if config.getoption("markexpr").startswith("graph") else free
-
-
-def _running() -> int:
-    """Return how many other threads want a core, over a second: averages of minutes still know the set-up."""
-    looks = 20
-    others = 0
-    for _ in range(looks):
-        time.sleep(1.0 / looks)
-        others += int(Path("/proc/loadavg").read_text().split()[3].partition("/")[0]) - 1
-    return round(others / looks)
+    cores = min(len(os.sched_getaffinity(0)), MOST_WORKERS)
+    return cores + cores // 2 if config.getoption("markexpr").startswith("graph") else cores
 
 
 @pytest.fixture(scope="session")
