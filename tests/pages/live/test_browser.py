@@ -123,6 +123,14 @@ class TestPage(PageChecks):
     """As all pages."""
 
 
+def test_on_a_phone_controls_are_below_the_flight_and_inject_is_apart_from_pause(browser, endless, screen):
+    screen(390)
+    look(browser, *endless)
+    edges = "return arguments[0].map((each) => document.querySelector(each).getBoundingClientRect())"
+    flight, pause, inject = browser.run(edges, [".side-view", "[name=pause]", "[name=inject]"])
+    assert flight["bottom"] < pause["top"] and pause["bottom"] + 2 * pause["height"] < inject["top"]
+
+
 @pytest.mark.parametrize("button", ["pause", "set_pace", "set_tau", "inject", "clear"])
 def test_with_another_token_every_button_is_answered_with_a_reason(browser, endless, button):
     flight, page = endless
