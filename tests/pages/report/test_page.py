@@ -100,6 +100,15 @@ def test_it_opens_with_the_verdict_and_a_picture_before_any_table(page, quiet):
     assert f"the error stayed in the invariant set, largest level {level:.3g}." in said
 
 
+def test_a_rigid_vehicle_has_a_tube_and_no_elastic_modes(bags):
+    from recorded_flight import record_flight
+
+    bag = record_flight(bags / "rigid", "winged_cone", duration=2.0, fault=1.0)
+    page = report_page(reported_runs([bag]))
+    assert "inside throughout" in words(page) and 'id="plot-level"' in page
+    assert 'id="elastic"' not in page and 'id="vehicle" class="rigid"' in page
+
+
 @pytest.mark.long
 def test_without_attachments_there_is_a_page_but_no_verdict(quiet, tmp_path):
     writer = BagWriter(tmp_path / "bare", quiet.topics.values())

@@ -13,8 +13,9 @@ static inline real winged_cone_sound(real altitude, const Vehicle *p)
     return (p->sound_speed_curvature * altitude + p->sound_speed_slope) * altitude + p->sound_speed_zero;
 }
 
-static inline Forces winged_cone_forces(real altitude, real velocity, real alpha, real rate, const real *u,
-                                        const Vehicle *p)
+/* A function of its own: inlined, it would take registers from Parker's equations. */
+static __attribute__((noinline)) Forces winged_cone_forces(real altitude, real velocity, real alpha, real rate,
+                                                           const real *u, const Vehicle *p)
 {
     const real fuel = u[FUEL], elevator = u[ELEVATOR];
     const real density =

@@ -179,6 +179,8 @@ class Flight {
       // A custom controller has no tube, and a design may have no set.
       panel.element.closest("figure").hidden = this.count > 0 && !panel.curves.some((curve) => charts.arrays[curve.y].some(Number.isFinite));
     }
+    const elastic = charts.panels.filter((panel) => panel.name.startsWith("elastic")).flatMap((panel) => panel.curves);
+    document.body.classList.toggle("rigid", this.count > 0 && !elastic.some((curve) => charts.arrays[curve.y].some(Boolean)));
     charts.show();
     this.vehicle.draw();
     const curve = charts.panels.find((panel) => panel.name === "level").curves[0], level = charts.arrays[curve.y].at(-1);
