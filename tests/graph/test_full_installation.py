@@ -29,14 +29,12 @@ pytestmark = pytest.mark.full_ros
 LAUNCH = ("ros2", "launch", "hsv_bringup", "sil.launch.py")
 PAGE = "docs/installation.md"
 REFERENCE = ROOT / "bags" / "reference" / "case1"
-FORMS: dict[str, dict[str, Any]] = {
-    "converted": {},
-    "split": {"max_bagfile_size": 300_000},
-    "zstd by file": {"compression_mode": "file", "compression_format": "zstd"},
+COMPRESSED: dict[str, dict[str, Any]] = {
+    "file": {"compression_mode": "file"},
     # With a shorter queue rosbag2 drops what it cannot compress in time.
-    "zstd by message": {"compression_mode": "message", "compression_format": "zstd", "compression_queue_size": 0},
+    "message": {"compression_mode": "message", "compression_queue_size": 0},
 }
-"""What ros2 bag convert makes of a bag."""
+"""What ros2 bag convert compresses: settings by mode."""
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -171,7 +169,7 @@ def generate_launch_description():
     )
     return LaunchDescription([
         DeclareLaunchArgument("flight", description="what to fly"),
-        ExecuteProcess(cmd=["sleep", "20"]),  # longer than hsv prepare takes
+        ExecuteProcess(cmd=["sleep", "3600"]),  # until launch ends it
         TimerAction(period=1.0, actions=[sil]),
     ])
 """
@@ -229,7 +227,7 @@ def test_a_bag_of_ros2_bag_record_gives_the_metrics_of_the_flights_own(
 
 def test_a_recorded_bag_is_converted_and_indexed_anew(shared_processes: Processes, recorded: tuple[Path, Path]) -> None:
     folder, expected = shared_processes.folder, told(shared_processes, "info", recorded[1])
-    options = {"uri": "bags/converted", "storage_id": "mcap", "all_topics": True, **FORMS["split"]}
+    options = {"uri": "bags/converted", "storage_id": "mcap", "all_topics": True, "max_bagfile_size": 300_000}
     (folder / "convert.yaml").write_text(yaml.safe_dump({"output_bags": [options]}))
     for beginning, bag in (("ros2 bag convert -i", "converted"), ("ros2 bag reindex", "recorded")):
         done = shared_processes.run("bash", "-c", the_printed(PAGE, beginning))
@@ -285,17 +283,20 @@ def test_faults_and_factors_come_and_go_in_flight(processes: Processes) -> None:
 
 @pytest.mark.skipif("rclcpp" not in prefixes(), reason="the installation has no rclcpp")
 def test_the_controller_in_cpp_flies_as_the_one_in_python(processes: Processes) -> None:
-    shutil.copytree(ROOT / "examples" / "cpp_node", processes.folder / "cpp_node")
-    built = processes.run("bash", "-c", "cd cpp_node && python3 -m colcon build")
-    assert built.returncode == 0 and "warning" not in built.stdout, built.stdout
-    executable = processes.folder / "cpp_node" / "install" / "hsv_example_cpp" / "lib" / "hsv_example_cpp" / "regulator"
-    node = processes.start(executable)
-    scenario = short_scenario(processes.folder)
-    done = processes.run("hsv", "run", scenario, "--external", "--bag", "external", "--no-report")
-    assert done.returncode == 0 and node.poll() is None, done.stdout
-    finish(node)
-    command = Bag(processes.folder / "external").columns("/hsv/command")
-    assert len(command["step"]) == 251 and np.isfinite(command["elevator_deflection"]).all()
+    scenario, commands = short_scenario(processes.folder), []
+    for example, package in (("cpp_node", "hsv_example_cpp"), ("node", "hsv_example_node")):
+        shutil.copytree(ROOT / "examples" / example, processes.folder / example)
+        built = processes.run("bash", "-c", f"cd {example} && python3 -m colcon build")
+        assert built.returncode == 0 and (example == "node" or "warning" not in built.stdout), built.stdout
+        start = f"source {example}/install/local_setup.bash; exec {example}/install/{package}/lib/{package}/regulator"
+        node = processes.start("bash", "-c", start)
+        done = processes.run("hsv", "run", scenario, "--external", "--bag", f"by_{example}", "--no-report")
+        assert done.returncode == 0 and node.poll() is None, done.stdout
+        finish(node)
+        columns = Bag(processes.folder / f"by_{example}").columns("/hsv/command")
+        commands.append([columns[name] for name in ("step", "fuel_equivalence_ratio", "elevator_deflection")])
+    assert len(commands[0][0]) == 251
+    np.testing.assert_allclose(*commands, rtol=1e-9)
 
 
 EXAMPLE = re.compile(r"```python\n(.*?)```", re.DOTALL)
@@ -312,30 +313,19 @@ def test_two_vehicles_fly_in_one_domain_as_the_page_shows(processes: Processes) 
         assert told_of_it["as_published"] is True and told_of_it["custom_data"]["scenario"] == scenario
 
 
-@pytest.fixture(scope="module", params=[*FORMS, "reindexed"])
-def form(request: pytest.FixtureRequest, shared_processes: Processes) -> Path:
-    """Return the reference bag in a form that the tools of rosbag2 have given it."""
-    path = shared_processes.folder / request.param.replace(" ", "_")
-    if request.param == "reindexed":
-        path.mkdir()
-        (path / "case1_0.mcap").write_bytes((REFERENCE / "case1_0.mcap").read_bytes())
-        done = shared_processes.run("ros2", "bag", "reindex", path, "-s", "mcap")
-    else:
-        options = {"uri": str(path), "storage_id": "mcap", "all_topics": True, **FORMS[request.param]}
-        file = path.with_suffix(".yaml")
-        file.write_text(yaml.safe_dump({"output_bags": [options]}))
-        done = shared_processes.run("ros2", "bag", "convert", "-i", REFERENCE, "-o", file)
+@pytest.mark.parametrize("mode", COMPRESSED)
+def test_a_compressed_bag_gives_what_the_bag_gives(processes: Processes, mode: str) -> None:
+    options = {"uri": "made", "storage_id": "mcap", "all_topics": True, "compression_format": "zstd"}
+    settings = {"output_bags": [options | COMPRESSED[mode]]}
+    (processes.folder / "convert.yaml").write_text(yaml.safe_dump(settings))
+    done = processes.run("ros2", "bag", "convert", "-i", REFERENCE, "-o", "convert.yaml")
     assert done.returncode == 0, done.stdout
-    return path
-
-
-def test_what_rosbag2_makes_of_a_bag_gives_what_the_bag_gives(shared_processes: Processes, form: Path) -> None:
-    theirs, ours = told(shared_processes, "info", form), told(shared_processes, "info", REFERENCE)
-    lost = [] if form.name == "reindexed" else ["attachments", "custom_data"]
+    theirs, ours = told(processes, "info", "made"), told(processes, "info", REFERENCE)
+    lost = ["attachments", "custom_data"]
     for name in lost:
         assert ours[name] and not theirs[name]  # convert keeps neither, nor what they tell
-    for name in ("path", "folder", *lost, *(("as_published", "not_covered") if lost else ())):
+    for name in ("path", "folder", *lost, "as_published", "not_covered"):
         del theirs[name], ours[name]
     assert theirs == ours
     # Tables and pages of all forms: tests/cli/test_rosbag2_bags.py.
-    assert shared_processes.run("hsv", "diff", form, REFERENCE).stdout.endswith("identical\n")
+    assert processes.run("hsv", "diff", "made", REFERENCE).stdout.endswith("identical\n")
