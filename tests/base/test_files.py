@@ -10,19 +10,13 @@ import pytest
 from hsv.base.errors import DesignError, DocumentError, ScenarioError
 from hsv.base.files import MAX_BYTES, MAX_LEVELS, parse_json, parse_toml, parse_yaml, read_bytes, read_text
 from hsv.design.inputs import find_inputs, read_inputs
-from hsv.flight.scenario import load_scenario, parse_scenario, scenario_text
+from hsv.flight.scenario import load_scenario
 
 
-def test_a_text_is_read_whole(tmp_path):
-    path = tmp_path / "text"
-    path.write_bytes("Ünits\r\nμ\n".encode())
-    assert read_text(path) == "Ünits\nμ\n"
-
-
-def test_a_byte_order_mark_and_the_line_ends_of_windows_are_no_part_of_a_text(tmp_path):
+def test_a_text_is_read_without_its_byte_order_mark_and_the_line_ends_of_windows(tmp_path):
     path = tmp_path / "case.toml"
-    path.write_bytes(b"\xef\xbb\xbfextends = 'case1'\r\nduration = '6 s'\r\n")
-    assert parse_toml(read_text(path)) == {"extends": "case1", "duration": "6 s"}
+    path.write_bytes("\ufeffextends = 'Ünits'\r\nduration = '6 s'\r\n".encode())
+    assert read_text(path) == "extends = 'Ünits'\nduration = '6 s'\n"
 
 
 def test_numbers_of_yaml_are_those_of_ros():
@@ -58,16 +52,11 @@ def test_what_cannot_be_read_says_why(tmp_path, name, content, why):
 @pytest.mark.parametrize(
     ("parse", "opening", "closing"),
     [
-        (parse_toml, "a = " + "[" * 1200, "]" * 1200),
-        (parse_toml, "a = " + "{b = " * 1200, "1" + "}" * 1200),
-        (parse_toml, "a." * 100_000, "b = 1"),
         (parse_toml, "['a' . " + '"b". ' * 100_000, "b]"),
         (parse_toml, "a = " + "[" * (MAX_LEVELS + 1), "]" * (MAX_LEVELS + 1)),
         (parse_json, "[" * 100_000, "]" * 100_000),
-        (parse_json, '{"a": ' * 200, "1" + "}" * 200),
         (parse_yaml, "[" * 100_000, "]" * 100_000),
         (parse_yaml, "{a: " * 100_000, "1" + "}" * 100_000),
-        (parse_yaml, "- " * 1000, "1"),
     ],
 )
 def test_deep_nesting_is_refused(parse, opening, closing):
@@ -75,11 +64,7 @@ def test_deep_nesting_is_refused(parse, opening, closing):
         parse(opening + closing)
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["a: &a [*a]", "&a {b: *a}", "a: &a {b: [1, {c: *a}]}", "&a [&b {c: *b}]"],
-    ids=["list", "root", "deep", "two"],
-)
+@pytest.mark.parametrize("text", ["a: &a [*a]", "&a {b: *a}", "a: &a {b: [1, {c: *a}]}"])
 def test_an_alias_inside_of_what_it_is_for_is_refused(text):
     with pytest.raises(DocumentError, match=r"the alias '[ab]' stands inside of what it is for at line 1, column \d+$"):
         parse_yaml(text)
@@ -96,15 +81,11 @@ def test_aliases_that_multiply_are_refused_and_others_taken():
     ("parse", "text", "why"),
     [
         (parse_yaml, "period: 0.02\nperiod: 0.03", "the key 'period' occurs twice at line 2, column 1"),
-        (parse_yaml, "{a: {b: 1, c: 2, b: 3}}", "the key 'b' occurs twice"),
         (parse_json, '[{"a": 1, "b": 2, "a": 1}]', "the key 'a' occurs twice"),
         (parse_toml, "a = 1\na = 2", "Cannot overwrite a value"),
-        (parse_yaml, "a: 2026-02-30", "day is out of range for month"),
         (parse_yaml, "a: !!python/object/apply:os.system [ls]", "could not determine a constructor"),
         (parse_toml, f"a = {'9' * 5000}", "Exceeds the limit"),
-        (parse_json, "9" * 5000, "Exceeds the limit"),
         (parse_toml, f"a = 0x{'f' * 5000}", "a whole number of more than 4000 digits"),
-        (parse_yaml, f"a: [-0x{'f' * 5000}]", "a whole number of more than 4000 digits"),
         (parse_json, "[1, 2", "Expecting"),
         (parse_json, b"\xff", "can't decode"),
         (parse_toml, " " * (MAX_BYTES + 1), f"more than {MAX_BYTES} bytes"),
@@ -121,31 +102,17 @@ def test_numbers_with_many_points_on_a_line_are_no_nested_key():
     assert parse_toml(f"a = '{'A sentence of words. ' * 500}'") == {"a": "A sentence of words. " * 500}
 
 
-OWN = 'extends = "{base}"\ntitle = "mine"\n'
-
-
 def test_tables_are_merged_lists_replaced_and_limits_are_ones_own(tmp_path):
     path = tmp_path / "mine.toml"
-    path.write_text(
-        OWN.format(base="case1_uncertain")
-        + '[vehicle.perturbation]\nmass = "+7 %"\n[[command]]\naltitude_change = "10 ft"\n'
-        + "[limits]\nsaturated_steps = 3\n"
+    own = (
+        '[vehicle.perturbation]\nmass = "+7 %"\n[[command]]\naltitude_change = "10 ft"\n[limits]\nsaturated_steps = 3\n'
     )
+    path.write_text(f'extends = "case1_uncertain"\ntitle = "mine"\n{own}')
     base, mine = load_scenario("case1_uncertain"), load_scenario(str(path))
     assert mine.vehicle.perturbation == base.vehicle.perturbation | {"mass": 0.07}
     assert len(base.command) == len(mine.command) == 1 and mine.command[0].velocity_change == 0.0
     assert mine.limits == {"saturated_steps": 3.0}
     assert (mine.initial, mine.fault, mine.design) == (base.initial, base.fault, base.design)
-
-
-def test_paths_are_those_of_the_folder_and_the_text_is_whole(tmp_path):
-    (tmp_path / "lab").mkdir()
-    (tmp_path / "lab" / "base.toml").write_text(OWN.format(base="case1"))
-    (tmp_path / "lab" / "mine.toml").write_text(OWN.format(base="base.toml") + 'duration = "130 s"\n')
-    text = scenario_text(str(tmp_path / "lab" / "mine.toml"))
-    assert "extends" not in text
-    assert parse_scenario(text, "mine").duration == 130.0
-    assert parse_scenario(text, "mine").limits == load_scenario("case1").limits
 
 
 @pytest.mark.parametrize(
@@ -154,10 +121,7 @@ def test_paths_are_those_of_the_folder_and_the_text_is_whole(tmp_path):
         ("extends = 3\n", r"scenario 'mine': extends = 3: expected a name or the path of a file"),
         ('extends = "cas1"\n', r"scenario 'cas1': expected a path or one of"),
         ('extends = "other.toml"\n', r"other.toml': cannot be read"),
-        (
-            'extends = "mine.toml"\n',
-            r"scenario 'mine': extends: .*mine.toml extends .*mine.toml, expected files that do",
-        ),
+        ('extends = "mine.toml"\n', r"scenario 'mine': extends: .*mine.toml extends .*mine.toml, expected files that"),
         ('extends = "case1"\ndruation = "3 s"\n', r"scenario 'mine': druation: unknown key"),
     ],
 )
@@ -171,15 +135,9 @@ def test_what_cannot_be_extended_is_named(tmp_path, text, message):
 def test_designs_extend_designs(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('extends = "baseline"\nname = "mine"\n[nominal]\nscales = [1.0, 0.5]\n')
-    base, mine = (inputs.model_dump() for inputs in (read_inputs_of("baseline"), read_inputs(path)))
-    assert mine.pop("name") == "mine" and base.pop("name") == "baseline"
+    base, mine = (read_inputs(each).model_dump() for each in (find_inputs("baseline"), path))
     assert mine["nominal"].pop("scales") == [1.0, 0.5] and base["nominal"].pop("scales")
-    assert mine == base
+    assert mine == base | {"name": "mine"}
     path.write_text('extends = "absent"\n')
     with pytest.raises(DesignError, match="design = 'absent': no such file"):
         read_inputs(path)
-
-
-def read_inputs_of(name):
-
-    return read_inputs(find_inputs(name))

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import pytest
 
 from hsv.bags.description import TUBE_MPC
-from hsv.base.processes import ENDING, choose_log_folder, over_threads, take_interrupts, uninterrupted
+from hsv.base.processes import ENDING, choose_log_folder, take_interrupts, uninterrupted
 from hsv.graph.launcher import Launcher
 
 NUMBERS = *ENDING, signal.SIGALRM
@@ -104,12 +104,6 @@ def test_a_node_is_ended_that_has_just_been_started(monkeypatch, tmp_path):
     with pytest.raises(KeyboardInterrupt), Launcher([TUBE_MPC], [], lambda step: None, lambda node, text: None):
         time.sleep(10.0)
     assert [process.poll() for process in started] == [-signal.SIGINT]
-
-
-def test_results_are_in_the_order_of_the_items_and_counted():
-    counts = []
-    assert over_threads(lambda item: item * item, range(20), counts.append) == [item * item for item in range(20)]
-    assert counts == list(range(1, 21))
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 import math
 import re
-import subprocess
-import sys
 
 import pytest
 from hypothesis import given, settings
@@ -15,33 +13,25 @@ from hsv.base.units import (
     factor,
     parse_quantity,
     percent,
-    rounded,
     square_by_pint,
     to_paper,
 )
 from hsv.cli.output import unit_key
 from hsv.flight.metrics import METRICS
 from hsv.model.signals import INPUT_UNITS, STATE_UNITS
-from hsv.model.vehicle import load_vehicle
 
 
 @pytest.mark.parametrize(
     ("text", "unit", "value"),
     [
         ("85500 ft", "m", 26060.4),
-        ("85500ft", "m", 26060.4),
         ("85.5 kft", "m", 26060.4),
         ("7900 ft/s", "m/s", 2407.92),
         ("0.3 deg", "rad", math.radians(0.3)),
-        ("-30 deg", "rad", -math.pi / 6),
         ("3 deg/s", "rad/s", math.radians(3)),
-        ("200 s", "s", 200.0),
         ("3 min", "s", 180.0),
         ("+10 %", "1", 0.1),
-        ("-0.5%", "1", -0.005),
-        ("0.9", "1", 0.9),
         (0.9, "1", 0.9),
-        (0, "1", 0.0),
         ("1 rpm", "rad/s", math.pi / 30),
         ("1 slug^0.5 ft", "kg^0.5 m", math.sqrt(14.593902937) * 0.3048),
     ],
@@ -55,28 +45,20 @@ def test_quantities_become_si(text, unit, value):
     [
         ("85500", "m", "the unit is missing"),
         (85500, "m", "the unit is missing"),
-        (85500.0, "m", "the unit is missing"),
         ("7900 ft", "m/s", "wrong unit"),
         ("1 furlogn", "m", "unknown unit"),
         ("1 [ft", "m", "cannot be read"),
         ("__import__('os')", "m", "no number"),
-        ("ft", "m", "no number"),
         ("", "m", "no number"),
         ("nan ft", "m", "no number"),
-        ("inf ft", "m", "no number"),
         ("1e999 ft", "m", "expected a finite quantity"),
-        (float("nan"), "1", "expected a finite quantity"),
-        (10**400, "1", "expected a finite quantity"),
         ("5 degC", "m", "cannot be read"),
         # Angles are no bare numbers, nor bare numbers angles; a frequency is no angular frequency.
         ("12", "rad", "the unit is missing"),
         ("10 %", "m", "wrong unit"),
-        ("10 deg", "1", "wrong unit"),
         ("15 Hz", "rad/s", "wrong unit"),
-        ("15 1/s", "rad/s", "wrong unit"),
         (True, "1", "expected a finite quantity"),
         (None, "m", "expected a finite quantity"),
-        (["1 ft"], "m", "expected a finite quantity"),
     ],
 )
 def test_what_is_not_such_a_quantity_is_refused_by_name(text, unit, problem):
@@ -88,13 +70,6 @@ def test_what_is_not_such_a_quantity_is_refused_by_name(text, unit, problem):
     assert "\n" not in message
 
 
-def test_bounds_of_the_envelope_are_exact():
-    bounds = (parse_quantity("85000 ft", "m", "h"), parse_quantity("86500 ft", "m", "h"))
-    assert bounds == load_vehicle().altitude_range
-    bounds = (parse_quantity("7700 ft/s", "m/s", "V"), parse_quantity("8300 ft/s", "m/s", "V"))
-    assert bounds == load_vehicle().velocity_range
-
-
 @settings(max_examples=100)
 @given(st.integers(0, 10**9))
 def test_a_decimal_in_feet_becomes_the_decimal_in_metres(thousandths):
@@ -104,21 +79,10 @@ def test_a_decimal_in_feet_becomes_the_decimal_in_metres(thousandths):
     assert parse_quantity(f"{thousandths / 1000} ft", "m", "h") == expected
 
 
-@settings(max_examples=50)
-@given(st.floats(-1e12, 1e12))
-def test_rounding_keeps_fifteen_digits(value):
-    assert rounded(value) == pytest.approx(value, rel=1e-14)
-    assert rounded(rounded(value)) == rounded(value)
-
-
 @pytest.mark.parametrize("unit", PAPER_UNITS)
 def test_paper_units_come_back(unit):
     value, paper = to_paper(2.5, unit)
     assert value * factor(paper, unit) == pytest.approx(2.5, rel=1e-14)
-
-
-def test_seconds_stay_seconds():
-    assert to_paper(3.0, "s") == (3.0, "s")
 
 
 def test_every_unit_that_is_printed_has_a_spelling_in_json_keys():
@@ -145,17 +109,6 @@ def test_percent_as_people_write_it(share, text):
 )
 def test_known_units_are_those_of_the_units_library(unit):
     assert _squared(unit) == square_by_pint(unit)
-
-
-def test_shipped_scenarios_need_no_units_library():
-    script = """
-import sys
-from hsv.flight.scenario import load_scenario, scenario_names
-for name in scenario_names():
-    load_scenario(name)
-sys.exit("pint" in sys.modules)
-"""
-    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
 
 
 @pytest.mark.parametrize(

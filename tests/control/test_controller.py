@@ -98,13 +98,9 @@ class Answering:
     ("answer", "message"),
     [
         ((0.1, float("nan")), r"^own, step 7: .*answered \[0\.1, nan\]"),
-        ((float("inf"), 0.1), r"^own, step 7: .*answered \[inf, 0\.1\]"),
         ((0.1,), r"^own, step 7: .*answered \(0\.1,\)"),
-        ((0.1, 0.2, 0.3), r"^own, step 7: .*answered \(0\.1, 0\.2, 0\.3\)"),
         (None, r"^own, step 7: .*answered None"),
         ((0.1 + 0.0j, 0.2), r"^own, step 7: .*answered \(\(0\.1\+0j\), 0\.2\)"),
-        (np.array([0.1, 0.2j]), r"^own, step 7: .*answered array"),
-        (("a", "b"), r"^own, step 7: .*answered \('a', 'b'\)"),
         (ValueError("two\nlines"), r"^own, step 7: ValueError: two lines \(test_controller.py:\d+\)$"),
         (SystemExit("bye"), r"^own, step 7: SystemExit: bye \(test_controller.py:\d+\)$"),
     ],

@@ -1,13 +1,13 @@
-import numpy as np
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.control.coverage import commanded, uncovered_faults, uncovered_hardware
+from hsv.control.coverage import uncovered_faults, uncovered_hardware
 from hsv.control.design import find_design, read_design
 from hsv.control.tube_law import TubeStatusCode
 from hsv.flight.assembly import assemble_flight, uncovered_of
 from hsv.flight.blocks import steps
 from hsv.flight.scenario import load_scenario
+from hsv.model.signals import INPUT_NAMES
 
 BASELINE, REALISTIC = (read_design(find_design(name)) for name in ("baseline", "realistic"))
 ELEVATOR = "elevator_deflection"
@@ -18,32 +18,25 @@ def of(changes, design=BASELINE, scenario="case1"):
     return uncovered_of(load_scenario(scenario, changes), design)
 
 
-def test_the_flight_of_the_certificate_is_covered():
-    assert of({}) == []
-
-
 def test_a_design_that_is_not_as_it_was_written_is_not_covered(tmp_path):
     text = find_design("baseline").read_text()
     path = tmp_path / "baseline.yaml"
     path.write_text(text.replace("hash: a", "hash: b"))
-    assert of({}, read_design(path)) == [
-        "design: not as it was written, its parameters do not have the digest design.hash"
-    ]
+    [named] = of({}, read_design(path))
+    assert named == "design: not as it was written, its parameters do not have the digest design.hash"
 
 
 @pytest.mark.parametrize("inputs", [{}, None, {"disturbance": 0.9}, {"disturbance": {"elevator_effectiveness": "0.9"}}])
 def test_a_certificate_that_does_not_say_what_it_covers_is_refused(inputs):
-    with pytest.raises(
-        DesignError, match=r"^certificate: inputs\.disturbance\.elevator_effectiveness = .*: expected a"
-    ):
+    with pytest.raises(DesignError, match=r"^certificate: inputs\.disturbance\.elevator_effectiveness = .*: expected"):
         uncovered_of(load_scenario("case1"), BASELINE, {"inputs": inputs})
 
 
 @pytest.mark.parametrize(
     ("changes", "named"),
     [
+        ({}, []),
         ({"sensors.pitch_rate.noise": "0.01 deg/s"}, ["sensors.pitch_rate: noise 0.01 deg/s; "]),
-        ({"sensors.altitude.latency": 2}, ["sensors.altitude: latency 2; "]),
         ({"sensors.altitude.random_walk": "1 ft/s^0.5"}, ["sensors.altitude: random walk; "]),
         ({"wind.up": "3 ft/s"}, ["wind.up: 3 ft/s; the certificate is for still air"]),
         ({"density.offset": "-2 %"}, ["density.offset: -0.02; the certificate is for the model's density"]),
@@ -54,18 +47,11 @@ def test_a_certificate_that_does_not_say_what_it_covers_is_refused(inputs):
         ({"vehicle.perturbation.mass": "12 %"}, ["vehicle.perturbation.mass: 12 %; the certificate is for 10 % at"]),
         ({"vehicle.perturbation.mass": "10 %"}, []),
         ({"notch.enabled": False}, ["notch: none"]),
-        (
-            {"fault[0].effectiveness": 0.8},
-            ["fault: loss_of_effectiveness of elevator_deflection (effectiveness 0.8)"],
-        ),
+        ({"fault[0].effectiveness": 0.8}, ["fault: loss_of_effectiveness of elevator_deflection (effectiveness 0.8)"]),
         ({"fault[0].effectiveness": 0.95}, []),
         (
             {"fault": [{"channel": ELEVATOR, "type": "bias", "start": "1 s", "offset": "-0.5 deg"}]},
             ["fault: bias of elevator_deflection (offset -0.5 deg); the certificate is for a loss of"],
-        ),
-        (
-            {"fault": [{"channel": ELEVATOR, "type": "bandwidth", "start": "1 s", "natural_frequency": "5 rad/s"}]},
-            ["fault: bandwidth of elevator_deflection (natural_frequency 5 rad/s); "],
         ),
         ({"actuator.elevator_deflection.stop": "29 deg"}, []),
         ({"actuator.elevator_deflection.stop": "28 deg"}, ["actuator.elevator_deflection.stop: 28 deg; "]),
@@ -89,28 +75,17 @@ def test_a_design_covers_the_actuators_that_it_knows_and_no_others():
     known = {"actuator.elevator_deflection.set": "elevator_50", "actuator.fuel_equivalence_ratio.set": "fuel_10"}
     assert of(known | {"actuator.elevator_deflection.stop": "30 deg"}, REALISTIC) == []
     assert [text.partition(":")[0] for text in of(known, REALISTIC)] == ["actuator.elevator_deflection.stop"]
-    assert [text.partition(";")[0] for text in of({}, REALISTIC)] == [
-        "actuator.fuel_equivalence_ratio: ideal",
-        "actuator.elevator_deflection: ideal",
-    ]
+    assert [text.partition(";")[0] for text in of({}, REALISTIC)] == [f"actuator.{name}: ideal" for name in INPUT_NAMES]
 
 
 def test_other_faults_are_not_covered_and_each_is_named_once():
-    found = uncovered_faults([LOSS, ("elevator_deflection", "lock_in_place", {}), LOSS], 0.9)
-    assert found == [
-        "fault: lock_in_place of elevator_deflection; the certificate is for a loss of elevator effectiveness alone"
-    ]
+    [found] = uncovered_faults([LOSS, ("elevator_deflection", "lock_in_place", {}), LOSS], 0.9)
+    assert found.startswith("fault: lock_in_place of elevator_deflection; the certificate is for a loss of elevator")
     assert len(uncovered_faults([LOSS, LOSS], None)) == 1
 
 
 def test_where_no_tube_is_certified_nothing_is_covered():
     assert of({}, None, "case1_rmpc") == ["all of it: controller robust_mpc has no certified tube"]
-
-
-def test_commands_stay_within_the_limits_that_the_tube_was_tightened_for():
-    for design in (BASELINE, REALISTIC):
-        most = np.maximum(np.abs(design.input_minimum), np.abs(design.input_maximum))
-        assert commanded(design)[1] < most[1]
 
 
 def test_the_status_tells_of_declared_hardware_alone():

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from marking import long
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.base.errors import DesignError, ParameterError
@@ -23,8 +22,9 @@ from hsv.control.design import (
     write_design,
 )
 
-SHIPPED = sorted((Path(__file__).parents[2] / "offline_design").glob("*.yaml"))
+DESIGNS = sorted((Path(__file__).parents[2] / "offline_design").glob("*.yaml"))
 VALUES = read_parameters(find_design("baseline"))
+ARRAYS = [name for name, value in VALUES.items() if isinstance(value, list)]
 
 
 def with_entry(name, index, value):
@@ -33,7 +33,7 @@ def with_entry(name, index, value):
     return changed
 
 
-@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", DESIGNS, ids=lambda path: path.stem)
 def test_every_shipped_design_loads_unmodified(path):
     design = read_design(path)
     assert design.name == path.stem
@@ -57,19 +57,14 @@ def test_a_changed_number_shows_as_modified():
     assert digest(VALUES) == VALUES["design.hash"]
 
 
-def array_names():
-    return [name for name, value in VALUES.items() if isinstance(value, list)]
-
-
-@pytest.mark.parametrize("name", array_names())
-@pytest.mark.parametrize("value", [math.nan, 1, *map(long, (math.inf, "1.0", None))])
-def test_an_entry_that_is_no_finite_double_is_named(name, value):
+@pytest.mark.parametrize("name", ARRAYS)
+def test_an_entry_that_is_no_finite_double_is_named(name):
     with pytest.raises(DesignError) as caught:
-        ControlDesign.from_parameters(with_entry(name, 0, value))
-    assert str(caught.value).startswith(f"parameter {name}[0] = {value!r}: expected double array")
+        ControlDesign.from_parameters(with_entry(name, 0, math.nan))
+    assert str(caught.value).startswith(f"parameter {name}[0] = nan: expected double array")
 
 
-@pytest.mark.parametrize("name", array_names())
+@pytest.mark.parametrize("name", ARRAYS)
 def test_an_array_of_wrong_length_is_named(name):
     for changed in ([*VALUES[name], VALUES[name][-1]], VALUES[name][:-1]):
         with pytest.raises(DesignError) as caught:
@@ -81,37 +76,34 @@ def test_an_array_of_wrong_length_is_named(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "message"),
+    ("changes", "message"),
     [
-        ("period", 1, "parameter period = 1: expected double"),
-        ("period", math.nan, "parameter period = nan: expected double"),
-        ("design.name", 3, "parameter design.name = 3: expected string"),
-        ("scheduling.interpolation", "quintic", "parameter scheduling.interpolation = 'quintic': expected one of"),
-        ("feedback.gain", 1.0, "parameter feedback.gain = 1.0: expected double array"),
+        ({"period": 1}, "period = 1: expected double"),
+        ({"design.name": 3}, "design.name = 3: expected string"),
+        ({"scheduling.interpolation": "quintic"}, "scheduling.interpolation = 'quintic': expected one of"),
+        ({"input.minimum": VALUES["input.maximum"]}, "input.minimum: expected values below input.maximum"),
+        ({"nominal.ellipsoids": VALUES["nominal.ellipsoids"][25:]}, "nominal.ellipsoids: 6 matrices, expected one per"),
+        ({"nominal.input_minimum": []}, "nominal.input_minimum: 0 values, expected"),
+        ({"nominal.region_maximum": [1.0] * 6}, "nominal.region_maximum: 6 values, expected"),
+        ({"feedback.tau": [0.6], "feedback.tau_minimum": [0.7]}, "feedback.tau = 0.6: expected 0.7 to 1"),
+        ({"feedback.tau_minimum": [0.0]}, "feedback.tau_minimum = [0.0]: expected values above zero"),
+        ({"feedback.tau_minimum": [0.5, 0.5]}, "feedback.tau_minimum: 2 values, expected 1 or 5"),
+        ({"feedback.tau": [0.05], "feedback.tau_minimum": [0.05]}, "feedback.tau: spectral radius "),
+        ({"tube.shape": [-entry for entry in VALUES["tube.shape"]]}, "tube.shape"),
     ],
 )
-def test_a_wrong_scalar_is_named(name, value, message):
+def test_a_wrong_parameter_is_named(changes, message):
     with pytest.raises(DesignError) as caught:
-        ControlDesign.from_parameters({**VALUES, name: value})
-    assert str(caught.value).startswith(message)
+        ControlDesign.from_parameters(VALUES | changes)
+    assert str(caught.value).startswith(f"parameter {message}")
 
 
 @pytest.mark.parametrize("name", ["feedback.gain", "nominal.gains"])
-@pytest.mark.parametrize("factor", [-1.0, 0.0, 100.0])
+@pytest.mark.parametrize("factor", [0.0, 100.0])
 def test_a_gain_that_does_not_stabilise_is_refused_with_its_spectral_radius(name, factor):
     changed = {**VALUES, name: [factor * entry for entry in VALUES[name]]}
     with pytest.raises(DesignError, match=rf"parameter {name}: spectral radius \d+\.\d+ of the closed loop at vertex"):
         ControlDesign.from_parameters(changed)
-
-
-def test_limits_must_leave_room():
-    with pytest.raises(DesignError, match=r"parameter input.minimum: expected values below input.maximum"):
-        ControlDesign.from_parameters({**VALUES, "input.minimum": VALUES["input.maximum"]})
-
-
-def test_every_gain_needs_its_ellipsoid():
-    with pytest.raises(DesignError, match=r"parameter nominal.ellipsoids: 6 matrices, expected one per gain, 7"):
-        ControlDesign.from_parameters({**VALUES, "nominal.ellipsoids": VALUES["nominal.ellipsoids"][25:]})
 
 
 @pytest.mark.parametrize(
@@ -119,11 +111,7 @@ def test_every_gain_needs_its_ellipsoid():
     [
         (None, "cannot be read (No such file or directory), expected a parameter file"),
         (b"", "expected ROS 2 parameters"),
-        (b"a: 1\n", "expected ROS 2 parameters"),
-        (b"- 1\n- 2\n", "expected ROS 2 parameters"),
         (b"/**:\n  ros__parameters:\n    a: [1.0,\n", "while parsing"),
-        (b"\xff\xfe\x00", "cannot be read (not text), expected a parameter file"),
-        (b"a: \x07\n", "control characters are not allowed"),
     ],
 )
 def test_a_file_that_is_no_parameter_file_is_named_in_one_line(tmp_path, content, problem):
@@ -138,39 +126,18 @@ def test_a_file_that_is_no_parameter_file_is_named_in_one_line(tmp_path, content
     assert "\n" not in message
 
 
-def test_errors_of_a_file_name_file_and_parameter(tmp_path):
-    path = tmp_path / "bad.yaml"
-    path.write_text("/**:\n  ros__parameters:\n    period: 1\n")
-    with pytest.raises(DesignError) as caught:
-        read_design(path)
-    assert str(caught.value).startswith(f"{path}: parameter period = 1: expected double")
-
-
-SHIPPED = find_design("baseline").read_text()
-
-
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        (
-            "    period: ",
-            "    perriod: ",
-            "parameter perriod: unknown, expected those of a design (did you mean 'period'?)",
-        ),
-        ("    period: 0.02", "    period: 0.02\n    period: 0.03", "the key 'period' occurs twice at line 6"),
+        ("    period: ", "    perriod: ", "parameter perriod: unknown, expected those of a design (did you mean"),
         ("    period: 0.02", "    period: 0.02\n    design.name: b", "parameter design.name occurs twice"),
-        (
-            "    period: 0.02",
-            "    period: 0.02\n    own: &a {own: *a}",
-            "the alias 'a' stands inside of what it is for",
-        ),
         ("half_width: [12.9", "half_width: [-12.9", "parameter tube.half_width = [-12.9"),
     ],
 )
 def test_what_a_design_must_not_have_is_named(tmp_path, old, new, problem):
-    path = tmp_path / "mine.yaml"
-    assert SHIPPED.count(old) == 1
-    path.write_text(SHIPPED.replace(old, new))
+    path, text = tmp_path / "mine.yaml", find_design("baseline").read_text()
+    assert text.count(old) == 1
+    path.write_text(text.replace(old, new))
     with pytest.raises(DesignError) as caught:
         read_design(path)
     assert problem in str(caught.value) and str(path) in str(caught.value) and "\n" not in str(caught.value)
@@ -178,9 +145,8 @@ def test_what_a_design_must_not_have_is_named(tmp_path, old, new, problem):
 
 def test_a_section_of_one_node_goes_over_that_for_all(tmp_path):
     path = tmp_path / "parameters.yaml"
-    path.write_text(
-        "/**: {ros__parameters: {period: 0.02, notch: {enabled: true}}}\nplant: {ros__parameters: {period: 0.01}}\n"
-    )
+    shared = "/**: {ros__parameters: {period: 0.02, notch: {enabled: true}}}\n"
+    path.write_text(f"{shared}plant: {{ros__parameters: {{period: 0.01}}}}\n")
     assert read_parameters(path) == {"period": 0.02, "notch.enabled": True}
     assert read_parameters(path, "plant") == {"period": 0.01, "notch.enabled": True}
 
@@ -193,22 +159,8 @@ def test_designs_are_found_by_name_and_by_path(tmp_path, monkeypatch):
     assert find_design(str(own)) == own
     assert find_design("baseline").name == "baseline.yaml"
     assert find_file("baseline", ".toml").name == "baseline.toml"
-
-
-@pytest.mark.parametrize("name", ["absent", "./absent.yaml", "", "/"])
-def test_a_design_that_is_not_there_is_named(name):
-    with pytest.raises(DesignError, match=rf"design = '{name}': no such file, expected the path of a .yaml file"):
-        find_design(name)
-
-
-def test_closed_loop_of_the_shipped_baseline_is_as_fast_as_the_study_says():
-    design = ControlDesign.from_parameters(VALUES)
-    rigid = [
-        np.abs(np.linalg.eigvals((A + B @ design.feedback_gain)[:5, :5])).max()
-        for A, B in zip(design.polytope.A, design.polytope.B, strict=True)
-    ]
-    assert len(rigid) == 20
-    assert max(rigid) < 0.994
+    with pytest.raises(DesignError, match=r"design = 'absent': no such file, expected the path of a .yaml file"):
+        find_design("absent")
 
 
 def test_factors_and_filtered_nominal_survive_the_parameter_file_and_are_left_out_where_they_say_nothing():
@@ -225,24 +177,6 @@ def test_factors_and_filtered_nominal_survive_the_parameter_file_and_are_left_ou
     assert ControlDesign.from_parameters(values | {"feedback.tau_minimum": tau.tolist()}).modified
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"feedback.tau": [0.9]}, r"feedback\.tau = 0.9: expected 1"),
-        ({"feedback.tau": [0.6], "feedback.tau_minimum": [0.7]}, r"feedback\.tau = 0.6: expected 0.7 to 1"),
-        ({"feedback.tau_minimum": [0.0]}, r"feedback\.tau_minimum = \[0.0\]: expected values above zero"),
-        ({"feedback.tau_minimum": [0.5, 0.5]}, r"feedback\.tau_minimum: 2 values, expected 1 or 5"),
-        (
-            {"feedback.tau": [0.05], "feedback.tau_minimum": [0.05]},
-            r"feedback\.tau: spectral radius .* expected below 1",
-        ),
-    ],
-)
-def test_a_factor_that_cannot_fly_is_refused(changes, message):
-    with pytest.raises(DesignError, match=message):
-        ControlDesign.from_parameters(read_parameters(find_design("baseline")) | changes)
-
-
 def test_both_bounds_hold_for_a_plan():
     bounds = read_design(find_design("baseline")).plan_bounds
     assert_allclose(bounds.lower, bounds.region_minimum[:2])
@@ -252,13 +186,6 @@ def test_both_bounds_hold_for_a_plan():
     assert low < 0.0 < high
 
 
-@pytest.mark.parametrize("name", ["nominal.input_minimum", "nominal.region_maximum"])
-def test_a_bound_that_is_missing_or_too_short_is_named(name):
-    for value in ([], VALUES[name][:-1]):
-        with pytest.raises(DesignError, match=rf"parameter {name}: {len(value)} values, expected"):
-            ControlDesign.from_parameters({**VALUES, name: value})
-
-
 def test_a_design_without_a_tube_carries_none():
     names = ("nominal.input_m", "nominal.region", "tube.")
     without = {n: v for n, v in VALUES.items() if not n.startswith(names)}
@@ -266,11 +193,6 @@ def test_a_design_without_a_tube_carries_none():
 
 
 SCALAR, DIAGONAL = np.full(5, 0.8), np.array([0.8, 0.6, 1.0, 1.0, 1.0])
-
-
-@pytest.mark.parametrize("values", [[0.8], [0.93], [1.0], [0.9] * 5])
-def test_everything_between_the_minimum_and_one_is_certified(values):
-    np.testing.assert_array_equal(certified(values, SCALAR), np.full(5, values[0]))
 
 
 def test_a_diagonal_factor_moves_all_dimensions_together():
@@ -294,7 +216,6 @@ def test_a_change_has_one_value_or_five():
     [
         ([0.79], SCALAR, r"feedback\.tau = 0\.79: expected 0\.8 to 1"),
         ([1.0, 0.7, 1.0, 1.0, 1.0], SCALAR, r"feedback\.tau\[1\] = 0\.7: expected 0\.8 to 1"),
-        ([0.9, 1.0, 1.0, 1.0, 1.0], SCALAR, "all the same share of the way from 1"),
         ([0.8, 1.0, 1.0, 1.0, 1.0], DIAGONAL, "all the same share of the way from 1"),
         ([0.9], DIAGONAL, r"feedback\.tau = \[0\.9, .*the way from 1 to \[0\.8, 0\.6, 1\.0, 1\.0, 1\.0\]"),
         ([0.9], np.ones(5), "expected 1: no other factor is certified"),

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import expm, solve_discrete_are
 
 from hsv.base.errors import ParameterError
-from hsv.control.estimator import PROCESS_PARAMETERS, Estimator, EstimatorData, estimator_data
+from hsv.control.estimator import PROCESS_PARAMETERS, Estimator, estimator_data
 from hsv.core import doubles, lib
 from hsv.model.dynamics import advance, jacobian
 from hsv.model.faults.schedule import fault_rows
@@ -50,21 +50,6 @@ def test_gain_solves_the_riccati_equation(estimator):
     assert np.abs(np.linalg.eigvals((np.eye(11) - estimator.gain @ H) @ F)).max() < 0.9999
 
 
-def test_a_step_is_a_prediction_corrected_by_the_gain():
-    rng = np.random.default_rng(1)
-    gain, command = 0.1 * rng.normal(size=(11, 5)), START.input + np.array([0.01, -0.02])
-    estimator = Estimator(EstimatorData(gain, START.state, VEHICLE, T, 2))
-    predicted, offsets = START.state, np.zeros(2)
-    for k in range(4):
-        measurement = predicted + 0.01 * rng.normal(size=9)
-        estimate = estimator.step(k, measurement, command)
-        correction = gain @ (measurement - predicted)[:5]
-        offsets = offsets + correction[9:]
-        assert_allclose(estimate, predicted + correction[:9], rtol=1e-12)
-        assert_allclose(estimator._state[9:], offsets, rtol=1e-12)
-        predicted = advance(estimate, command + offsets, VEHICLE, T, 2)
-
-
 def flown(estimator, measured, seconds=20.0, offset=0.0):
     """Return truth and estimate of a flight about the trim, its elevator off by a constant that no one knows."""
     rows = fault_rows([SENSOR], [], T)
@@ -78,11 +63,6 @@ def flown(estimator, measured, seconds=20.0, offset=0.0):
         command = START.input + np.array([0.0, turn])
         x = advance(x, command + np.array([0.0, offset]), VEHICLE, T, 2)
     return np.array(truth), np.array(found), stepped._state
-
-
-def test_of_a_perfect_measurement_the_estimate_is_the_truth(estimator):
-    truth, found, _ = flown(estimator, sensor_data({}, T))
-    assert_allclose(found, truth, rtol=1e-9, atol=1e-9)
 
 
 def test_noise_falls_to_a_fraction_of_the_sensors(estimator):

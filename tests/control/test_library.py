@@ -2,18 +2,14 @@
 
 import ctypes
 import hashlib
-import os
 import shutil
 
-import numpy as np
 import pytest
 from c_libraries import PROBE, build_probe
-from numpy.testing import assert_array_equal
 
 from hsv.base.errors import ParameterError
 from hsv.control.controller import CONTROLLER_INPUTS, CONTROLLER_OUTPUTS
 from hsv.control.library import inside, library_digest, library_record, load_block, seen_from
-from hsv.control.library_process import SharedMemory
 from hsv.model.signals import FILTER_STATE
 
 
@@ -36,24 +32,6 @@ def test_a_scenario_names_libraries_of_its_own_folder(tmp_path):
     assert inside("tube_mpc", tmp_path) == seen_from("tube_mpc", tmp_path) == "tube_mpc"
     with pytest.raises(ParameterError, match="expected a path inside the scenario's folder"):
         inside("../own.so:lqr", tmp_path)
-
-
-def test_what_is_no_library_is_refused(tmp_path):
-    (tmp_path / "text.so").write_text("no library")
-    with pytest.raises(ParameterError, match=r"controller = '.*text.so:probe': .*expected a shared library"):
-        library_record(f"{tmp_path / 'text.so'}:probe")
-    with pytest.raises(ParameterError, match=r"controller = '.*nowhere.so:probe': "):
-        library_digest(f"{tmp_path / 'nowhere.so'}:probe")
-
-
-def test_shared_memory_grows_and_keeps_what_it_holds():
-    memory = SharedMemory()
-    memory.numbers(3)[:] = [1.0, 2.0, 3.0]
-    assert_array_equal(memory.numbers(2), [1.0, 2.0])
-    assert_array_equal(memory.numbers(1000), [1.0, 2.0, 3.0, *np.zeros(997)])
-    other = SharedMemory(os.dup(memory.descriptor))
-    other.numbers(1000)[999] = 4.0
-    assert memory.numbers(1000)[999] == 4.0
 
 
 def test_the_layout_of_the_header_is_that_of_the_bench(tmp_path):
@@ -82,10 +60,7 @@ def test_parameters_are_described_as_those_of_python(tmp_path):
     ("flags", "message"),
     [
         (["-DABI=7"], r"^abi_version = 7, expected 1, as of hsv_block.h"),
-        (["-DSTEP=0"], r"^step = NULL, expected a function"),
-        (['-DNAME="two words"'], r"^name = 'two words', expected letters, digits and underscores"),
         (['-DNAME="\\xff"'], r"^name = b'\\xff', expected text in UTF-8"),
-        (["-DNAME=0"], r"^name = '', expected letters"),
         (["-DSTATE_SIZE=-1"], r"^state_size = -1, expected 0 to"),
         (["-DINPUT_COUNT=1LL<<40"], r"^input_count = 1099511627776, expected 0 to"),
         (['-DINPUTS={"x","m",-1}'], r"^inputs\[0\].size = -1, expected 0 to"),

@@ -98,40 +98,6 @@ def test_plan_is_the_optimum(law):
     assert_allclose(plan.ravel(), np.asarray(solution.x) * np.tile(DESIGN.nominal_input_scale, BLOCKS), atol=1e-5)
 
 
-def test_input_depends_on_the_deviation_alone(law):
-    first = law.step(STEP).input
-    for scale in (0.9, 0.3, 100.0, 0.7):
-        law.step(scale * STEP)
-    assert np.array_equal(law.step(STEP).input, first)
-    assert np.array_equal(QpLaw(DESIGN, DATA, TRAJECTORY).step(STEP).input, first)
-
-
-@pytest.mark.long
-def test_flies_the_step_within_the_bounds_and_faster_than_the_family():
-    values = {**VALUES, "reference.altitudes": [26243.28], "reference.velocities": [2484.12]}
-    settled = {}
-    for name in ("qp", "family"):
-        trajectory = NominalTrajectory.from_parameters({**values, "nominal.law": name})
-        states, measured = [], START.state
-        for _ in range(4000):
-            result = trajectory.step(measured)
-            measured = result.reference + result.deviation
-            states.append(result.deviation)
-            if name == "qp":
-                total = result.input + result.reference_input
-                assert np.all(total >= MINIMUM - 1e-12) and np.all(total <= MAXIMUM + 1e-12)
-                assert result.status == NominalStatus.OK
-        share = np.abs(states)[:, :2] / np.abs(STEP[:2])
-        settled[name] = [0.02 * np.nonzero(share[:, axis] > 0.02)[0][-1] for axis in (0, 1)]
-        if name == "qp":
-            pitch_acceleration = np.diff(np.array(states)[:, 4]) / 0.02
-            low, high = BOUNDS.pitch_acceleration
-            # The programme predicts with the model at the reference, the plan flies that of every point.
-            room = 0.05 * (high - low)
-            assert pitch_acceleration.min() > low - room and pitch_acceleration.max() < high + room
-    assert np.all(np.array(settled["qp"]) < settled["family"])
-
-
 def test_where_the_solver_fails_the_plan_before_goes_on_and_then_the_family(law):
     plan = law._solve(STEP[:5])
     law.step(STEP)

@@ -28,15 +28,12 @@ def test_law_is_one_gain_about_the_reference_with_the_filtered_rate(index):
     assert result.status is TubeStatusCode.NO_SET and not result.inside and math.isnan(result.level)
 
 
-def test_input_is_limited():
-    result = RobustMpc(DESIGN).step(ControllerInput(0, X_R + 1e4, 0.0, X_R, U_R, np.zeros(9), np.zeros(2), NOTHING))
+def test_input_is_limited_and_what_is_not_a_number_is_told():
+    rest = 0.0, X_R, U_R, np.zeros(9), np.zeros(2), NOTHING
+    result = RobustMpc(DESIGN).step(ControllerInput(0, X_R + 1e4, *rest))
     assert np.all((result.input == DESIGN.input_minimum) | (result.input == DESIGN.input_maximum))
     assert result.saturated.all()
-
-
-def test_input_that_is_not_a_number_is_told():
-    nothing = np.full(9, np.nan)
-    result = RobustMpc(DESIGN).step(ControllerInput(0, nothing, 0.0, X_R, U_R, np.zeros(9), np.zeros(2), NOTHING))
+    result = RobustMpc(DESIGN).step(ControllerInput(0, np.full(9, np.nan), *rest))
     assert result.status is TubeStatusCode.INVALID_INPUT
 
 

@@ -55,13 +55,6 @@ def test_law_is_equation_36(tau):
         assert result.tau.tolist() == [tau]
 
 
-def test_flexible_states_are_not_fed_back():
-    assert_array_equal(DESIGN.feedback_gain[:, 5:], 0.0)
-    shaken = REFERENCE.copy()
-    shaken[5:] += 100.0
-    assert_array_equal(step(TubeLaw(DESIGN), shaken).input, step(TubeLaw(DESIGN)).input)
-
-
 def test_feedback_uses_the_filtered_rate_but_the_error_the_true_one():
     state = REFERENCE.copy()
     state[4] = 0.02
@@ -148,24 +141,11 @@ def test_a_change_of_tau_acts_from_the_next_step_on_and_outlives_the_run():
     assert step(law, state).tau.tolist() == [0.5, 0.5, 0.75, 0.75, 1.0]
 
 
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ([0.4], r"feedback\.tau = 0.4: expected 0.5 to 1, the certified range"),
-        ([1.1], r"feedback\.tau = 1.1: expected 0.5 to 1"),
-        ([math.nan], r"feedback\.tau = \[nan\]: expected values above zero"),
-        ([0.8, 0.8], r"feedback\.tau: 2 values, expected 1 or 5"),
-        ([1.0, 0.9, 0.49, 1.0, 1.0], r"feedback\.tau\[2\] = 0.49: expected 0.5 to 1"),
-        ([0.5, 0.9, 0.9, 0.9, 0.9], r"feedback\.tau = .* the same share of the way from 1 to \[0.5\]"),
-    ],
-)
-def test_a_factor_that_is_not_certified_is_refused_and_changes_nothing(values, message):
+def test_a_factor_that_is_not_certified_is_refused_and_changes_nothing():
     law = TubeLaw(adjustable())
-    with pytest.raises(ParameterError, match=message):
-        law.change_tau(values)
+    with pytest.raises(ParameterError, match=r"feedback\.tau = 0.4: expected 0.5 to 1, the certified range"):
+        law.change_tau([0.4])
     assert step(law).tau.tolist() == [1.0]
-    with pytest.raises(ParameterError, match=r"= 0\.9: expected 1: no other factor is certified"):
-        TubeLaw(DESIGN).change_tau([0.9])
 
 
 def test_scheduled_changes_come_at_their_times():
@@ -179,22 +159,6 @@ def test_scheduled_changes_come_at_their_times():
     law.reset()
     assert law.change_tau([0.9]) == 0
     assert [step(law, k=k).tau[0] for k in range(3)] == [0.9, 0.9, 0.8]
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        (
-            {"tau_change.starts": [1.0, 2.0], "tau_change.values": [0.8]},
-            r"tau_change\.values: 1 values, expected 2 or 10",
-        ),
-        ({"tau_change.starts": [2.0, 1.0], "tau_change.values": [0.8, 0.7]}, r"tau_change\.starts = \[2.0, 1.0\]"),
-        ({"tau_change.starts": [1.0], "tau_change.values": [0.4]}, r"tau_change\.values\[0\] = 0.4: expected 0.5 to 1"),
-    ],
-)
-def test_wrong_changes_are_named(changes, message):
-    with pytest.raises(ParameterError, match=message):
-        TubeLaw.from_parameters(adjustable().to_parameters() | changes)
 
 
 def test_filtered_feedback_is_blind_to_what_the_filter_does_to_the_plan():
@@ -213,13 +177,24 @@ def test_filtered_feedback_is_blind_to_what_the_filter_does_to_the_plan():
     assert np.abs(inputs[True]).max() < 1e-12 < 1e-4 < np.abs(inputs[False]).max()
 
 
-def test_without_the_filter_in_the_loop_filtered_feedback_is_the_plain_one():
-    error = near(np.random.default_rng(4))
-    results = []
-    for filtered in (False, True):
-        law = TubeLaw(adjustable(filtered=filtered))
-        deviation = near(np.random.default_rng(5))
-        x = REFERENCE + error + deviation
-        inputs = ControllerInput(0, x, x[4], REFERENCE, REFERENCE_INPUT, deviation, np.zeros(2), np.empty(0))
-        results.append(law.step(inputs).u_feedback)
-    assert_array_equal(*results)
+ERROR = np.array([0.5, -0.2, *np.zeros(7)])
+
+
+def test_the_integral_acts_on_altitude_and_velocity_error_and_is_emptied_by_a_reset():
+    plain, law = TubeLaw(DESIGN), TubeLaw(DESIGN, integral_rate=0.1)
+    assert_allclose(
+        step(law, REFERENCE + ERROR).u_unsaturated, step(plain, REFERENCE + ERROR).u_unsaturated, rtol=1e-15
+    )
+    for k in range(1, 50):
+        step(law, REFERENCE + ERROR, k=k)
+    expected = 0.1 * DESIGN.feedback_gain[:, :2] @ ERROR[:2] * 50 * 0.02
+    assert_allclose(step(law, REFERENCE, k=50).u_feedback, expected, rtol=1e-9)
+    law.reset()
+    assert_array_equal(step(law, REFERENCE).u_feedback, 0.0)
+
+
+def test_the_integral_stands_still_while_an_input_is_limited():
+    law = TubeLaw(DESIGN, integral_rate=0.1)
+    for k in range(100):
+        assert step(law, REFERENCE - np.array([1e5, *np.zeros(8)]), k=k).saturated.any()
+    assert_array_equal(step(law, REFERENCE, k=100).u_feedback, 0.0)

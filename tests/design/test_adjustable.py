@@ -12,7 +12,6 @@ from hsv.design.adjustable import design_adjustable, relaxed_bound, room_at_one
 from hsv.design.certified import load_certified
 from hsv.design.disturbance import ChannelModel
 from hsv.design.error_system import error_system
-from hsv.design.feedback import common_lyapunov
 from hsv.design.inputs import read_inputs, with_tau
 from hsv.design.region import incomplete_share
 from hsv.design.tightening import TightenedInputs
@@ -88,17 +87,6 @@ def test_nominal_bounds_grow_with_the_room(stored, subject):
     with pytest.raises(DesignError, match=r"U minus F' Z': .* expected room above zero"):
         relaxed_bound(np.array([0.25, 0.19]), np.array([0.15, 0.2]), wide, narrow)
     assert np.all(room_at_one(design, subject.vehicle, subject.certificate["tube"]) > 0.0)
-
-
-def test_stable_loops_without_a_common_function_are_refused():
-    # Each nilpotent, their product expands, and so does their mean; with a third, in part, the mean does not.
-    loops = np.array([[[0.0, 2.0], [0.0, 0.0]], [[0.0, 0.0], [2.0, 0.0]]])
-    with pytest.raises(DesignError, match="two loops: spectral radius 1 of the mean"):
-        common_lyapunov(loops, np.ones(2), "two loops")
-    with pytest.raises(DesignError, match="three loops: smallest eigenvalue"):
-        common_lyapunov(np.array([*loops, np.zeros((2, 2))]), np.ones(2), "three loops")
-    found = common_lyapunov(0.3 * loops, np.ones(2), "two loops")
-    assert found.residuals.min() > 0.0
 
 
 def test_wrong_factors_are_named():

@@ -19,14 +19,6 @@ def test_the_cost_is_above_its_optimum_by_the_gap():
     assert report.objective == x[0, 0]
 
 
-def test_what_the_cost_leaves_open_is_in_the_middle():
-    def inequalities(x, y):
-        return [x - 1.0, np.block([[np.eye(1), y - 0.3], [y - 0.3, np.eye(1)]])]
-
-    (_, y), _ = minimise([Unknown((1, 1)), Unknown((1, 1))], lambda x, y: x[0, 0], inequalities, "flat")
-    assert_allclose(y, 0.3, atol=1e-12)
-
-
 def test_a_symmetric_matrix_is_found():
     # The least trace of Q >= C is that of C; the least eigenvalue of Q - C is that of the barrier, the same in all.
     C = np.array([[2.0, -0.5, 0.1], [-0.5, 1.0, 0.0], [0.1, 0.0, 3.0]])

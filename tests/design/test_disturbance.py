@@ -1,13 +1,9 @@
-import dataclasses
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, widened
-from hsv.design.error_system import tube_errors
 from hsv.design.region import Region
-from hsv.design.tube_problem import tube_problem
 from hsv.model.vehicle import load_vehicle
 
 
@@ -38,23 +34,6 @@ def test_the_fault_is_one_tenth_of_the_total_elevator(flight, subject):
     assert_allclose(lost[5000:], -0.1 * flight.history.command[5000:-1, 1], rtol=1e-12)
 
 
-def test_the_error_system_predicts_the_error_of_a_flight(flight, subject):
-    """One step of the convex combination of vertices from the true error gives the next one, notch states included."""
-    design = subject.design
-    model = ChannelModel(design, load_vehicle())
-    errors = tube_errors(flight.history.state, flight.history.deviation, flight.reference, model.notch)
-    channels = model.signals(flight).channels
-    ones = DisturbanceSet(-np.ones(7), np.ones(7))
-    for k in (1, 60, 700, 5001, 5100):
-        h, v = flight.history.state[k, :2]
-        A, B = design.polytope.at(h, v)
-        local = dataclasses.replace(design.polytope, A=np.repeat(A[None], 20, 0), B=np.repeat(B[None], 20, 0))
-        local = dataclasses.replace(design, polytope=local)
-        system = tube_problem(local, load_vehicle(), ones).system
-        predicted = system.A[0] @ errors[k] + system.G[0] @ channels[k]
-        assert_allclose(predicted, errors[k + 1], rtol=0.0, atol=1e-11)
-
-
 def test_membership_names_channel_and_step():
     low, high = np.array([-1.0] * 3 + [-0.2] + [-1.0] * 3), np.array([2.0] * 3 + [0.0] + [1.0] * 3)
     bounds = DisturbanceSet(*widened(low, high, 1.1))
@@ -66,10 +45,3 @@ def test_membership_names_channel_and_step():
     assert worst.ratio == pytest.approx(1.5)
     channels[4, 3] = 1e-6
     assert bounds.membership(channels).channel == "lost_elevator"
-
-
-def test_report_and_back(found):
-    disturbance = found.problem.disturbance
-    again = DisturbanceSet.from_report(disturbance.report())
-    assert np.array_equal(again.lower, disturbance.lower)
-    assert np.array_equal(again.upper, disturbance.upper)

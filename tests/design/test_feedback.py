@@ -45,9 +45,3 @@ def test_the_gain_comes_out_as_shipped(design, inputs):
     columns = disturbance_columns(inputs)
     again = feedback_gain(A, B, columns, inputs.feedback.state_scale.array(), inputs.feedback.input_scale.array())
     assert_allclose(again.F, design.feedback_gain[:, :5], rtol=1e-6)
-
-
-def test_unknown_method_is_refused(design):
-    A, B = rigid(design)
-    with pytest.raises(DesignError, match=r"feedback.method = 'lucky'"):
-        feedback_gain(A, B, np.eye(5), np.ones(5), np.ones(2), method="lucky")

@@ -3,7 +3,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hsv.base.errors import DesignError
 from hsv.control.notch_filter import NotchSection, continuous, series
 from hsv.design.inputs import read_inputs
 from hsv.design.model import design_model, polytopic_model
@@ -16,10 +15,6 @@ OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
 @pytest.fixture(scope="module")
 def model(inputs):
     return design_model(inputs.model, load_vehicle())
-
-
-def with_representation(inputs, **changes):
-    return inputs.model.model_copy(update=changes)
 
 
 def test_tensor_product_has_the_paper_s_vertices_and_meets_its_accuracy(model):
@@ -41,17 +36,8 @@ def test_vertices_have_the_unstable_pole_of_the_vehicle(model):
     assert np.abs(model.polytope.A[:, :5, 5:]).max() < 1e-15
 
 
-@pytest.mark.long
-def test_a_coarser_tolerance_keeps_six_vertices(inputs):
-    coarse = inputs.model.tensor_product.model_copy(update={"tolerance": 1e-5})
-    model = design_model(with_representation(inputs, tensor_product=coarse), load_vehicle())
-    assert model.report["vertices"] == [2, 3]
-    assert model.report["accuracy"]["relative_frobenius_error"] < 5e-5
-    assert model.report["accuracy"]["bode_magnitude_error_db"] < 0.3
-
-
 def test_grid_is_the_simple_and_less_accurate_alternative(inputs):
-    model = design_model(with_representation(inputs, representation="grid"), load_vehicle())
+    model = design_model(inputs.model.model_copy(update={"representation": "grid"}), load_vehicle())
     assert model.found.interpolation == "linear"
     assert model.report["vertices"] == [4, 5]
     assert 1e-6 < model.report["accuracy"]["relative_frobenius_error"] < 1e-4
@@ -76,14 +62,6 @@ def test_codesigned_model_keeps_six_vertices_and_agrees_with_the_ecm(codesign):
 
 
 @pytest.mark.long
-def test_singular_functions_alone_miss_the_phase_at_an_antiresonance(codesign):
-    options = codesign.model.tensor_product.model_copy(update={"functions": "singular"})
-    inputs = codesign.model.model_copy(update={"tensor_product": options})
-    accuracy = design_model(inputs, load_vehicle(), sections(codesign)).report["accuracy"]
-    assert accuracy["bode_phase_error_deg"] > 1.5
-
-
-@pytest.mark.long
 def test_codesigned_model_at_a_point_is_vehicle_and_filter_in_series(codesign):
     notch = sections(codesign)
     model = polytopic_model(codesign.model, load_vehicle(), notch)
@@ -92,13 +70,6 @@ def test_codesigned_model_at_a_point_is_vehicle_and_filter_in_series(codesign):
     joined = np.linalg.solve(T, A @ T)
     np.testing.assert_allclose(joined[:9, :9], model.polytope.at(26100.0, 2450.0)[0], atol=1e-9)
     assert np.abs(joined[:9, 9:]).max() < 1e-9
-
-
-def test_scales_of_the_filter_are_asked_for(codesign):
-    options = codesign.model.tensor_product.model_copy(update={"filter_scale": None})
-    inputs = codesign.model.model_copy(update={"tensor_product": options})
-    with pytest.raises(DesignError, match="filter_scale: missing"):
-        polytopic_model(inputs, load_vehicle(), sections(codesign))
 
 
 def sections(inputs):

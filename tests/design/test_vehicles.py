@@ -5,6 +5,7 @@ import json
 import pytest
 
 from hsv.base.errors import DesignError
+from hsv.cli.entry import main
 from hsv.control.checks import load_subject
 from hsv.control.design import read_design
 from hsv.control.tube_law import TubeStatusCode
@@ -17,33 +18,21 @@ from hsv.flight.verification import verify
 from hsv.model.vehicle import load_vehicle
 
 VEHICLE = """extends = "parker"
-[rigid_body]
-mass = { value = "4600 kg" }
-[geometry]
-reference_area = { uncertainty = "0 %" }
-mean_aerodynamic_chord = { uncertainty = "0 %" }
-thrust_moment_arm = { uncertainty = "0 %" }
-[thrust]
-thrust_beta_1 = { uncertainty = "0 %" }
-thrust_beta_3 = { uncertainty = "0 %" }
-thrust_beta_5 = { uncertainty = "0 %" }
-[input_limits]
-elevator_deflection = { minimum = "-31 deg", maximum = "32 deg" }
+rigid_body.mass.value = "4600 kg"
+geometry.reference_area.uncertainty = "0 %"
+geometry.mean_aerodynamic_chord.uncertainty = "0 %"
+geometry.thrust_moment_arm.uncertainty = "0 %"
+thrust.thrust_beta_1.uncertainty = "0 %"
+thrust.thrust_beta_3.uncertainty = "0 %"
+thrust.thrust_beta_5.uncertainty = "0 %"
+input_limits.elevator_deflection = { minimum = "-31 deg", maximum = "32 deg" }
 """
 
 SMALL = """extends = "baseline_single_k"
 name = "small"
 vehicle = "mine.toml"
-[model]
-representation = "grid"
-[model.grid]
-altitude_vertices = 2
-velocity_vertices = 2
-[disturbance]
-coupling = 0.3
-duration = "8 s"
-fault_start = "4 s"
-share = 0.5
+model = { representation = "grid", grid = { altitude_vertices = 2, velocity_vertices = 2 } }
+disturbance = { coupling = 0.3, duration = "8 s", fault_start = "4 s", share = 0.5 }
 """
 
 
@@ -60,29 +49,22 @@ def holds(path, quick=False):
     return all(claim.ok for claims in verify(load_subject(path), quick).values() for claim in claims)
 
 
-def designed(hsv, monkeypatch, source, target):
+def designed(monkeypatch, source, target):
     """Run ``hsv design`` from another folder than that of the inputs."""
     words = ["hsv", "design", str(source), "--out", str(target)]
     monkeypatch.chdir(target.parent)
     monkeypatch.setattr("sys.argv", words)
     with pytest.raises(SystemExit) as ended:
-        hsv()
+        main()
     assert not ended.value.code
 
 
-@pytest.fixture
-def hsv():
-    from hsv.cli.entry import main
-
-    return main
-
-
 @pytest.mark.long
-def test_a_design_is_for_the_vehicle_beside_its_inputs_and_its_certificate_is_enough(hsv, folder, monkeypatch):
+def test_a_design_is_for_the_vehicle_beside_its_inputs_and_its_certificate_is_enough(folder, monkeypatch):
     # Random sequences, which say nothing of vehicles, take most of a small design's time.
     monkeypatch.setattr("hsv.design.tube.SEQUENCES", 1000)
     design, source = folder / "small.yaml", folder / "inputs" / "small.toml"
-    designed(hsv, monkeypatch, source, design)
+    designed(monkeypatch, source, design)
     mine = load_vehicle(str(folder / "inputs" / "mine.toml"))
     found = read_design(design)
     assert found.vehicle == mine.digest != ""
@@ -116,13 +98,8 @@ def test_the_default_vehicle_by_name_changes_nothing(folder):
     ("own", "message"),
     [
         ('vehicle = "parkr"', "vehicle 'parkr': expected one of parker, winged_cone"),
-        ('vehicle = "gone.toml"', "gone.toml': cannot be read (No such file or directory), expected a TOML file"),
         ("vehicle = 3", "vehicle = 3: expected a name or a path"),
-        (
-            '[disturbance]\ncoupling = "strong"',
-            "disturbance.coupling = 'strong': expected one of paper_like, derived, or",
-        ),
-        ("[disturbance]\ncoupling = -1", "disturbance.coupling = '-1.0': expected one of paper_like, derived, or"),
+        ('[disturbance]\ncoupling = "strong"', "disturbance.coupling = 'strong': expected one of paper_like,"),
         ("[disturbance]\ncoupling = true", "disturbance.coupling = True: input should be a valid string"),
     ],
 )

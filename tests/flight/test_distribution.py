@@ -5,18 +5,14 @@ from statistics import NormalDist
 import mpmath
 import numpy as np
 import pytest
-import tomli_w
 
 from hsv.base.errors import ScenarioError
 from hsv.base.files import follow_extends
 from hsv.flight.distribution import KINDS, TRUNCATION, Distribution, standard_quantiles
-from hsv.flight.scenario import parse_scenario, scenario_at_means
+from hsv.flight.scenario import scenario_at_means
 
-BASE = {
-    "title": "Distributions",
-    "duration": "4 s",
-    "initial": {"altitude": "85500 ft", "velocity": "7900 ft/s"},
-}
+INITIAL = {"altitude": "85500 ft", "velocity": "7900 ft/s"}
+BASE = {"title": "Distributions", "duration": "4 s", "initial": INITIAL}
 
 
 def over_base(table):
@@ -56,38 +52,17 @@ def test_of_whole_numbers_each_between_the_ends_is_drawn_as_often():
     assert drawn.middle == 2.0
 
 
+CLIMB, MASS = {"altitude_change": "10 m"}, "vehicle.perturbation.mass"
+
+
 @pytest.mark.parametrize(
     ("table", "field", "unit", "low", "high"),
     [
         ({"initial": {"altitude": {"uniform": ["26000 m", "26100 m"]}}}, "initial.altitude", "m", 26000.0, 26100.0),
-        (
-            {"vehicle": {"perturbation": {"mass": {"normal": ["1 %", "1 %"]}}}},
-            "vehicle.perturbation.mass",
-            "1",
-            -0.02,
-            0.04,
-        ),
-        (
-            {
-                "command": [
-                    {"altitude_change": "10 m"},
-                    {"start": {"uniform": ["1 s", "2 s"]}, "altitude_change": "10 m"},
-                ]
-            },
-            "command[1].start",
-            "s",
-            1.0,
-            2.0,
-        ),
+        ({"vehicle": {"perturbation": {"mass": {"normal": ["1 %", "1 %"]}}}}, MASS, "1", -0.02, 0.04),
+        ({"command": [CLIMB, CLIMB | {"start": {"uniform": ["1 s", "2 s"]}}]}, "command[1].start", "s", 1.0, 2.0),
         ({"duration": {"uniform": ["3 s", "0.1 min"]}}, "duration", "s", 3.0, 6.0),
         ({"tube": {"tau": [1.0, 1.0, {"uniform": [0.9, 1.0]}, 1.0, 1.0]}}, "tube.tau[2]", "1", 0.9, 1.0),
-        (
-            {"notch": {"zero_frequency": {"uniform": ["15 rad/s", "16 rad/s"]}}},
-            "notch.zero_frequency",
-            "rad/s",
-            15.0,
-            16.0,
-        ),
         ({"controller": "mine", "mine": {"time": {"uniform": ["1 min", "90 s"]}}}, "mine.time", "s", 60.0, 90.0),
         ({"controller": "mine", "mine": {"gain": {"normal": [2.0, 0.5]}}}, "mine.gain", "1", 0.5, 3.5),
         ({"link": {"command": {"delay": {"uniform": [0, 5]}}}}, "link.command.delay", "1", 0.0, 5.0),
@@ -107,25 +82,13 @@ def test_any_number_may_be_a_distribution_which_stands_for_its_mean(table, field
 @pytest.mark.parametrize(
     ("field", "given", "message"),
     [
-        (
-            "altitude",
-            {"triangular": ["1 m", "2 m"]},
-            r"initial.altitude = .*expected a number or { uniform = \[least, ",
-        ),
+        ("altitude", {"triangular": ["1 m", "2 m"]}, r"initial.altitude = .*expected a number or { uniform ="),
         ("altitude", {"uniform": ["26000 m", "26100 m"], "normal": [0, 1]}, "expected a number or { uniform"),
-        ("altitude", {}, "expected a number or { uniform"),
         ("altitude", {"uniform": ["26000 m"]}, r"expected uniform = \[least, largest\]"),
-        ("altitude", {"uniform": ["26000 m", "26050 m", "26100 m"]}, r"expected uniform = \[least, largest\]"),
-        ("altitude", {"normal": "26000 m"}, r"expected normal = \[mean, standard deviation\]"),
         ("altitude", {"uniform": ["26100 m", "26000 m"]}, "expected a least value below the largest"),
-        ("altitude", {"uniform": ["26000 m", "26000 m"]}, "expected a least value below the largest"),
         ("altitude", {"normal": ["26000 m", "-5 m"]}, "expected a standard deviation above zero"),
-        ("altitude", {"normal": ["26000 m", "0 m"]}, "expected a standard deviation above zero"),
         ("altitude", {"uniform": ["26000 s", "26100 m"]}, "uniform = '26000 s': wrong unit, expected a finite"),
-        ("altitude", {"uniform": [26000, 26100]}, "uniform = 26000: the unit is missing"),
-        ("altitude", {"uniform": ["26000 m", {"uniform": [1, 2]}]}, "expected a finite quantity"),
         ("altitude", {"uniform": ["10000 m", "26000 m"]}, "expected 85000 ft to 86500 ft, the flight envelope"),
-        ("altitude", {"normal": ["26000 m", "1000 m"]}, "the flight envelope"),
     ],
 )
 def test_a_malformed_distribution_is_named_with_what_was_expected(field, given, message):
@@ -140,34 +103,15 @@ def test_a_malformed_distribution_is_named_with_what_was_expected(field, given, 
     ("table", "message"),
     [
         ({"title": {"uniform": [0.0, 1.0]}}, "title = .*expected a text"),
-        (
-            {"robust_mpc": {"gain_index": {"uniform": [0.0, 1.0]}}},
-            "robust_mpc.gain_index = .*expected integer from 0 to 63",
-        ),
-        ({"notch": {"enabled": {"uniform": [0.0, 1.0]}}}, "notch.enabled = .*expected bool"),
-        ({"reference": {"uniform": ["1 m", "2 m"]}}, "reference.uniform: unknown key, expected one of blend, trim"),
-        (
-            {"limits": {"altitude_end_error": {"uniform": ["1 m", "2 m"]}}},
-            "limits.altitude_end_error = .*expected a finite",
-        ),
+        ({"robust_mpc": {"gain_index": {"uniform": [0.0, 1.0]}}}, "robust_mpc.gain_index = .*expected integer from 0"),
+        ({"limits": {"altitude_end_error": {"uniform": ["1 m", "2 m"]}}}, "limits.altitude_end_error = .*expected a"),
         ({"controller": "mine", "mine": {"gain": {"even": [1.0, 2.0]}}}, "mine.gain = .*expected a number or {"),
-        (
-            {"controller": "mine", "mine": {"time": {"uniform": ["1 s", "2 m"]}}},
-            "mine.time = .*uniform = '2 m': wrong unit",
-        ),
+        ({"controller": "mine", "mine": {"time": {"uniform": ["1 s", "2 m"]}}}, "mine.time = .*uniform = '2 m':"),
     ],
 )
 def test_where_no_number_stands_there_is_no_distribution(table, message):
     with pytest.raises(ScenarioError, match=message):
         scenario_at_means(over_base(table), "mine")
-
-
-def test_a_flight_of_a_distribution_is_refused_with_its_field():
-    text = tomli_w.dumps(over_base({"initial": {"velocity": {"uniform": ["7890 ft/s", "7910 ft/s"]}}}))
-    with pytest.raises(
-        ScenarioError, match=r"^scenario 'mine': initial.velocity: a distribution, which hsv montecarlo"
-    ):
-        parse_scenario(text, "mine")
 
 
 def test_an_inherited_distribution_is_replaced_whole():

@@ -6,7 +6,6 @@ import zipfile
 from contextlib import contextmanager, nullcontext
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
@@ -96,23 +95,6 @@ def test_a_state_is_restored_from_its_bytes(page, pair):
     assert rows(range(20, 40)) == flown
     with pytest.raises(Exception, match="fmi3DoStep"):
         pair[0].doStep(0.8, 0.013)
-
-
-@pytest.mark.long
-def test_a_vehicle_with_real_hardware_is_that_of_the_bench(page, tmp_path):
-    scenario = load_scenario("case1_realistic", {"fault[0].start": "1 s", "duration": "2 s"})
-    path = tmp_path / "vehicle.fmu"
-    write_fmu(path, exported_vehicle(scenario))
-    parts = assemble_flight(scenario)
-    vehicle, command, found = page.Fmu(str(path)), parts.plant.initial.input, parts.plant.reset()
-    for k in range(100):
-        expected = [*found.state, *found.measurement, *found.forces, *found.effector, *found.air]
-        assert vehicle.read("state", "measurement", "forces", "effector", "air") == expected
-        command = command + np.array([0.001, -0.0005])
-        vehicle.write(command.tolist(), "command")
-        vehicle.doStep(k * page.T, page.T)
-        found = parts.plant.step(*parts.fault_injector.step(k, command))
-    vehicle.freeInstance()
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from hsv.base.errors import HsvError, RunError, ScenarioError
 from hsv.base.parameters import Parameter, validate
 from hsv.control.controller import ControllerInput, StepKernel
 from hsv.control.controllers import controller_class
-from hsv.flight.assembly import assemble_flight, scenario_parameters
+from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import parse_scenario
 from hsv.model.vehicle import load_vehicle
@@ -76,13 +76,10 @@ class Leaky:
 class CompiledLeaky(Leaky):
     """The same as a function in C, given by its address."""
 
-    fails_at = silent_at = -1
-
     @property
     def kernel(self):
-        own = self.own
-        settings = [own["leaky.gain"], own["leaky.time"], self.fails_at, self.silent_at]
-        return StepKernel(step_function("leaky"), np.zeros(1), np.array(settings))
+        settings = np.array([self.own["leaky.gain"], self.own["leaky.time"]])
+        return StepKernel(step_function("leaky"), np.zeros(1), settings)
 
 
 class Late(Leaky):
@@ -118,10 +115,7 @@ def test_answers_are_limited_and_the_limits_are_told(monkeypatch):
     monkeypatch.setattr(Late, "answer", (5.0, -3.0))
     flown = fly(flight("Late"))
     assert flown.history.u_unsaturated[20].tolist() == [5.0, -3.0]
-    assert flown.history.command[20].tolist() == [
-        LIMITS.input_maximum[0],
-        LIMITS.input_minimum[1],
-    ]
+    assert flown.history.command[20].tolist() == [LIMITS.input_maximum[0], LIMITS.input_minimum[1]]
     assert flown.curves.saturated[20].all() and not flown.curves.saturated[19].any()
 
 
@@ -131,18 +125,8 @@ def test_a_flight_has_the_wall_times_of_a_law_in_python_step_by_step():
 
 
 def test_settings_reach_the_controller_in_si_units():
-    scenario = parse_scenario(
-        SCENARIO.format(
-            controller=f"{__name__}:Leaky",
-            design="baseline",
-            settings='time = "1.5 min"',
-            table="leaky",
-            duration="1 s",
-        ),
-        "own",
-    )
-    assert scenario_parameters(scenario)["leaky.time"] == 90.0
-    parts = assemble_flight(scenario)
+    parts = flight(design="baseline", settings='time = "1.5 min"', duration="1 s")
+    assert parts.controller._controller.own["leaky.time"] == 90.0
     assert fly(parts).history.deviation.any()  # with a design there is a nominal trajectory, too
 
 
@@ -151,7 +135,6 @@ def test_settings_reach_the_controller_in_si_units():
     [
         ("Late", (np.nan, 0.0), r"Late, step 20: answered \[nan, 0.0\], expected 2 finite"),
         ("Late", (0.3,), r"Late, step 20: answered \(0.3,\), expected 2 finite numbers: fuel"),
-        ("Late", None, r"Late, step 20: answered None"),
         ("Raising", None, r"Raising, step 0: ZeroDivisionError: no gain \(test_foreign_controllers.py:\d+\)$"),
     ],
 )
@@ -160,18 +143,6 @@ def test_a_controller_that_fails_is_named_with_its_step(controller, answer, mess
     parts = flight(controller)
     with pytest.raises(RunError, match=message):
         fly(parts)
-
-
-def test_a_compiled_controller_that_fails_is_named_with_its_step(monkeypatch):
-    monkeypatch.setattr(CompiledLeaky, "fails_at", 33)
-    with pytest.raises(RunError, match=r"CompiledLeaky, step 33: returned 7, expected 0$"):
-        fly(flight("CompiledLeaky"))
-
-
-def test_a_compiled_controller_that_leaves_a_step_out_is_named(monkeypatch):
-    monkeypatch.setattr(CompiledLeaky, "silent_at", 5)
-    with pytest.raises(RunError, match=r"CompiledLeaky, step 5: answered \[nan, nan\]"):
-        fly(flight("CompiledLeaky"))
 
 
 class Listed(Leaky):
@@ -206,17 +177,9 @@ class JunkKernel(Leaky):
     kernel = 5
 
 
-class Complex(Late):
-    answer = np.array([1j, 0.0])
-
-
-def test_a_kernel_of_another_type_and_complex_answers_are_named(tmp_path, monkeypatch):
+def test_a_kernel_of_another_type_and_an_end_on_import_are_named(tmp_path, monkeypatch):
     with pytest.raises(HsvError, match=r"JunkKernel': kernel = 5: expected a StepKernel"):
         flight("JunkKernel")
-    with pytest.raises(
-        RunError, match=r"Complex, step 20: answered array\(\[0\.\+1\.j, 0\.\+0\.j\]\), expected 2 finite"
-    ):
-        fly(flight("Complex"))
     (tmp_path / "ends_on_import.py").write_text("import sys\nsys.exit(0)\n")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(HsvError, match="cannot be loaded, ends_on_import ends the program on import"):
@@ -238,26 +201,18 @@ def test_flights_in_threads_share_no_state():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (
-            {"controller": "7"},
-            r"controller = '7': expected one of .*package.module:Class, path/lib.so:symbol or path/name.fmu",
-        ),
+        ({"controller": "7"}, r"controller = '7': expected one of .*package.module:Class, path/lib.so:symbol or"),
         ({"controller": "7:lqr"}, r"controller = '7:lqr': '7' is no module, expected package.module:Class or path/"),
-        ({"controller": ":lqr"}, r"controller = ':lqr': '' is no module, expected package.module:Class or path/"),
         ({"controller": "./build/lqr"}, r"controller = './build/lqr': no symbol, expected path/lib.so:symbol"),
-        ({"controller": "lqr.so"}, r"controller = 'lqr.so': no symbol, expected path/lib.so:symbol"),
         ({"controller": "./7:lqr"}, r"controller = '\./7:lqr': cannot be read \(No such .*expected a shared library"),
         ({"controller": "tube_mcp"}, r"controller = 'tube_mcp': expected one of .*did you mean 'tube_mpc'"),
         ({"controller": "nowhere:Class"}, r"No module named 'nowhere' \(PYTHONPATH=FOLDER:\$PYTHONPATH finds"),
-        ({"controller": "math:nothing"}, r"cannot be loaded, AttributeError"),
         ({"controller": "math:cos"}, r"has no PARAMETERS, from_parameters, expected a class of a controller"),
         ({"controller": f"{__name__}:Listed"}, r"Listed': PARAMETERS: expected hsv.base.parameters.Parameter, each"),
         ({"controller": f"{__name__}:Without"}, r"Without': has no reset, step, expected a controller"),
         ({"settings": "gian = 1.0"}, r"leaky.gian: unknown key, expected one of gain, time"),
         ({"settings": "gain = -1.0"}, r"leaky.gain = -1.0: expected from 0 to 10"),
-        ({"settings": 'time = "3 m"'}, r"leaky.time = '3 m': wrong unit"),
         ({"table": "lucky", "settings": "gain = 1.0"}, r"lucky: unknown key, expected one of leaky"),
-        ({"controller": "tube_mpc"}, r"leaky: unknown key"),
         ({"controller": "tube_mpc", "table": "tube"}, r"design = '': expected one, tube_mpc flies with its gains"),
     ],
 )

@@ -45,16 +45,17 @@ def folder(tmp_path_factory):
     return folder
 
 
+def written(folder, settings="", controller="probe.so:probe", design=""):
+    """Return the path of a scenario, written to a folder."""
+    path = folder / "mine.toml"
+    path.write_text(SCENARIO.format(settings=settings, controller=controller, design=design))
+    return str(path)
+
+
 @pytest.fixture
 def flight(folder):
     """Assemble the flight of a scenario beside the library."""
-
-    def assemble(settings="", controller="probe.so:probe", design=""):
-        path = folder / "scenario.toml"
-        path.write_text(SCENARIO.format(settings=settings, controller=controller, design=design))
-        return assemble_flight(load_scenario(str(path)))
-
-    return assemble
+    return lambda *settings, **named: assemble_flight(load_scenario(written(folder, *settings, **named)))
 
 
 class Probe:
@@ -89,31 +90,13 @@ def test_c_and_python_fly_the_same_bits(flight, folder, design, settings):
     assert str(folder) not in Path("/proc/self/maps").read_text()
 
 
-def test_c_and_python_answer_the_same_stepwise(flight):
-    ours, other = flight(), flight(controller=f"{__name__}:Probe")
-    state = ours.plant.initial.state.copy()
-    state[3] += 0.01
-    for _ in range(2):
-        for parts in (ours, other):
-            parts.controller.reset()
-        for k in range(5):
-            given = ControllerInput(
-                k, state, 0.0, ours.plant.initial.state, np.array([0.4, 0.2]), np.zeros(9), np.zeros(2), np.zeros(2)
-            )
-            answers = [parts.controller.step(given).input.tolist() for parts in (ours, other)]
-            assert answers[0] == answers[1]
-            assert (answers[0][1] == 0.2) == (k == 0)
-
-
 def test_a_copy_goes_on_from_the_state_of_the_first(flight):
     assert from_copied_state(flight(), fly(flight())) == ""
 
 
 def test_what_a_library_keeps_beside_its_state_is_found(tmp_path):
-    path = tmp_path / "static.toml"
-    path.write_text(SCENARIO.format(settings="", controller="probe.so:probe", design=""))
     build_probe(tmp_path, "-DSTATIC")
-    found = next(findings(load_scenario(str(path))))
+    found = next(findings(load_scenario(written(tmp_path))))
     assert found.check == "flown twice" and found.difference.startswith("u_unsaturated from step 0 on")
 
 
@@ -134,32 +117,21 @@ def test_what_goes_wrong_is_named_with_its_step_and_the_next_flight_flies(flight
     assert len(fly(flight()).time) == 201
 
 
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ("crash_at = 3", r"probe.so:probe, step 3: crashed \(SIGSEGV\)$"),
-        ("fail_at = 3", r"probe.so:probe, step 3: RunError: returned 7$"),
-        ("silent_at = 3", r"probe.so:probe, step 3: answered \[nan, nan\]"),
-    ],
-)
-def test_what_goes_wrong_stepwise_is_named_with_its_step(flight, settings, message):
-    parts = flight(settings)
-    given = ControllerInput(
-        3, np.zeros(9), 0.0, np.zeros(9), np.array([0.4, 0.2]), np.zeros(9), np.zeros(2), np.zeros(2)
-    )
-    with pytest.raises(ControllerError, match=message):
-        parts.controller.step(given)
-    parts.controller.step(given._replace(step=4))
+def test_what_goes_wrong_stepwise_is_named_with_its_step(flight):
+    controller, two = flight("crash_at = 3").controller, np.array([0.4, 0.2])
+    given = ControllerInput(3, np.zeros(9), 0.0, np.zeros(9), two, np.zeros(9), two, two)
+    with pytest.raises(ControllerError, match=r"probe.so:probe, step 3: crashed \(SIGSEGV\)$"):
+        controller.step(given)
+    controller.step(given._replace(step=4))
 
 
 def test_a_library_that_is_built_anew_is_loaded_anew(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(SCENARIO.format(settings="", controller="probe.so:probe", design=""))
+    path = written(tmp_path)
     build_probe(tmp_path)
-    assert fly(assemble_flight(load_scenario(str(path)))).history.command.std() > 0.0
+    assert fly(assemble_flight(load_scenario(path))).history.command.std() > 0.0
     build_probe(tmp_path, "-DSTATE_SIZE=2", '-DWEIGHT="weights"')
     with pytest.raises(ScenarioError, match=r"probe.weight: unknown key, expected one of weights, crash"):
-        assemble_flight(load_scenario(str(path), {"probe.weight": [0.1, 0.1, 0.1]}))
+        assemble_flight(load_scenario(path, {"probe.weight": [0.1, 0.1, 0.1]}))
 
 
 @pytest.mark.parametrize(
@@ -167,14 +139,8 @@ def test_a_library_that_is_built_anew_is_loaded_anew(tmp_path):
     [
         (["-DABI=2"], r"^scenario 'mine': controller = '.*/probe.so:probe': abi_version = 2, expected 1"),
         (['-DOUTPUTS={"u","1",2}'], r": outputs\[0\] = u, 2 in '1', expected wanted_input, 2 in '1, rad'$"),
-        (
-            ['-DINPUTS={"estimate","m",9}'],
-            r": inputs\[0\] = estimate, 9 in 'm', expected estimate, 9 in 'm, m/s, rad, ",
-        ),
-        (
-            ["-DINPUTS=HSV_CONTROLLER_INPUTS,HSV_FILTER_STATE_INPUT(4)"],
-            r": inputs\[6\] = filter_state, 4 in 'rad, rad s', expected filter_state, 2 in",
-        ),
+        (['-DINPUTS={"estimate","m",9}'], r": inputs\[0\] = estimate, 9 in 'm', expected estimate, 9 in 'm, m/s,"),
+        (["-DINPUTS=HSV_CONTROLLER_INPUTS,HSV_FILTER_STATE_INPUT(4)"], r": inputs\[6\] = filter_state, 4 in 'rad, rad"),
     ],
 )
 def test_a_library_that_is_no_controller_is_refused(tmp_path, flags, message, monkeypatch):
@@ -182,18 +148,14 @@ def test_a_library_that_is_no_controller_is_refused(tmp_path, flags, message, mo
     # As in the library's process, without starting one for each.
     library = LoadedLibrary(tmp_path / "probe.so", SharedMemory(-1))
     monkeypatch.setattr("hsv.control.library_process._in_this_process", lambda path: library)
-    path = tmp_path / "mine.toml"
-    path.write_text(SCENARIO.format(settings="", controller="probe.so:probe", design="baseline"))
     with pytest.raises(ScenarioError, match=message):
-        assemble_flight(load_scenario(str(path)))
+        assemble_flight(load_scenario(written(tmp_path, design="baseline")))
 
 
 def test_a_library_that_crashes_while_it_is_loaded_is_refused(tmp_path):
     build_probe(tmp_path, "-DCRASHES_ON_LOADING")
-    path = tmp_path / "mine.toml"
-    path.write_text(SCENARIO.format(settings="", controller="probe.so:probe", design=""))
     with pytest.raises(ScenarioError, match=r"': crashed \(SIGSEGV\) while it was loaded$"):
-        assemble_flight(load_scenario(str(path)))
+        assemble_flight(load_scenario(written(tmp_path)))
 
 
 @pytest.mark.parametrize(
@@ -219,31 +181,21 @@ def test_settings_reach_the_library_in_si_units(flight):
 def test_a_path_out_of_the_folder_is_refused(tmp_path, climbing):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "link").symlink_to(tmp_path)
-    path = tmp_path / "mine" / "scenario.toml"
-    path.write_text(SCENARIO.format(settings="", controller=f"{climbing}:probe", design=""))
     with pytest.raises(ScenarioError, match=r"controller = '.*probe.so:probe': expected a path inside the scenario's"):
-        load_scenario(str(path))
+        load_scenario(written(tmp_path / "mine", controller=f"{climbing}:probe"))
 
 
 def test_a_path_is_from_the_folder_of_the_file_that_says_it(folder, tmp_path):
-    base, own = folder / "base.toml", tmp_path / "own.toml"
-    base.write_text(SCENARIO.format(settings="", controller="./probe.so:probe", design=""))
+    base, own = written(folder, controller="./probe.so:probe"), tmp_path / "own.toml"
     own.write_text(f'extends = "{base}"\nduration = "1 s"\n')
     assert load_scenario(str(own)).controller == f"{folder}/probe.so:probe"
-    assert f'controller = "{folder}/probe.so:probe"' in scenario_text(str(base))
+    assert f'controller = "{folder}/probe.so:probe"' in scenario_text(base)
 
 
-def test_a_library_that_is_not_there_is_named(flight):
-    with pytest.raises(ScenarioError, match=r"controller = '.*/absent.so:probe': cannot be read \(No such file"):
-        flight(controller="absent.so:probe")
-
-
-def test_a_library_without_its_source_is_prepared_for_a_run_as_it_flies_in_process(tmp_path):
+def test_a_library_without_its_source_is_prepared_for_a_run(tmp_path):
     build_probe(tmp_path)
-    path, files = tmp_path / "mine.toml", tmp_path / "files"
-    path.write_text(SCENARIO.format(settings="", controller="probe.so:probe", design=""))
-    assert len(fly(assemble_flight(load_scenario(str(path)))).time) == 201
-    prepare(str(path), bag=tmp_path / "bag", folder=files)
+    files = tmp_path / "files"
+    prepare(written(tmp_path), bag=tmp_path / "bag", folder=files)
     assert {file.name for file in files.iterdir()} == {"scenario.toml", "scenario.yaml", "design.yaml", "run.yaml"}
     assert f"controller_sha256={library_digest(f'{tmp_path}/probe.so:probe')}" in (files / "run.yaml").read_text()
 
@@ -255,9 +207,8 @@ def test_the_controller_in_the_header_s_comment_is_built_and_flies(tmp_path):
     [command] = [line for line in code if line.startswith("cc ")]
     (tmp_path / "trimmed.c").write_text("\n".join(code[: code.index(command)]))
     subprocess.run(command, shell=True, check=True, cwd=tmp_path)
-    path = tmp_path / "mine.toml"
-    text = SCENARIO.format(settings="share = 0.5", controller="trimmed.so:trimmed", design="")
-    path.write_text(text.replace("[probe]", "[trimmed]"))
+    path = Path(written(tmp_path, "share = 0.5", "trimmed.so:trimmed"))
+    path.write_text(path.read_text().replace("[probe]", "[trimmed]"))
     flown = fly(assemble_flight(load_scenario(str(path))))
     assert np.allclose(flown.history.command, flown.reference_input * [1.0, 0.5], rtol=1e-15, atol=0.0)
     assert library_record(load_scenario(str(path)).controller).source_name == "trimmed.c"

@@ -3,7 +3,7 @@ import pytest
 from hsv.base.errors import ScenarioError
 from hsv.control.design import find_design
 from hsv.flight.assembly import assemble, assemble_flight, flight_parameters
-from hsv.flight.scenario import load_scenario, parse_scenario, scenario_names, scenario_text
+from hsv.flight.scenario import load_scenario, parse_scenario, scenario_text
 
 CASE1 = scenario_text("case1")
 
@@ -15,14 +15,6 @@ def refusal(text):
     assert "\n" not in message
     assert message.startswith("scenario 'mine': ")
     return message.removeprefix("scenario 'mine': ")
-
-
-@pytest.mark.parametrize("name", scenario_names())
-def test_every_shipped_scenario_loads_and_assembles(name):
-    scenario = load_scenario(name)
-    assert scenario.name == name
-    assert scenario.title
-    assemble(flight_parameters(scenario))
 
 
 def test_case1_is_the_flight_of_the_paper():
@@ -49,11 +41,6 @@ def test_edges_of_the_envelope_belong_to_it(altitude, step):
     assemble(flight_parameters(parse_scenario(text, "edge")))
 
 
-def test_metres_serve_as_well_as_feet():
-    text = CASE1.replace('"85500 ft"', '"26060.4 m"').replace('"250 ft/s"', '"76.2 m/s"')
-    assert parse_scenario(text, "case1").parameters() == load_scenario("case1").parameters()
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -61,28 +48,16 @@ def test_metres_serve_as_well_as_feet():
         ('title = "', 'wings = 2\ntitle = "', "wings: unknown key, expected one of title, design, "),
         ('title = "', 'name = "x"\ntitle = "', "name: unknown key"),
         ('title = "', 'controller = ["tube_mpc"]\ntitle = "', "controller = ['tube_mpc']: expected a name or a path"),
-        (
-            "effectiveness = 0.9",
-            "effectiveness = 0.9\nwhen = 3",
-            "fault[0].when: unknown key, expected one of effective",
-        ),
+        ("effectiveness = 0.9", "effectiveness = 0.9\nwhen = 3", "fault[0].when: unknown key, expected one of"),
         ('"600 ft"', '"600 s"', "command[0].altitude_change = '600 s': wrong unit, expected a finite quantity such as"),
         ('"600 ft"', "600", "command[0].altitude_change = 600: the unit is missing"),
-        ('"600 ft"', '"nan ft"', "command[0].altitude_change = 'nan ft': "),
-        ('"600 ft"', '"6e999 ft"', "command[0].altitude_change = '6e999 ft': expected a finite quantity"),
         ('"600 ft"', '"6000 ft"', "command[0].altitude_change leads to 91500 ft at 0 s: expected 85000 ft to 86500 ft"),
-        (
-            '"250 ft/s"',
-            '"2500 ft/s"',
-            "command[0].velocity_change leads to 10400 ft/s at 0 s: expected 7700 ft/s to 8300 ft/s",
-        ),
+        ('"250 ft/s"', '"2500 ft/s"', "command[0].velocity_change leads to 10400 ft/s at 0 s: expected 7700 ft/s to"),
         ('"85500 ft"', '"865000 ft"', "initial.altitude = '865000 ft': expected 85000 ft to 86500 ft, the flight env"),
-        ('"7900 ft/s"', '"7900 ft"', "initial.velocity = '7900 ft': wrong unit"),
         ('duration = "200 s"', 'duration = "-1 s"', "duration = '-1 s': expected a time from 0 s to 100000 s"),
         ('duration = "200 s"', "", "duration: missing"),
         ('"CM"', '"XM"', "vehicle.model = 'XM': expected 'CM' or 'DM'"),
         ('"paper_like"', '"strong"', "vehicle.coupling = 'strong': expected one of paper_like, derived, or a "),
-        ("effectiveness = 0.9", "effectiveness = nan", "fault[0].effectiveness = nan: expected a finite quantity"),
         ("effectiveness = 0.9", "effectiveness = 1.9", "fault[0].effectiveness = 1.9: expected from 0 to 1"),
         ("effectiveness = 0.9", 'effectiveness = "9 deg"', "fault[0].effectiveness = '9 deg': wrong unit"),
         ("loss_of_effectiveness", "melted", "fault[0].type = 'melted': expected one of loss_of_effectiveness"),
@@ -90,34 +65,21 @@ def test_metres_serve_as_well_as_feet():
         ('"100 s"', '"-1 s"', "fault[0].start = '-1 s': expected a time"),
         ('"100 s"', '"200 s"', "fault[0].start = 200 s: expected a time before the flight's end, 200 s"),
         ('"600 ft"', '"600 ft"\nstart = "250 s"', "command[0].start = 250 s: expected a time before the flight's end"),
-        (
-            "[[fault]]",
-            '[[tube.change]]\nstart = "999 s"\ntau = 1.0\n[[fault]]',
-            "tube.change[0].start = 999 s: expected a time before the flight's end, 200 s",
-        ),
+        ("[limits]", '[[tube.change]]\nstart = "999 s"\ntau = 1.0\n[limits]', "tube.change[0].start = 999 s: expected"),
         ("[[fault]]", "[fault]", "fault = {"),
         ("saturated_steps", "stalls", "limits.stalls: unknown key, expected one of altitude_rise_time"),
         ('"8 ft"', '"8 s"', "limits.altitude_end_error = '8 s': wrong unit"),
         ('"8 ft"', '"-8 ft"', "limits.altitude_end_error = '-8 ft': expected of at least 0 ft"),
-        (
-            "saturated_steps = 0",
-            "saturated_steps = 0.5",
-            "limits.saturated_steps = 0.5: expected a whole number of at least 0",
-        ),
+        ("saturated_steps = 0", "saturated_steps = 0.5", "limits.saturated_steps = 0.5: expected a whole number of"),
         ('duration = "200 s"', 'duration = "２００ s"', "duration = '２００ s': cannot be read"),
         ("[limits]", "[notch]\nenabled = 1\n[limits]", "notch.enabled = 1: expected bool"),
         ("[limits]", "[notch]\nzero_frequency = 15\n[limits]", "notch.zero_frequency = 15: the unit is missing"),
-        ("[limits]", '[notch]\nzero_damping = "1 s"\n[limits]', "notch.zero_damping = '1 s': wrong unit"),
         ("[limits]", "[notch]\nzero_damping = [-1, 2]\n[limits]", "notch.zero_damping[0] = -1: expected from 0 to 10"),
         ('[vehicle]\nmodel = "CM"', "[vehicle]\nmodel = 3", "vehicle.model = 3: expected 'CM' or 'DM'"),
         ("[vehicle]", "[vehicle", "Expected ']' at the end of a table declaration (at line"),
         ('title = "', 'title = 3 # "', "title = 3: expected a text"),
         ('title = "', 'title = " " # "', "title = ' ': expected a text that is not empty"),
-        (
-            'title = "',
-            'controller = "robust_mpc"\nrobust_mpc.gain_index = -1\ntitle = "',
-            "robust_mpc.gain_index = -1: expected integer from 0 to 63",
-        ),
+        ('title = "', 'robust_mpc.gain_index = -1\ntitle = "', "robust_mpc.gain_index = -1: expected integer from 0"),
     ],
 )
 def test_a_wrong_field_is_named_with_value_and_expectation(old, new, message):
@@ -132,9 +94,7 @@ def test_a_wrong_field_is_named_with_value_and_expectation(old, new, message):
         ('mass = "+10 ft"', "vehicle.perturbation.mass = '+10 ft': wrong unit"),
         ('mass = "-95 %"', "vehicle.perturbation.mass = '-95 %': expected -90 % to +1000 %"),
         ("mass = nan", "vehicle.perturbation.mass = nan: expected a finite quantity"),
-        ("mass = true", "vehicle.perturbation.mass = True: expected a finite quantity"),
         ("mass = 5", "vehicle.perturbation.mass = 5: the unit is missing, expected one such as '+5 %'"),
-        ('mass = "0.05"', "vehicle.perturbation.mass = '0.05': the unit is missing"),
         ("mass = { uniform = [-0.1, 0.1] }", "vehicle.perturbation.mass = -0.1: the unit is missing"),
     ],
 )
@@ -142,37 +102,11 @@ def test_a_wrong_perturbation_is_named(line, message):
     assert refusal(CASE1.replace("[initial]", f"[vehicle.perturbation]\n{line}\n[initial]")).startswith(message)
 
 
-def test_an_empty_file_lacks_its_first_field():
-    assert refusal("") == "title: missing"
-
-
-@pytest.mark.parametrize(
-    ("name", "problem"),
-    [
-        ("case9", "expected a path or one of case1, case1_active"),
-        ("./absent.toml", "cannot be read (No such file or directory), expected a TOML file"),
-        ("/", "cannot be read (Is a directory), expected a TOML file"),
-    ],
-)
-def test_a_scenario_that_is_not_there_is_named(name, problem):
-    with pytest.raises(ScenarioError) as caught:
-        load_scenario(name)
-    assert str(caught.value).startswith(f"scenario {name!r}: {problem}")
-
-
-def test_what_is_not_text_is_refused(tmp_path):
-    path = tmp_path / "binary.toml"
-    path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ScenarioError, match=r"binary.toml': cannot be read \(not text\)"):
-        load_scenario(str(path))
-
-
-def test_a_design_that_is_not_there_is_named():
-    from hsv.base.errors import DesignError
-
-    scenario = parse_scenario(CASE1.replace('"baseline"', '"absent"'), "mine")
-    with pytest.raises(DesignError, match=r"design = 'absent': no such file"):
-        flight_parameters(scenario)
+def test_a_scenario_that_is_not_there_is_named():
+    with pytest.raises(ScenarioError, match=r"^scenario 'case9': expected a path or one of case1, case1_active"):
+        load_scenario("case9")
+    with pytest.raises(ScenarioError, match=r"^scenario '/': cannot be read \(Is a directory\), expected a TOML file"):
+        load_scenario("/")
 
 
 def test_a_flight_may_have_another_notch_filter_than_its_design():
@@ -182,33 +116,19 @@ def test_a_flight_may_have_another_notch_filter_than_its_design():
     assert [(s.zero_frequency, s.pole_damping) for s in flown] == [(15.0, 0.5), (19.5, 0.4)]
 
 
-STEEP = """[[command]]
-velocity_change = "100 ft/s"
-start = "1 s"
-end = "1.1 s"
-[limits]"""
+LATER = '[[tube.change]]\nstart = "5 s"\ntau = 1\n[[tube.change]]\nstart = "6 s"\ntau = 0.01\n[limits]'
+TWO_SECTIONS = '[notch]\nzero_frequency = ["15 rad/s", "19 rad/s"]\n[limits]'
+ANOTHER_GAIN = 'controller = "robust_mpc"\nrobust_mpc.gain_index = 40\ntitle = "'
+STEEP = '[[command]]\nvelocity_change = "100 ft/s"\nstart = "1 s"\nend = "1.1 s"\n[limits]'
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
         ("[limits]", "[tube]\ntau = 2\n[limits]", r"tube\.tau\[0\] = 2\.0: expected double array from 0 to 1"),
-        ("[limits]", "[tube]\ntau = [1, 0.5]\n[limits]", r"tube\.tau: 2 values, expected 1 or 5"),
-        (
-            "[limits]",
-            '[[tube.change]]\nstart = "5 s"\ntau = 1\n[[tube.change]]\nstart = "6 s"\ntau = 0.01\n[limits]',
-            r"tube\.change\[1\]\.tau\[0\] = 0\.01: expected .*certified",
-        ),
-        (
-            "[limits]",
-            '[notch]\nzero_frequency = ["15 rad/s", "19 rad/s"]\n[limits]',
-            r"notch\.zero_frequency: 2 values, expected as many as notch\.zero_damping, 1 ",
-        ),
-        (
-            'title = "',
-            'controller = "robust_mpc"\nrobust_mpc.gain_index = 40\ntitle = "',
-            r"robust_mpc\.gain_index = 40: expected 0 to \d+",
-        ),
+        ("[limits]", LATER, r"tube\.change\[1\]\.tau\[0\] = 0\.01: expected .*certified"),
+        ("[limits]", TWO_SECTIONS, r"notch\.zero_frequency: 2 values, expected as many as notch\.zero_damping, 1 "),
+        ('title = "', ANOTHER_GAIN, r"robust_mpc\.gain_index = 40: expected 0 to \d+"),
         ("[limits]", STEEP, r"command: reference at 1 s: altitude = .* no equilibrium"),
         ('"200 s"', '"200.01 s"', r"duration = 200\.01 s: expected a whole number of periods, 0\.02 s each"),
         ('"200 s"', '"0.009 s"', r"duration = 0\.009 s: expected at least a period, 0\.02 s"),
@@ -259,7 +179,6 @@ def test_commands_add_up_to_breakpoints():
         ('start = "20 s"\nend = "10 s"', "command[0].end = 10 s: expected a time after start, 20 s, or none"),
         ('altitude_change = "1 ft"\nstart = "9 s"\nend = "9 s"', "command[0].end = 9 s: expected a time after start"),
         ("", "command[0]: changes nothing, expected altitude_change or velocity_change"),
-        ('start = "20"', "command[0].start = '20': "),
         ('altitude_change = "-600 ft"\nend = "60 s"', "command[0].altitude_change leads to 84900 ft at 60 s: expected"),
         ('altitude_step = "600 ft"', "command[0].altitude_step: unknown key, expected one of altitude_change, vel"),
     ],
@@ -290,11 +209,9 @@ def test_tau_and_its_changes_become_parameters():
     [
         ("robust_mpc", '[integral]\nrate = "0.1 / s"', "controller tube_mpc"),
         ("robust_mpc", "[tube]\ntau = 0.8", "controller tube_mpc"),
-        ("robust_mpc", "[tube]", "controller tube_mpc"),
         ("robust_mpc", '[nominal]\nlaw = "qp"', "one that follows the nominal state"),
         ("tube_mpc", "[robust_mpc]\ngain_index = 1", "controller robust_mpc"),
         ("one.of:Ours", '[integral]\nrate = "0.1 / s"', "controller tube_mpc"),
-        ("one.of:Ours", "[robust_mpc]", "controller robust_mpc"),
     ],
 )
 def test_a_table_that_the_controller_does_not_read_is_refused(controller, table, expected):

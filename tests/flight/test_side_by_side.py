@@ -53,12 +53,6 @@ def test_corners_of_a_scenario_are_the_same_in_every_lane(scenario):
     assert len({own.fingerprint for own in flown}) == WIDTH
 
 
-def test_flights_too_long_for_the_memory_of_all_lanes_fly_one_at_a_time():
-    parts = components("case1", duration=2000.0)
-    assert not FlightGroup.takes([parts] * WIDTH)
-    assert FlightGroup.takes([parts] * WIDTH, rows=1)
-
-
 def test_a_flight_that_diverges_ends_alone_and_disturbs_no_other():
     parts = components("case1", duration=20.0)
     flown = check([parts.perturbed({"moment_elevator": -0.85 if i in (1, WIDTH - 1) else 0.0}) for i in range(WIDTH)])

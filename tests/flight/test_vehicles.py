@@ -3,7 +3,6 @@
 import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from hsv.base.errors import ScenarioError
@@ -43,11 +42,6 @@ def folder(tmp_path):
     (tmp_path / "mine.toml").write_text(MINE)
     (tmp_path / "flight.toml").write_text(FLIGHT.format("mine.toml"))
     return tmp_path
-
-
-def test_the_default_vehicle_by_name_is_the_flight_of_the_scenario_that_names_none():
-    named, plain = (fly(assemble_flight(load_scenario("case1", SHORT | c))) for c in ({"vehicle": "parker"}, {}))
-    assert named.fingerprint == plain.fingerprint
 
 
 def test_a_vehicle_beside_its_scenario_is_flown_from_any_folder_and_taken_along(folder, monkeypatch):
@@ -120,45 +114,14 @@ def test_a_tube_is_certified_for_its_own_vehicle(design, changes, status):
     assert next(steps(parts)).diagnostics.status is status
 
 
-def test_input_limits_are_those_of_the_vehicle(folder):
-    (folder / "mine.toml").write_text(
-        MINE + '[input_limits]\nelevator_deflection = { minimum = "5 deg", maximum = "13 deg" }\n'
-    )
-    (folder / "hard.py").write_text(
-        "class Hard:\n"
-        "    PARAMETERS = ()\n"
-        "    @classmethod\n"
-        "    def from_parameters(cls, values, design):\n"
-        "        return cls()\n"
-        "    def reset(self):\n"
-        "        pass\n"
-        "    def step(self, inputs):\n"
-        "        return inputs.reference_input[0], 1.0\n"
-    )
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(folder)
-        own = SHORT | {"controller": "hard:Hard", "design": "", "duration": "0.2 s", "fault": []}
-        flight = fly(assemble_flight(load_scenario(str(folder / "flight.toml"), own)))
-    assert np.all(flight.history.command[:, 1] == np.radians(13.0))
-
-
 @pytest.mark.parametrize(
     ("vehicle", "message"),
     [
-        (
-            'vehicle = "parkr"',
-            "vehicle 'parkr': expected one of parker, winged_cone or the path of a TOML file (did you",
-        ),
-        ("vehicle = 3", "vehicle = 3: expected a name, a path, or a table"),
+        ('vehicle = "parkr"', "vehicle 'parkr': expected one of parker, winged_cone or the path of a TOML"),
         ("[vehicle]\nname = 3", "vehicle.name = 3: expected a name or a path"),
-        ("[vehicle]\ndefinition = 3", "vehicle.definition = 3: expected the tables of a vehicle file"),
         ("[vehicle]\ndefinition = { wings = 2 }", "vehicle 'parker': wings: unknown field, expected one of title"),
         ("[vehicle]\ncoupling = { uniform = [-1, 1] }", "vehicle.coupling = -1.0: expected one of paper_like, derived"),
-        (
-            f"[vehicle]\ncoupling = 1{400 * '0'}",
-            f"vehicle.coupling = 1{400 * '0'}: expected one of paper_like, derived, or",
-        ),
-        ("[vehicle]\ncoupling = -1", "vehicle.coupling = -1: expected one of paper_like, derived, or a multiple of"),
+        (f"[vehicle]\ncoupling = 1{400 * '0'}", f"vehicle.coupling = 1{400 * '0'}: expected one of paper_like,"),
     ],
 )
 def test_a_wrong_vehicle_is_named(tmp_path, vehicle, message):

@@ -7,7 +7,6 @@ import pytest
 from marking import long
 from numpy.testing import assert_allclose
 
-from hsv.base.errors import DesignError
 from hsv.control.checks import Subject, load_subject
 from hsv.control.design import find_design
 from hsv.control.verification import Tube
@@ -97,8 +96,3 @@ def test_a_fault_beyond_the_region_is_found_outside(baseline):
     _, disturbance, room = scenario_checks(baseline, scenario)
     assert not disturbance.ok and disturbance.value > 2.0 and "lost_elevator" in disturbance.name
     assert room.ok
-
-
-def test_without_a_tube_there_is_nothing_to_check(baseline):
-    with pytest.raises(DesignError, match="controller = 'robust_mpc', expected 'tube_mpc'"):
-        list(scenario_checks(baseline, load_scenario("case1_rmpc")))

@@ -9,14 +9,14 @@ from numpy.testing import assert_array_equal
 
 from hsv.base.errors import ParameterError
 from hsv.core import lib
-from hsv.model.links import LARGEST, command_link, computation, link_state, measurement_link
+from hsv.model.links import command_link, computation, link_state, measurement_link
 
 T = 0.02
 STEPS = 4000
 SENT = np.array([26000.0, 2400.0, 0.03, 0.04, 0.01, 1.0, 2.0, 0.3, 0.4]) * (
     1.0 + 0.1 * np.sin(np.outer(np.arange(STEPS), np.linspace(0.11, 0.27, 9)))
 )
-MEASUREMENT, COMMAND = 0, 1
+MEASUREMENT = 0
 
 
 def passed(link, sent=SENT, seed=0, before=None):
@@ -43,12 +43,6 @@ def held(taken):
     return np.array([False, *(taken[1:] == taken[:-1]).all(axis=1)])
 
 
-def test_an_ideal_link_passes_every_bit():
-    link = measurement_link({})
-    assert link.ideal
-    assert_array_equal(passed(link), SENT)
-
-
 @pytest.mark.parametrize("delay", [1, 3, 50])
 def test_delay_is_exact(delay):
     assert_array_equal(measured(delay=float(delay)), SENT[np.maximum(np.arange(STEPS) - delay, 0)])
@@ -70,13 +64,6 @@ def test_time_of_computation_is_whole_periods_and_the_rest():
         assert (found[1] == 0.0) == (rest == 0.0)
 
 
-def test_of_payloads_that_are_late_at_random_the_newest_counts():
-    late = np.floor(3.0 * drawn(lib.LINK_DELAY, MEASUREMENT, seed=5)[0])
-    assert set(late) == {0.0, 1.0, 2.0}
-    newest = np.maximum.accumulate(np.arange(STEPS) - 1 - late)
-    assert_array_equal(measured(seed=5, delay=1.0, jitter=2.0), SENT[np.maximum(newest, 0).astype(int)])
-
-
 def test_lost_payloads_are_those_that_were_drawn_and_the_last_one_is_held():
     lost = drawn(lib.LINK_LOSS, MEASUREMENT, seed=3)[0] < 0.2
     assert abs(lost.sum() - 0.2 * STEPS) < 4.0 * math.sqrt(0.2 * 0.8 * STEPS)
@@ -95,31 +82,6 @@ def test_losses_in_bursts_have_their_share_and_their_mean_length():
     assert lost.sum() / runs == pytest.approx(4.0, rel=0.15)
     assert len(edges) > 1000
     assert held(measured(loss=1.0)).sum() == STEPS - 1
-
-
-def test_a_corrupted_payload_differs_in_one_bit_of_one_number_or_is_held():
-    taken = measured(seed=2, corruption=0.3)
-    draw, place = drawn(lib.LINK_CORRUPTION, MEASUREMENT, seed=2)
-    corrupted = draw < 0.3
-    assert_array_equal(taken[~corrupted], SENT[~corrupted])
-    expected = SENT.copy()
-    words = expected.view(np.uint64).reshape(-1)
-    for k in np.flatnonzero(corrupted):
-        bit = int(place[k] * 64 * 9)
-        words[9 * k + bit // 64] ^= np.uint64(1) << np.uint64(bit % 64)
-        if not np.all(np.abs(expected[k]) <= LARGEST):
-            expected[k] = expected[k - 1] if k else SENT[0]
-    assert_array_equal(taken, expected)
-    refused = corrupted & held(taken)
-    # Of 64 bits the ones of the exponent's upper end alone make a number that large.
-    assert 0.02 < refused.sum() / corrupted.sum() < 0.1
-    assert np.isfinite(taken).all() and np.abs(taken).max() <= LARGEST
-
-
-def test_with_a_checksum_what_is_corrupted_is_lost():
-    corrupted = drawn(lib.LINK_CORRUPTION, MEASUREMENT)[0] < 0.1
-    last = np.maximum.accumulate(np.where(corrupted, 0, np.arange(STEPS)))
-    assert_array_equal(measured(corruption=0.1, checksum=True), SENT[last])
 
 
 @pytest.mark.parametrize(

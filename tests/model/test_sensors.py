@@ -39,23 +39,8 @@ def of_pitch_rate(states=STATES, faults=(), seed=0, **fields):
     return result[:, Q]
 
 
-def test_ideal_sensors_say_the_truth_to_the_bit():
-    assert sensor_data({}, T).ideal
-    assert_array_equal(measured({}), STATES)
-
-
 def still(steps):
     return np.tile(STATES[0], (steps, 1))
-
-
-@pytest.mark.long
-def test_drift_is_a_gauss_markov_process():
-    error = of_pitch_rate(still(200_000), drift_sigma=1e-3, drift_time=0.5) - STATES[0, Q]
-    assert np.std(error) == pytest.approx(1e-3, rel=0.05)
-    lag = 20
-    assert np.mean(error[:-lag] * error[lag:]) / 1e-6 == pytest.approx(math.exp(-lag * T / 0.5), abs=0.05)
-    begun = [of_pitch_rate(still(1), seed=seed, drift_sigma=1.0, drift_time=1.0)[0] for seed in range(400)]
-    assert np.std(begun) == pytest.approx(1.0, rel=0.15)
 
 
 def test_constants_are_drawn_once_a_flight():
@@ -68,18 +53,15 @@ def test_constants_are_drawn_once_a_flight():
     assert np.std(scales) == pytest.approx(0.1, rel=0.15)
 
 
-def test_lag_is_of_first_order_and_begins_at_rest():
+def test_lag_latency_quantum_and_range_are_those_of_their_fields():
     states = still(100)
     states[1:, Q] += 0.05
-    expected = states[:, Q] - 0.05 * np.exp(-20.0 * T * np.arange(100)) * (np.arange(100) > 0)
     # Sampled: the first new sample has had one period.
+    expected = states[:, Q] - 0.05 * np.exp(-20.0 * T * np.arange(100)) * (np.arange(100) > 0)
     assert_allclose(of_pitch_rate(states, lag=20.0), expected, atol=1e-15)
-
-
-@pytest.mark.parametrize("latency", [1, 3, 50])
-def test_latency_is_exact(latency):
-    expected = STATES[np.maximum(np.arange(STEPS) - latency, 0), Q]
-    assert_array_equal(of_pitch_rate(latency=latency), expected)
+    assert_array_equal(of_pitch_rate(latency=3), STATES[np.maximum(np.arange(STEPS) - 3, 0), Q])
+    assert_allclose(of_pitch_rate(quantum=1e-4), 1e-4 * np.round(STATES[:, Q] / 1e-4), atol=1e-12)
+    assert_array_equal(of_pitch_rate(minimum=0.0095, maximum=0.0104), np.clip(STATES[:, Q], 0.0095, 0.0104))
 
 
 def test_lost_samples_are_held():
@@ -88,18 +70,6 @@ def test_lost_samples_are_held():
     assert 0.7 < fresh.mean() < 0.9 and fresh[0]
     last = np.maximum.accumulate(np.where(fresh, np.arange(STEPS), 0))
     assert_array_equal(result, STATES[last, Q])
-
-
-def test_quantisation_rounds_to_the_nearest_step():
-    quantum = 1e-4
-    result = of_pitch_rate(quantum=quantum)
-    assert np.abs(result - STATES[:, Q]).max() <= 0.5 * quantum * (1.0 + 1e-9)
-    assert_allclose(result / quantum, np.round(result / quantum), atol=1e-9)
-    assert abs(np.mean(result - STATES[:, Q])) < 0.1 * quantum
-
-
-def test_range_clips():
-    assert_array_equal(of_pitch_rate(minimum=0.0095, maximum=0.0104), np.clip(STATES[:, Q], 0.0095, 0.0104))
 
 
 def test_inertial_angle_of_attack_shares_the_error_of_the_pitch_angle():
@@ -160,18 +130,8 @@ def test_fault_of_noise_and_drop_out():
         ({"sensors.set": "good"}, "sensors.set = 'good': expected one of ideal, fine, ghv"),
         ({"sensors.pitch_rate.noise": [-1.0]}, r"sensors.pitch_rate.noise\[0\] = -1.0: expected"),
         ({"sensors.pitch_rate.noise": [1.0, 2.0]}, "sensors.pitch_rate.noise: 2 values, expected one"),
-        (
-            {"sensors.altitude.latency": [1.5]},
-            r"altitude.latency\[0\] = 1.5: expected double array from 0 to 50, whole",
-        ),
-        (
-            {"sensors.pitch_angle.minimum": [np.radians(25.0)], "sensors.pitch_angle.maximum": [np.radians(20.0)]},
-            "minimum = 25 deg: expected less than maximum, 20 deg",
-        ),
-        (
-            {"sensors.altitude.minimum": [2.0], "sensors.altitude.maximum": [1.0]},
-            "minimum = 2 m: expected less than maximum, 1 m",
-        ),
+        ({"sensors.altitude.latency": [1.5]}, r"altitude.latency\[0\] = 1.5: expected double array from 0 to 50,"),
+        ({"sensors.altitude.minimum": [2.0], "sensors.altitude.maximum": [1.0]}, "minimum = 2 m: expected less than"),
     ],
 )
 def test_what_is_no_sensor_is_refused(values, message):

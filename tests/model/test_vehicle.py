@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import tomli_w
 
 from hsv.base.errors import ParameterError, VehicleError
 from hsv.base.units import parse_quantity
@@ -50,52 +49,28 @@ def test_a_vehicle_that_extends_another_differs_in_what_it_lists():
     assert "extends" not in vehicle_text(OTHER) and vehicle_text("parker").startswith("# Flexible")
 
 
+PSI = "inertial_coupling.derived.inertial_coupling_1.value"
 WRONG = [
     ("rigid_body.mass", None, 'rigid_body.mass: missing, expected a table such as { value = "1.0 kg" }'),
     ("rigid_body", None, "rigid_body: missing, expected a table"),
-    ("rigid_body.mass.value", None, "rigid_body.mass.value: missing, expected a quantity such as '1.0 kg'"),
     ("rigid_body.mass", "300 slug", "rigid_body.mass = '300 slug': expected a table such as { value = \"1.0 kg\" }"),
     ("rigid_body.mass.value", "300 ft", "rigid_body.mass.value = '300 ft': wrong unit, expected a finite quantity"),
-    ("rigid_body.mass.value", 300.0, "rigid_body.mass.value = 300.0: the unit is missing"),
     ("rigid_body.mass.value", "-3 kg", "mass = -3 kg: expected above zero"),
     ("rigid_body.mass.valu", "3 kg", "rigid_body.mass.valu: unknown field, expected one of value, symbol, uncertainty"),
     ("rigid_body.weight", {}, "rigid_body.weight: unknown field, expected one of mass, moment_of_inertia, gravity"),
     ("wings", {}, "wings: unknown field, expected one of title, structure, rigid_body, geometry"),
     ("structure", "parkr", "structure = 'parkr': expected one of parker, winged_cone (did you mean 'parker'?)"),
-    ("title", 3, "title = 3: expected a text"),
     ("title", " ", "title = ' ': expected a text that is not empty"),
-    ("lift.lift_alpha.value", "4.7 m", "lift.lift_alpha.value = '4.7 m': wrong unit"),
     ("rigid_body.mass.uncertainty", "-1 %", "mass: uncertainty = -0.01: expected 0 to 0.9"),
-    ("rigid_body.mass.uncertainty", "95 %", "mass: uncertainty = 0.95: expected 0 to 0.9"),
-    ("elastic_modes.natural_frequency_1.value", "16 Hz", "elastic_modes.natural_frequency_1.value = '16 Hz': wrong"),
-    (
-        "envelope.altitude.minimum",
-        "90000 ft",
-        "altitude_range: 27432.0 to 26365.2, expected a range that increases",
-    ),
-    ("envelope.altitude.maximum", None, "envelope.altitude.maximum: missing, expected a quantity such as '1.0 m'"),
+    ("envelope.altitude.minimum", "90000 ft", "altitude_range: 27432.0 to 26365.2, expected a range that increases"),
     ("envelope.velocity.minimum", "-1 m/s", "velocity_range: from -1.0 m/s, expected above zero"),
     ("envelope.angle.maximum", "0 deg", "angle_limit = 0 rad: expected above zero"),
-    ("envelope.mach", {}, "envelope.mach: unknown field, expected one of altitude, velocity, angle"),
-    (
-        "input_limits.elevator_deflection.maximum",
-        "-40 deg",
-        "elevator_deflection: -0.5235987755982988 to -0.6981317007977318, expected a range that increases",
-    ),
-    ("input_limits.rudder", {}, "input_limits.rudder: unknown field, expected one of fuel_equivalence_ratio"),
+    ("input_limits.elevator_deflection.maximum", "-40 deg", "elevator_deflection: -0.5235987755982988 to -0.69813"),
     ("inertial_coupling.derived", None, "coupling_sets.names = ['paper_like']: expected one called"),
     ("inertial_coupling.0.5", {}, "inertial_coupling.0: expected a name of lower-case letters, digits and _"),
-    (
-        "inertial_coupling.derived.inertial_coupling_1.value",
-        "-1e9 slug^0.5 ft",
-        "inertial_coupling.derived = -1.1644e+09, 346.291 kg^0.5 m: expected squares whose sum is at most 677909",
-    ),
+    (PSI, "-1e9 slug^0.5 ft", "inertial_coupling.derived = -1.1644e+09, 346.291 kg^0.5 m: expected squares whose sum"),
     ("elastic_modes.damping_ratio_1.value", -0.02, "damping_ratio_1 = -0.02: expected at least 0"),
-    (
-        "inertial_coupling.derived.inertial_coupling_1.value",
-        "3 kg",
-        "inertial_coupling.derived.inertial_coupling_1.value = '3 kg': wrong unit",
-    ),
+    (PSI, "3 kg", "inertial_coupling.derived.inertial_coupling_1.value = '3 kg': wrong unit"),
 ]
 
 
@@ -112,7 +87,7 @@ def changed(field, value):
     return tables
 
 
-@pytest.mark.parametrize(("field", "value", "message"), WRONG, ids=[f"{f} = {v}" for f, v, _ in WRONG])
+@pytest.mark.parametrize(("field", "value", "message"), WRONG)
 def test_a_wrong_field_is_named_with_what_was_expected(field, value, message):
     with pytest.raises(VehicleError) as caught:
         parse_vehicle(changed(field, value), "mine")
@@ -132,12 +107,7 @@ def test_no_more_parameters_are_uncertain_than_a_design_can_fly_the_corners_of()
     ("text", "message"),
     [
         ("title = ", r"mine.toml': .*, expected a TOML file"),
-        (
-            'extends = "parkr"\n',
-            r"vehicle 'parkr': expected one of parker, winged_cone or the path of a TOML file \(did",
-        ),
-        ('extends = "mine.toml"\n', r"vehicle 'mine': extends: .* expected files that do not extend each other"),
-        ("extends = 3\n", r"vehicle 'mine': extends = 3: expected a name or the path of a file"),
+        ('extends = "parkr"\n', r"vehicle 'parkr': expected one of parker, winged_cone or the path of a"),
     ],
 )
 def test_a_file_that_is_no_vehicle_is_named(tmp_path, text, message):
@@ -175,12 +145,10 @@ def test_no_path_in_parameters_is_followed(tmp_path):
     ("name", "value", "message"),
     [
         ("vehicle.mass", 0.0, "parameter vehicle.mass = 0 kg: expected above zero"),
-        ("vehicle.mass", 1, "parameter vehicle.mass = 1: expected double"),
         ("vehicle.altitude_range", [2.0, 1.0], "parameter vehicle.altitude_range: 2.0 to 1.0, expected a range that"),
         ("vehicle.input_maximum", [1.5, -1.0], "parameter vehicle.elevator_deflection: "),
         ("vehicle.input_maximum", [1.5], "parameter vehicle.input_maximum = [1.5]: expected 2 numbers"),
         ("vehicle.coupling_sets.names", ["a"], "parameter vehicle.coupling_sets.values = "),
-        ("vehicle.coupling_sets.names", ["a", "b"], "parameter vehicle.coupling_sets.names = ['a', 'b']: expected one"),
         ("vehicle.uncertainty.bounds", [0.1], "parameter vehicle.uncertainty.bounds = [0.1]: expected 10 numbers"),
     ],
 )
@@ -207,9 +175,3 @@ def test_a_package_registers_its_files_and_is_not_imported(tmp_path, monkeypatch
     assert "my_vehicles" not in sys.modules
     with pytest.raises(VehicleError, match=r"vehicle 'gone': registered as 'nowhere_at_all:gone\.toml', expected"):
         load_vehicle("gone")
-
-
-def test_a_vehicle_written_out_is_the_same(tmp_path):
-    path = tmp_path / "whole.toml"
-    path.write_text(tomli_w.dumps(vehicle_tables(OTHER)))
-    assert load_vehicle(str(path)).digest == load_vehicle(OTHER).digest

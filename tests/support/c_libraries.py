@@ -11,16 +11,8 @@ from pathlib import Path
 from hsv.control.library import include_folder
 
 PROBE = Path(__file__).with_name("probe.c")
-FLAGS = (
-    "-std=c99",
-    "-D_POSIX_C_SOURCE=199309L",
-    "-Wall",
-    "-Wextra",
-    "-Werror",
-    "-pedantic",
-    "-O2",
-    "-ffp-contract=off",
-)
+WARNINGS = ("-Wall", "-Wextra", "-Werror", "-pedantic")
+FLAGS = ("-std=c99", "-D_POSIX_C_SOURCE=199309L", *WARNINGS, "-O2", "-ffp-contract=off")
 
 
 def build_probe(folder: Path, *flags: str, name: str = "probe") -> Path:

@@ -57,8 +57,7 @@ def mutated(*sources: bytes) -> st.SearchStrategy[Mutated]:
     return draw_one()
 
 
-def flipped(data: bytes, random: Random) -> bytes:
-    """Return ``data`` with a bit flipped."""
+def _flipped(data: bytes, random: Random) -> bytes:
     at = random.randrange(len(data)) if data else 0
     return data[:at] + bytes([data[at] ^ 1 << random.randrange(8)]) + data[at + 1 :] if data else data
 
@@ -117,16 +116,5 @@ def _replaced(data: bytes, pattern: re.Pattern[bytes], by: bytes, random: Random
     return data[:start] + by + data[end:]
 
 
-_MUTATIONS = (
-    flipped,
-    _cut,
-    _removed,
-    _block_doubled,
-    _block_zeroed,
-    _line_moved,
-    _line_removed,
-    _key_renamed,
-    _value_replaced,
-    _value_replaced,
-    _nested,
-)
+_EDITS = (_line_moved, _line_removed, _key_renamed, _value_replaced, _value_replaced, _nested)
+_MUTATIONS = (_flipped, _cut, _removed, _block_doubled, _block_zeroed, *_EDITS)

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from hsv.base.errors import DesignError
 from hsv.control.design import find_design
 from hsv.design.certified import Plan, load_certified
 from hsv.design.hardware import verdict
@@ -65,19 +64,6 @@ def test_limits_that_are_reached_take_the_certificate_away():
     assert Reach("fuel_equivalence_ratio", 0.0, 0.8, 3.0, np.inf, np.inf).as_dict()["stop"] is None
 
 
-def test_a_flight_that_starts_outside_the_set_is_not_certified():
-    verdict = Verdict("all", "", np.ones(5), np.ones(2), np.ones((2, 2)), np.ones((2, 2)), 1.2)
-    assert not verdict.certified and verdict.said() == "flights may start outside the set, at level 1.2"
-
-
-def test_where_no_set_is_found_the_reason_is_that_of_the_search(subject, monkeypatch):
-    def none(*_):
-        raise DesignError("no set")
-
-    monkeypatch.setattr(verdict, "invariant_set", none)
-    assert verdict.verdict("x", subject.design, subject).said() == "no set"
-
-
 @pytest.mark.long
 def test_a_design_that_knows_actuators_is_judged_with_those_that_fly(realistic):
     tube = realistic.certificate["tube"]
@@ -98,19 +84,3 @@ def test_a_flight_may_start_where_both_ellipsoid_and_star_norms_allow_it():
     error = np.array([0.0, 0.0, 0.0, 0.1 * found.half_width[3], 0.0])
     assert max(found.level(side * np.append(error, [0.0, 0.0])) for side in (1.0, -1.0)) < 1.0
     assert verdict._start(found, error) > 1.0
-
-
-@pytest.mark.long
-def test_the_set_found_anew_is_that_of_the_certificate():
-    tight = load_certified(find_design("tight"))
-    (known,) = verdict.certified_with(tight, {})
-    assert known.certified and known.start <= 1.0
-    stated = tight.certificate["tube"]["invariant_set"]
-    assert np.allclose(known.half_width, stated["half_width"][:5], rtol=1e-5)
-    assert np.allclose(known.feedback, stated["feedback_half_range"] + _feedthrough(tight), rtol=1e-5)
-
-
-def _feedthrough(subject):
-    """Return the half-range (2) of the feedback to the filtered nominal pitch rate."""
-    problem = subject.invariant_set().problem
-    return np.abs(problem.system.F_d) @ problem.disturbance.half_width

@@ -96,36 +96,6 @@ def test_a_worker_that_does_not_answer_is_reported_and_refused(monkeypatch, clus
     assert waited[-1] == "waiting for the answers of all workers"
 
 
-@pytest.mark.long
-def test_workers_that_do_not_come_are_waited_for_a_while_and_not_silently(monkeypatch, cluster):
-    monkeypatch.setattr("hsv.flight.campaign.executors.WORKERS", 0.5)
-    waited = []
-    with (
-        pytest.raises(CampaignError, match=r"no workers after 0\.5 s"),
-        make_executor(0, cluster.scheduler_address, waited.append),
-    ):
-        pass
-    assert waited == ["waiting for the scheduler's workers"]
-
-
-@pytest.mark.long
-def test_a_lost_scheduler_is_a_failed_run_that_goes_on_later(planned, cluster, out):
-    campaign, store = planned(samples=320), ResultStore(out, planned(samples=320))
-    cluster.scale(1)
-
-    def lose(done):
-        if done:
-            cluster.close()
-
-    with (
-        make_executor(0, cluster.scheduler_address) as workers,
-        pytest.raises(RunError, match="the scheduler is lost"),
-    ):
-        run_campaign(campaign, store, workers, progress=lose)
-    with store.opened() as finished:
-        assert finished
-
-
 @contextmanager
 def dask_worker(address, folder, environment, *flags):
     """A worker started by hand, as on another machine."""
@@ -203,36 +173,6 @@ def test_a_stopped_worker_is_reported_and_waited_for(monkeypatch):
             os.kill(pid, signal.SIGSTOP)
         assert dict(workers.fly(length_of, "text", range(3))) == dict.fromkeys(range(3), b"4")
     assert re.fullmatch(r"waiting for batch 0 and 2 more: stopped worker process \d+, \d+", notices[0])
-
-
-def a_large_answer(text, batch):
-    """Fly a batch whose content is far more than a pipe holds."""
-    return bytes(3_000_000)
-
-
-class UnportableError(Exception):
-    """An error that cannot be made again of its arguments."""
-
-    def __init__(self, a, b):
-        super().__init__(a + b)
-
-
-def an_unportable_error(text, batch):
-    """Fail with an error that does not arrive in another process."""
-    raise UnportableError("so", "long")
-
-
-@pytest.mark.long
-def test_an_error_that_cannot_be_pickled_is_told():
-    with make_executor(2) as workers, pytest.raises(RunError, match="UnportableError: solong"):
-        list(workers.fly(an_unportable_error, "", range(2)))
-
-
-@pytest.mark.long
-def test_batches_that_nobody_took_are_not_taken_for_those_of_the_next_campaign():
-    with make_executor(2) as workers:
-        next(workers.fly(a_large_answer, "", range(6)))
-        assert dict(workers.fly(length_of, "text", range(6))) == dict.fromkeys(range(6), b"4")
 
 
 def alive(pid):

@@ -1,20 +1,13 @@
 import json
-import signal
-import subprocess
-import sys
-import time
 from contextlib import ExitStack
 
-import numpy as np
 import pytest
 from full_disk import files_no_larger_than
-from marking import long
 from pyarrow import parquet
-from waiting import wait_until
 
 from hsv.base.errors import CampaignError
 from hsv.flight.campaign.executors import Executor
-from hsv.flight.campaign.run import capacity, run_campaign
+from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.sample_runner import fly_batch
 from hsv.flight.campaign.store import ResultStore, read_result, result_digest
 from hsv.flight.campaign.summary import Results
@@ -54,59 +47,14 @@ def test_interrupted_twice_and_resumed_gives_the_same_file_and_flies_nothing_twi
     assert sorted(path.name for path in out.parent.iterdir()) == [out.name]
 
 
-DRIVER = """
-import sys
-from pathlib import Path
-from hsv.flight.campaign.campaign import Campaign
-from hsv.flight.campaign.run import run_campaign
-from hsv.flight.campaign.executors import Executor
-from hsv.flight.campaign.store import ResultStore
-campaign = Campaign.from_text(Path(sys.argv[1]).read_text())
-print("ready", flush=True)
-sys.stdin.readline()
-run_campaign(campaign, ResultStore(Path(sys.argv[2]), campaign), Executor())
-"""
-
-
-@pytest.mark.long
-def test_a_killed_process_loses_no_finished_batch(planned, tmp_path, out):
-    campaign = planned(samples=800)
-    (tmp_path / "campaign.json").write_text(campaign.text)
-    process = subprocess.Popen(
-        [sys.executable, "-c", DRIVER, str(tmp_path / "campaign.json"), str(out)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    process.stdout.readline()
-    process.stdin.write("go\n")
-    process.stdin.flush()
-    store = ResultStore(out, campaign)
-
-    def finished_batches():
-        assert process.poll() is None
-        return len(list(store.folder.glob("*.parquet")))
-
-    wait_until(lambda: finished_batches() >= 3, [process.pid], finished_batches, pause=lambda _: time.sleep(0.005))
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    with store.opened() as finished:
-        assert finished
-    executor = Counting()
-    run_campaign(campaign, store, executor)
-    assert set(executor.flown) == set(range(len(campaign.batches))) - finished
-    assert np.array_equal(Results(out).column("flight"), np.arange(800))
-
-
 def test_a_finished_campaign_is_not_flown_again(planned, results):
     executor = Counting()
     assert run_campaign(planned(), ResultStore(results.path, planned()), executor).flights == 0
     assert executor.flown == []
 
 
-@pytest.mark.parametrize("change", [{"seed": 4}, long({"commit": "later"})])
-def test_another_campaign_does_not_mix_with_one_that_is_there(planned, results, out, change):
-    other = planned(**change)
+def test_another_campaign_does_not_mix_with_one_that_is_there(planned, results, out):
+    other = planned(seed=4)
     with pytest.raises(CampaignError, match="holds another campaign"):
         run_campaign(other, ResultStore(results.path, other), Executor())
     with pytest.raises(KeyboardInterrupt):
@@ -114,15 +62,6 @@ def test_another_campaign_does_not_mix_with_one_that_is_there(planned, results, 
     with pytest.raises(CampaignError, match="holds another campaign"):
         run_campaign(other, ResultStore(out, other), Executor())
     assert run_campaign(other, ResultStore(out, other), Executor(), restart=True).flights == other.samples
-
-
-def test_two_processes_do_not_fly_the_same_campaign(planned, out):
-    with (
-        ResultStore(out, planned()).opened(),
-        pytest.raises(CampaignError, match="in use"),
-        ResultStore(out, planned()).opened(),
-    ):
-        pass
 
 
 def test_restart_leaves_a_campaign_alone_that_is_being_flown(planned, results, out):
@@ -146,23 +85,14 @@ def test_a_lock_left_by_a_killed_process_stops_nobody(planned, out):
         pass
 
 
-def damage(path, how):
-    content = path.read_bytes()
-    if how == "truncated":
-        path.write_bytes(content[: len(content) // 2])
-    else:
-        parquet.write_table(parquet.read_table(path).slice(1), path)
-
-
-@pytest.mark.parametrize("how", ["truncated", long("a row short")])
-def test_a_damaged_batch_is_flown_again_and_strangers_are_left_out(planned, results, out, how):
+def test_a_damaged_batch_is_flown_again_and_strangers_are_left_out(planned, results, out):
     campaign = planned(samples=44)
     with pytest.raises(KeyboardInterrupt):
         run_campaign(campaign, ResultStore(out, campaign), Executor(), progress=interrupted_at(32))
     store = ResultStore(out, campaign)
     first = store.folder / "00000000.parquet"
     (store.folder / "foo.parquet").write_text("nothing")
-    damage(first, how)
+    parquet.write_table(parquet.read_table(first).slice(1), first)
     executor = Counting()
     run_campaign(campaign, store, executor)
     assert executor.flown == [0, 1]
@@ -185,9 +115,8 @@ def test_a_batch_damaged_inside_is_named_and_flown_the_next_time(planned, result
     assert out.read_bytes() == results.path.read_bytes()
 
 
-@pytest.mark.parametrize("flights", [long(0), 32])
-def test_a_full_disk_is_one_error_and_what_is_finished_is_kept(planned, results, out, flights):
-    campaign = planned()
+def test_a_full_disk_is_one_error_and_what_is_finished_is_kept(planned, results, out):
+    campaign, flights = planned(), 32
     with ExitStack() as disk:
 
         def fill_the_disk(done):
@@ -217,7 +146,6 @@ def rewritten(path, campaign=None, without=()):
     ("campaign", "without", "expected"),
     [
         ({"wind": 3.0, "commit": "abc"}, (), "written by commit abc, which this version does not read"),
-        ({"method": "grid"}, (), "written by commit test.*'grid'"),
         ({"factors": [{"name": "wind", "unit": "1", "low": 0.0, "high": 1.0}]}, (), "factor 'wind'"),
         ({}, ("tube_level",), "has no column 'tube_level', written by commit test"),
         ({}, ("hsv.envelope",), "has no envelope .* written by commit test"),
@@ -230,29 +158,8 @@ def test_a_result_of_another_version_is_refused_with_its_commit(results, out, ca
         Results(out)
 
 
-def test_a_flipped_bit_in_the_rows_or_beside_them_is_damage(results, out):
-    data = results.path.read_bytes()
-    column = parquet.read_metadata(results.path).row_group(0).column(0)
-    page = column.data_page_offset + column.total_compressed_size // 2
-    for at in (page, data.rindex(b'"samples": 44') + 12):
-        out.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
-        with pytest.raises(CampaignError, match=f"^{out}: damaged"):
-            Results(out).column("flight")
-
-
 def test_what_is_no_result_of_a_campaign_is_refused(tmp_path):
     (tmp_path / "text.parquet").write_text("nothing")
     for name in ("text.parquet", "missing.parquet"):
         with pytest.raises(CampaignError, match=name):
             read_result(tmp_path / name)
-
-
-@pytest.mark.long
-def test_the_expected_time_and_space_are_of_the_missing_batches_and_the_result(planned, results, out):
-    campaign, store = planned(samples=132), ResultStore(out, planned(samples=132))
-    whole, rest = (capacity(campaign, store, Executor(), missing) for missing in (range(5), [3, 4]))
-    assert (whole.flights, whole.cores, rest.flights) == (132, 1, 36)
-    assert whole.wall_time > 0.0 and rest.wall_time > 0.0 and rest.bytes < whole.bytes
-    run_campaign(campaign, store, Executor())
-    kept = sum(len(fly_batch(campaign.text, batch)) for batch in range(5))
-    assert whole.bytes == pytest.approx(kept + out.stat().st_size, rel=0.1)

@@ -1,5 +1,4 @@
 import hashlib
-import tracemalloc
 
 import numpy as np
 import pytest
@@ -49,26 +48,6 @@ def test_samples_stay_what_they_were_in_every_bit(method):
     campaign = plan("case1", method=method, samples=64, seed=7, factors={"fault[0].start": ("90 s", "110 s")})
     drawn = tuple(hashlib.sha256(array.tobytes()).hexdigest()[:16] for array in draw(campaign))
     assert drawn == DIGESTS[method]
-
-
-@pytest.mark.long
-def test_the_largest_campaign_starts_at_once(planned):
-    campaign = planned(samples=10**7)
-    tracemalloc.start()
-    try:
-        campaign.draw(campaign.flights(len(campaign.batches) - 1))
-        _, most = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    # Bytes: the samples of all flights, of one number each, would take 80 million.
-    assert most < 10_000_000
-
-
-def test_corners_are_all_combinations_of_the_bounds_exactly(planned):
-    samples, _ = draw(planned(method="corners", factors={}))
-    assert samples.shape == (1024, 10)
-    assert np.array_equal(np.abs(samples), np.broadcast_to(BOUNDS, samples.shape))
-    assert len(np.unique(samples, axis=0)) == 1024
 
 
 @pytest.mark.parametrize(

@@ -77,11 +77,3 @@ def test_an_envelope_has_the_extremes_and_the_mean_values_of_each_window():
                 mean = list(accumulate(curve))[-1] / (stop - start)
                 assert envelope.total[window, i] == pytest.approx(mean + mean, rel=1e-14)
         assert envelope.count[window] == (2.0 if stop <= 140 else 0.0)
-
-
-def test_the_page_is_complete_in_itself(results):
-    page = campaign_page(results)
-    assert "https://" not in page.split('id="data"')[0]
-    for words in ("tube level", "moment of inertia", "hsv montecarlo replay", "Clopper-Pearson", "test"):
-        assert words in page
-    assert len(page) < 8e6

@@ -1,15 +1,13 @@
 """Running a campaign to its end, whatever happens in between."""
 
-import os
-import signal
-
 import pytest
 from node_processes import short_scenario
 
-from hsv.flight.campaign.executors import Executor, make_executor
+from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
 from hsv.flight.resilience.campaign import plan
 from hsv.flight.resilience.store import CaseStore
+from hsv.flight.sources import drop_older
 
 FAULTS = ("elevator_loss", "pitch_rate_drop_out")
 
@@ -48,28 +46,6 @@ def test_interrupted_it_goes_on_where_it_was(campaign, whole, tmp_path):
     assert first.stat().st_mtime_ns == written and kept(store) == whole
 
 
-@pytest.mark.long
-def test_a_killed_worker_loses_nothing_and_two_bring_what_one_does(campaign, whole, tmp_path):
-    store, killed = CaseStore(tmp_path, campaign), []
-    with make_executor(2) as workers:
-        pids = workers.pids()
-
-        def kill(done):
-            if done and not killed:
-                killed.append(pids[0])
-                os.kill(pids[0], signal.SIGKILL)
-
-        assert run_campaign(campaign, store, workers, progress=kill).batches == len(campaign.batches)
-    assert killed and kept(store) == whole
-
-
-def test_the_expected_time_is_that_of_all_flights(campaign, tmp_path):
-    announced = []
-    run_campaign(campaign, CaseStore(tmp_path, campaign), Executor(), expect=announced.append)
-    [needed] = announced
-    assert needed.flights == sum(case.flights for case in campaign.batches) and needed.wall_time > 0.0
-
-
 def test_a_damaged_case_is_flown_anew(campaign, whole, tmp_path):
     store = CaseStore(tmp_path, campaign)
     store.folder.mkdir()
@@ -78,3 +54,11 @@ def test_a_damaged_case_is_flown_anew(campaign, whole, tmp_path):
     first = min(store.folder.glob("*.json"))
     first.write_text(first.read_text()[:-20])
     assert run_campaign(campaign, store, Executor()).batches == 1 and kept(store) == whole
+
+
+def test_only_the_newest_cases_of_a_campaign_are_kept(tmp_path):
+    new, old = "0123456789ab", "ba9876543210"
+    for name in (f"case1_{new}", f"case1_{old}", f"case1_no_notch_{old}"):
+        (tmp_path / name).mkdir()
+    drop_older(tmp_path / f"case1_{new}")
+    assert {path.name for path in tmp_path.iterdir()} == {f"case1_{new}", f"case1_no_notch_{old}"}

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from hsv.model.airframe.pose import FLAMES, LEVEL, Sample, transforms
+from hsv.model.airframe.pose import FLAMES, Sample, transforms
 from hsv.model.airframe.urdf import urdf
 
 ROBOT = ElementTree.fromstring(urdf())
@@ -14,17 +14,6 @@ JOINTS = {joint.find("child").attrib["link"]: joint for joint in ROBOT.iter("joi
 
 def numbers(element, attribute):
     return np.array([float(word) for word in element.attrib[attribute].split()])
-
-
-def test_links_are_a_tree_below_the_level_frame():
-    links = [link.attrib["name"] for link in ROBOT.iter("link")]
-    assert len(links) == len(set(links)) and set(links) == {LEVEL, *JOINTS}
-    for child in JOINTS:
-        above = [child]
-        while above[-1] in JOINTS:
-            above.append(JOINTS[above[-1]].find("parent").attrib["link"])
-            assert len(above) <= len(links)
-        assert above[-1] == LEVEL
 
 
 @pytest.mark.parametrize("sample", [Sample(*[0.0] * 6), Sample(0.02, 0.03, 1.1, 0.9, 0.5, 0.2)], ids=["rest", "flight"])

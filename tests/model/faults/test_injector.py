@@ -32,13 +32,6 @@ def actuator(injector, step, command=COMMAND):
     return injector.step(step, command).actuator
 
 
-def test_loss_of_effectiveness_acts_on_the_total_command_of_its_channel_only():
-    injector = injector_of((loss(0.9), 0))
-    assert_array_equal(actuator(injector, 0), [0.4, 0.9 * 0.2])
-    injector = injector_of((loss(0.5, FUEL), 0))
-    assert_array_equal(actuator(injector, 0), [0.2, 0.2])
-
-
 @pytest.mark.parametrize("kind", FAULT_KINDS)
 def test_every_kind_is_told_from_its_start_with_its_parameters(kind):
     channel = FAULT_KINDS[kind].channels[0]
@@ -114,16 +107,6 @@ def test_clearing_all_heals_everything_but_not_what_is_still_to_come():
     assert actuator(injector, 5)[1] == 0.5 * 0.2
 
 
-def test_reset_returns_to_the_schedule():
-    injector = injector_of((loss(0.9), 2))
-    injector.step(0, COMMAND)
-    injector.inject(loss(0.1, FUEL))
-    injector.clear()
-    injector.reset()
-    assert_array_equal(actuator(injector, 0), COMMAND)
-    assert_array_equal(actuator(injector, 2), [0.4, 0.9 * 0.2])
-
-
 def test_schedule_from_parameters():
     injector = FaultInjector.from_parameters(
         {
@@ -143,11 +126,6 @@ def test_parameters_that_are_written_otherwise_are_refused(text):
     values = {"fault.channels": [ELEVATOR], "fault.types": ["loss_of_effectiveness"], "fault.starts": [1.0]}
     with pytest.raises(ParameterError, match=r"fault.parameters: .* expected a form as 'effectiveness=0.9'"):
         FaultInjector.from_parameters({**values, "fault.parameters": [text]})
-
-
-def test_an_unknown_channel_cannot_be_cleared():
-    with pytest.raises(ParameterError, match=r"channel = 'rudder': expected one of .*, or empty for all"):
-        FaultInjector().clear("rudder")
 
 
 def test_columns_of_different_length_are_refused_by_name():
