@@ -11,9 +11,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from hsv.bags.description import TUBE_MPC
 from hsv.base.processes import ENDING, choose_log_folder, take_interrupts, uninterrupted
-from hsv.graph.launcher import Launcher
 
 NUMBERS = *ENDING, signal.SIGALRM
 
@@ -84,36 +82,12 @@ def test_what_is_begun_is_finished():
     assert begun == finished == [1]
 
 
-@pytest.mark.usefixtures("interrupted_as_a_command")
-def test_a_node_is_ended_that_has_just_been_started(monkeypatch, tmp_path):
-    started = []
-
-    class Popen(subprocess.Popen):
-        def __init__(self, *arguments, **named):
-            super().__init__(*arguments, **named)
-            started.append(self)
-            signal.raise_signal(signal.SIGINT)
-
-    program = tmp_path / "node"
-    program.write_text("#!/bin/sh\nexec sleep 60\n")
-    program.chmod(0o755)
-    monkeypatch.setattr("hsv.graph.exclusive.LAST_DOMAIN", 2 * 10**9)
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(10**9 + os.getpid()))
-    monkeypatch.setattr("hsv.graph.launcher.executable", lambda node: program)
-    monkeypatch.setattr(subprocess, "Popen", Popen)
-    with pytest.raises(KeyboardInterrupt), Launcher([TUBE_MPC], [], lambda step: None, lambda node, text: None):
-        time.sleep(10.0)
-    assert [process.poll() for process in started] == [-signal.SIGINT]
-
-
 @pytest.mark.parametrize(
     ("given", "kept"),
     [
         ({"HOME": "{}"}, True),
-        ({"ROS_HOME": "{}"}, True),
         ({"ROS_LOG_DIR": "{}"}, True),
         ({"HOME": "/proc"}, False),
-        ({"HOME": ""}, False),
         ({"HOME": "{}", "ROS_LOG_DIR": "/proc/log"}, False),
     ],
 )

@@ -195,11 +195,6 @@ def test_a_design_without_a_tube_carries_none():
 SCALAR, DIAGONAL = np.full(5, 0.8), np.array([0.8, 0.6, 1.0, 1.0, 1.0])
 
 
-def test_a_diagonal_factor_moves_all_dimensions_together():
-    half_way = [0.9, 0.8, 1.0, 1.0, 1.0]
-    np.testing.assert_array_equal(certified(half_way, DIAGONAL), half_way)
-
-
 def test_a_change_has_one_value_or_five():
     flown = {"tau_change.starts": [1.0, 2.0]}
     for values in ([0.9, 0.8], [0.9] * 5 + [0.8] * 5):

@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import GovernorError
-from hsv.control import governor
 from hsv.control.design import find_design, read_design
 from hsv.control.governor import (
     AT_REST,
@@ -113,13 +112,6 @@ def test_legs_that_fit_begin_when_they_are_asked_for_or_when_the_one_before_is_d
     assert found.end == pytest.approx(5.9)
     assert column(found, "altitude") == (START[0], START[0], NEAR[0], START[0], START[0], NEAR[0])
     assert column(found, "velocity") == (START[1], START[1], NEAR[1], START[1], START[1], NEAR[1])
-
-
-def test_a_leg_for_which_nothing_fits_is_refused(monkeypatch):
-    monkeypatch.setattr(governor, "LONGEST", 0.3)
-    why = r"command 1: no reference to 26060\.5 m and 2407\.94 m/s fits, not one of 0\.3 s either: the plan needs elev"
-    with pytest.raises(GovernorError, match=why):
-        govern(Leg(0.0, 0.0, *NEAR), blend=SHORT_BLEND, **NARROW)
 
 
 def test_the_plan_is_that_of_the_reference_it_returns(short_step):

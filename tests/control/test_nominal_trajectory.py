@@ -22,12 +22,6 @@ def nominal(**changes):
     return NominalTrajectory.from_parameters({**VALUES, **TARGET, **changes})
 
 
-def smallest(deviation):
-    """Index of the innermost ellipsoid that holds the deviation, 0 if there is none."""
-    levels = [deviation[:5] @ P @ deviation[:5] for P in DESIGN.nominal_ellipsoids]
-    return max((g for g, level in enumerate(levels) if level <= 1.0 + 1e-6), default=0)
-
-
 def test_the_law_is_the_one_that_is_asked_for():
     for name, law in (("family", FamilyLaw), ("qp", QpLaw), ("kothare_online", KothareLaw)):
         assert type(nominal(**{"nominal.law": name}).law) is law
@@ -53,18 +47,6 @@ def test_obeys_the_nominal_system_scheduled_by_the_measured_state():
         result = law.step(measured)
         assert_allclose(result.deviation, expected, rtol=1e-11, atol=1e-13)
         assert_array_equal(result.reference, law.reference.final_state)
-
-
-def test_plays_the_gain_of_the_smallest_ellipsoid_that_holds_the_deviation():
-    law = nominal()
-    used = set()
-    for _ in range(6000):
-        result = law.step(START.state)
-        g = smallest(result.deviation)
-        used.add(g)
-        assert_allclose(result.input, DESIGN.nominal_gains[g] @ result.deviation, rtol=1e-9, atol=1e-14)
-    assert used == set(range(len(DESIGN.nominal_gains)))
-    assert np.abs(result.deviation[:2]).max() < 1.0
 
 
 def test_tells_when_the_deviation_is_larger_than_the_design_knows():

@@ -83,16 +83,6 @@ def test_starts_at_rest_for_its_first_input(sections):
         assert notch.step(0.037).filtered_pitch_rate == pytest.approx(0.037, rel=1e-11)
 
 
-def test_filter_state_is_that_before_the_update():
-    notch = NotchFilter([BASELINE], PERIOD)
-    d = notch.data
-    notch.step(0.01)
-    first, second = notch.step(0.02), notch.step(-0.03)
-    output = d.C[0] @ first.filter_state + d.D[0] * 0.02
-    assert first.filtered_pitch_rate == pytest.approx(output, rel=1e-13)
-    assert_allclose(second.filter_state, d.A[0] @ first.filter_state + d.B[0] * 0.02, rtol=1e-13)
-
-
 def test_disabled_filter_passes_the_rate_bit_for_bit():
     notch = NotchFilter.from_parameters({**DEFAULTS, "notch.enabled": False})
     result = notch.step(0.123456789)

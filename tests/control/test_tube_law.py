@@ -29,14 +29,6 @@ def near(rng):
     return rng.normal(size=9) * [5.0, 2.0, 0.002, 0.002, 0.005, 0.2, 2.0, 0.2, 2.0]
 
 
-def test_on_the_nominal_trajectory_it_plays_reference_plus_nominal_input():
-    deviation = near(np.random.default_rng(0))
-    u_n = np.array([0.05, 0.01])
-    result = step(TubeLaw(DESIGN), REFERENCE + deviation, deviation[4], deviation, u_n)
-    assert_allclose(result.input, REFERENCE_INPUT + u_n, rtol=1e-9)
-    assert_allclose(result.u_feedback, 0.0, atol=1e-9)
-
-
 @pytest.mark.parametrize("tau", [1.0, 0.8])
 def test_law_is_equation_36(tau):
     rng = np.random.default_rng(1)
@@ -113,15 +105,6 @@ def test_nothing_of_a_state_that_is_no_number_is_left_in_the_next_step():
 def adjustable(minimum=0.5, tau=1.0, **changes):
     factors = {"tau": np.full(5, tau), "tau_minimum": np.broadcast_to(minimum, 5)}
     return dataclasses.replace(DESIGN, **factors, **changes)
-
-
-def test_each_rigid_state_has_a_factor_of_its_own():
-    tau = np.array([0.6, 0.7, 0.8, 0.9, 1.0])
-    law = TubeLaw(dataclasses.replace(DESIGN, tau=tau))
-    error = near(np.random.default_rng(2))
-    result = step(law, REFERENCE + error, error[4])
-    assert_allclose(result.u_feedback, DESIGN.feedback_gain[:, :5] @ (tau * error[:5]), rtol=1e-9)
-    assert_array_equal(result.tau, tau)
 
 
 def test_a_change_of_tau_acts_from_the_next_step_on_and_outlives_the_run():

@@ -41,6 +41,9 @@ def failing(subject, parts=PARTS):
     return ""
 
 
+FILTER = sorted(name for name in PARAMETERS if name == "period" or name.startswith("notch."))
+
+
 @pytest.fixture(scope="module")
 def baseline():
     return load_subject(find_design("baseline"))
@@ -64,50 +67,14 @@ def test_nothing_is_shared_with_the_design():
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
-ARRAYS = {
-    "model.a": "polytope.A",
-    "model.b": "polytope.B",
-    "scheduling.altitude.breakpoints": "altitude_samples.0",
-    "scheduling.altitude.weights": "altitude_samples.1",
-    "scheduling.velocity.breakpoints": "velocity_samples.0",
-    "scheduling.velocity.weights": "velocity_samples.1",
-    "feedback.gain": "feedback_gain",
-    "feedback.tau": "tau",
-    "feedback.tau_minimum": "tau_minimum",
-    "nominal.gains": "nominal_gains",
-    "nominal.ellipsoids": "nominal_ellipsoids",
-    "nominal.input_bound": "nominal_input_bound",
-    "nominal.state_scale": "nominal_state_scale",
-    "nominal.input_scale": "nominal_input_scale",
-    "tube.centre": "tube.centre",
-    "tube.shape": "tube.shape",
-    "tube.half_width": "tube.half_width",
-    "nominal.input_minimum": "plan_bounds.input_minimum",
-    "nominal.input_maximum": "plan_bounds.input_maximum",
-    "nominal.region_minimum": "plan_bounds.region_minimum",
-    "nominal.region_maximum": "plan_bounds.region_maximum",
-    "input.minimum": "input_minimum",
-    "input.maximum": "input_maximum",
-}
-"""Where a design has the array of each parameter."""
-
-
-def array(design, name):
-    found = design
-    for key in ARRAYS[name].split("."):
-        found = found[int(key)] if key.isdigit() else getattr(found, key)
-    return found
-
-
 def tampered_design(subject, name, draw):
     """Return ``subject`` with one entry of a parameter changed by ten times its tolerance."""
-    design = copy.deepcopy(subject.design)
-    values = array(design, name)
-    size = np.broadcast_to(entry_size(name, subject.certificate), values.shape)
-    step = 10.0 * TOLERANCES[PARAMETERS[name]].allowed(values, size)
-    entry = np.unravel_index(int(draw.integers(values.size)), values.shape)
-    values[entry] += draw.choice((-1.0, 1.0)) * step[entry]
-    return dataclasses.replace(subject, design=design)
+    values = np.array(subject.design.to_parameters()[name])
+    size = np.resize(entry_size(name, subject.certificate), values.shape)
+    entry = int(draw.integers(len(values)))
+    values[entry] += draw.choice((-10.0, 10.0)) * TOLERANCES[PARAMETERS[name]].allowed(values, size)[entry]
+    changed = subject.design.to_parameters() | {name: values.tolist()}
+    return dataclasses.replace(subject, design=ControlDesign.from_parameters(changed))
 
 
 def place(certificate, field):
@@ -145,12 +112,15 @@ def test_seeded_tamperings_are_noticed(name):
     subject, draw = load_subject(find_design(name)), np.random.default_rng(5)
     stated = set(unchecked(subject, made(subject), whole=False))
     fields = [field for field in leaves(subject.certificate) if field not in stated]
-    parameters = [name for name in ARRAYS if name in subject.design.to_parameters()]
+    parameters = [name for name in subject.design.to_parameters() if name in PARAMETERS and name not in FILTER]
     missed = []
     for number in range(25):
         if number % 2:
             chosen = str(draw.choice(parameters))
-            changed = tampered_design(subject, chosen, draw)
+            try:
+                changed = tampered_design(subject, chosen, draw)
+            except DesignError:  # refused at once
+                continue
         else:
             chosen = str(draw.choice(fields))
             changed = tampered_certificate(subject, chosen, draw)
@@ -172,7 +142,7 @@ def test_every_field_is_recomputed_or_stated(name):
     assert missed == []
 
 
-@pytest.mark.parametrize("name", sorted(PARAMETERS.keys() - ARRAYS.keys()))
+@pytest.mark.parametrize("name", FILTER)
 def test_period_and_notch_are_held_to_their_tolerance(baseline, shipped, name):
     changed = np.array(shipped[name]) + 10.0 * TOLERANCES[PARAMETERS[name]].allowed(np.array(shipped[name]))
     design = ControlDesign.from_parameters(shipped | {name: changed.tolist()})

@@ -14,20 +14,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import core_calls as calls
 import numpy as np
 import pytest
-from core_calls import (
-    actuator_step,
-    atmosphere_step,
-    begin_faults,
-    command_faults,
-    dryden_cross_map,
-    engine_faults,
-    measure,
-    move_effectors,
-    receive,
-    written,
-)
 
 from hsv.control.design import find_design, read_design
 from hsv.control.effectiveness import EffectivenessData, effectiveness_along, effectiveness_data
@@ -35,20 +24,7 @@ from hsv.control.estimator import EstimatorData, steady_gain
 from hsv.control.nominal_law import NominalData, level
 from hsv.control.notch_filter import NotchSection, discretise
 from hsv.control.reference_trajectory import ReferenceTrajectory
-from hsv.core import doubles, ffi, lib, vector
-from hsv.core.arithmetic import (
-    arcsine,
-    arctangent2,
-    exponential,
-    logarithm,
-    normals,
-    of_each,
-    philox,
-    sine_cosine,
-    solve,
-    tangent,
-    uniforms,
-)
+from hsv.core import arithmetic, doubles, ffi, lib, vector
 from hsv.design.disturbance import decompose
 from hsv.design.error_system import tube_errors
 from hsv.flight.responses import along_filter, lag_response
@@ -115,20 +91,24 @@ def _bits(array: np.ndarray) -> np.ndarray:
 
 def elementary(z: Golden) -> None:
     angles = z["elementary.angle.x"].tolist()
-    for name, column in zip(("sine", "cosine"), zip(*map(sine_cosine, angles), strict=True), strict=True):
+    for name, column in zip(("sine", "cosine"), zip(*map(arithmetic.sine_cosine, angles), strict=True), strict=True):
         z.check(f"elementary.sine_cosine.{name}", column)
-    z.check("elementary.tangent", of_each(tangent, angles))
-    for name, function in (("arcsine", arcsine), ("exponential", exponential), ("logarithm", logarithm)):
-        z.check(f"elementary.{name}", of_each(function, z[f"elementary.{name}.x"]))
+    z.check("elementary.tangent", arithmetic.of_each(arithmetic.tangent, angles))
+    for name, function in (
+        ("arcsine", arithmetic.arcsine),
+        ("exponential", arithmetic.exponential),
+        ("logarithm", arithmetic.logarithm),
+    ):
+        z.check(f"elementary.{name}", arithmetic.of_each(function, z[f"elementary.{name}.x"]))
     points = z["elementary.arctangent2.y"].tolist(), z["elementary.arctangent2.x"].tolist()
-    z.check("elementary.arctangent2", [arctangent2(y, x) for y, x in zip(*points, strict=True)])
+    z.check("elementary.arctangent2", [arithmetic.arctangent2(y, x) for y, x in zip(*points, strict=True)])
 
 
 def noise(z: Golden) -> None:
-    z.check("noise.philox", [philox(tuple(c[:4]), tuple(c[4:])) for c in z["noise.philox.counter"].tolist()])
+    z.check("noise.philox", [arithmetic.philox(tuple(c[:4]), tuple(c[4:])) for c in z["noise.philox.counter"].tolist()])
     arguments = z["noise.numbers.arguments"].tolist()
-    z.check("noise.uniforms", [uniforms(*row) for row in arguments])
-    z.check("noise.normals", [normals(*row) for row in arguments])
+    z.check("noise.uniforms", [arithmetic.uniforms(*row) for row in arguments])
+    z.check("noise.normals", [arithmetic.normals(*row) for row in arguments])
 
 
 def design(name: str) -> Any:
@@ -149,8 +129,8 @@ def polytopes(z: Golden) -> None:
         # The schedule of one entry in each vertex is that of the weights.
         r = len(polytope.A)
         ones = replace(data, S=np.pad(np.eye(r), ((0, 0), (0, -r % lib.SUMS))), entries=np.arange(r))
-        z.check(f"polytope.{name}.weights", [written(lib.hsv_schedule, 99, ones.pointer, *p)[:r] for p in points])
-        z.check(f"polytope.{name}.S", [written(lib.hsv_schedule, 99, data.pointer, *p) for p in points])
+        z.check(f"polytope.{name}.weights", [calls.written(lib.hsv_schedule, 99, ones.pointer, *p)[:r] for p in points])
+        z.check(f"polytope.{name}.S", [calls.written(lib.hsv_schedule, 99, data.pointer, *p) for p in points])
         room = ffi.new("double[99]")
         z.check(f"polytope.{name}.inside", [lib.hsv_schedule(data.pointer, *p, room) for p in points])
         for axis in ("altitude", "velocity"):
@@ -193,7 +173,7 @@ def vehicle(z: Golden) -> None:
     z.check("dynamics.derivative_in", [derivative(*point, now) for point, now in zip(points, c, strict=True)])
     z.check("dynamics.forces", [forces(*point) for point in points])
     windy = [
-        written(lib.hsv_forces, 6, a, b, vehicle_struct(p).pointer, now)
+        calls.written(lib.hsv_forces, 6, a, b, vehicle_struct(p).pointer, now)
         for a, b, p, now in zip(x, u, own, c, strict=True)
     ]
     z.check("dynamics.forces_in", windy)
@@ -231,7 +211,7 @@ def actuators(z: Golden) -> None:
     maps = [actuator_map(order, *row[:3]) if order else (0.0,) * 4 for order, row in rows]
     z.check("actuator.map", maps)
     steps = [
-        actuator_step(order, own, row[3:5], row[5], row[6:], row[2])
+        calls.actuator_step(order, own, row[3:5], row[5], row[6:], row[2])
         for (order, row), own in zip(rows, maps, strict=True)
     ]
     z.check("actuator.step", steps)
@@ -260,13 +240,13 @@ def faults(z: Golden) -> None:
         start, late, lines = np.array([0.25, 0.1]), i % 3 * 0.65, []
         state, effector, before = actuators_at_rest(start), start.copy(), start
         for k, command in enumerate(commands):
-            acting = begin_faults(rows, k, 17)
+            acting = calls.begin_faults(rows, k, 17)
             for j in range(4):
                 share = min(max(late - j, 0.0), 1.0)
                 for given, begin, length in ((before, float(j), share), (command, j + share, 1.0 - share)):
                     if length > 0.0:
                         own = equipment[i % 4], (state, effector), rows, k, begin, given, alpha[k]
-                        move_effectors(*own, length)
+                        calls.move_effectors(*own, length)
                         lines.append([acting, *effector, *state.ravel()])
             before = command
         results.append(np.array(lines))
@@ -276,13 +256,16 @@ def faults(z: Golden) -> None:
     z.check("faults.effector.move_effectors.rows", [int.from_bytes(digest[:8], "little") for digest in digests])
     z.check(
         "faults.command.apply_command_faults",
-        [np.ravel([command_faults(rows, k, 17, u) for k, u in enumerate(commands)]) for rows in tables(z, "command")],
+        [
+            np.ravel([calls.command_faults(rows, k, 17, u) for k, u in enumerate(commands)])
+            for rows in tables(z, "command")
+        ],
     )
     sensors(z)
     points = [*enumerate(zip(alpha, mach, fuel, strict=True))]
     z.check(
         "faults.engine.apply_engine_faults",
-        [np.ravel([engine_faults(rows, k, 17, *point) for k, point in points]) for rows in tables(z, "engine")],
+        [np.ravel([calls.engine_faults(rows, k, 17, *point) for k, point in points]) for rows in tables(z, "engine")],
     )
 
 
@@ -297,7 +280,7 @@ def sensors(z: Golden) -> None:
                     values[f"sensors.{channel}.{other}"] = values.get(f"sensors.{channel}.{other}") or [standard]
         data, memory = sensor_data(values, PERIOD), sensor_state()
         given = data, memory, rows if i % 2 else none
-        found.append(np.ravel([measure(*given, k, 23 + i, x) for k, x in enumerate(z["sensors.x"])]))
+        found.append(np.ravel([calls.measure(*given, k, 23 + i, x) for k, x in enumerate(z["sensors.x"])]))
         if i in (3, 5, 11):
             fields = "noise bias bias_sigma drift_sigma drift_decay walk scale scale_sigma lag_decay latency drop_out"
             names = ("on", *fields.split(), "quantum", "minimum", "maximum")
@@ -312,7 +295,7 @@ def equipment(z: Golden) -> None:
         n = (9, 2)[i % 2]
         memory, lines = link_state(link, n, payloads[-1, :n] if i % 4 == 1 else None), np.zeros((len(payloads), 9))
         for k, payload in enumerate(payloads):
-            lines[k, :n] = receive(link, memory, k, 100 + i, payload[:n])
+            lines[k, :n] = calls.receive(link, memory, k, 100 + i, payload[:n])
         found.append(lines.ravel())
     z.check("links.receive", found)
 
@@ -320,9 +303,11 @@ def equipment(z: Golden) -> None:
     for i, values in enumerate(z["air.values"]):
         data = atmosphere_data(values, PERIOD)
         memory = atmosphere_state(data)
-        found.append(np.ravel([atmosphere_step(data, memory, k, 7 * i, *point) for k, point in enumerate(points)]))
+        found.append(
+            np.ravel([calls.atmosphere_step(data, memory, k, 7 * i, *point) for k, point in enumerate(points)])
+        )
     z.check("air.atmosphere_step", found)
-    z.check("air.dryden_cross_map", [dryden_cross_map(r) for r in z["air.dryden_cross_map.r"]])
+    z.check("air.dryden_cross_map", [calls.dryden_cross_map(r) for r in z["air.dryden_cross_map.r"]])
     gusts = zip(*(z[f"air.gust_mean.{name}"].tolist() for name in ("begin", "end", "length", "stays")), strict=True)
     z.check("air.gust_mean", [lib.hsv_gust_mean(*gust) for gust in gusts])
     altitudes, parker = z["air.speed_of_sound.altitude"], vehicle_struct(load_vehicle("parker").decoupled)
@@ -348,13 +333,13 @@ def filters(z: Golden) -> None:
             z[f"estimator.{i}.{name}"] for name in ("start", "input", "process", "noise", "iterations")
         )
         A, B = jacobian(start, held, VEHICLES[i])
-        z.check(f"estimator.{i}.transition", written(lib.hsv_transition, 121, A, B, period).reshape(11, 11))
+        z.check(f"estimator.{i}.transition", calls.written(lib.hsv_transition, 121, A, B, period).reshape(11, 11))
         gain, needed = steady_gain(A, B, period, process, noise)
         z.check(f"estimator.{i}.gain", gain)
         assert needed == iterations
         data, memory, lines = EstimatorData(gain, start, VEHICLES[i], period, 2), np.zeros(11), []
         for k in range(len(y)):
-            estimate = written(lib.hsv_estimate, 9, data.pointer, doubles(memory), k, y[k], u[max(k - 1, 0)])
+            estimate = calls.written(lib.hsv_estimate, 9, data.pointer, doubles(memory), k, y[k], u[max(k - 1, 0)])
             lines.append(np.concatenate((estimate, memory)))
         z.check(f"estimator.{i}.estimate_step", lines)
         z.check(f"estimator.{i}.estimate_step.last", lines[-1])
@@ -378,7 +363,7 @@ def elimination(z: Golden) -> None:
     for n in range(1, 7):
         found = np.zeros((12, n, 3))
         for i, (A, b) in enumerate(zip(z[f"elimination.{n}.A"], z[f"elimination.{n}.b"], strict=True)):
-            found[i, :, : 1 if i % 3 == 2 else 3] = solve(A, b[:, : 1 if i % 3 == 2 else 3])
+            found[i, :, : 1 if i % 3 == 2 else 3] = arithmetic.solve(A, b[:, : 1 if i % 3 == 2 else 3])
         z.check(f"elimination.{n}.x", found)
 
 

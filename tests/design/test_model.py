@@ -3,10 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hsv.control.notch_filter import NotchSection, continuous, series
+from hsv.control.notch_filter import NotchSection
 from hsv.design.inputs import read_inputs
-from hsv.design.model import design_model, polytopic_model
-from hsv.model.lpv.linearisation import Filter, from_true_rate
+from hsv.design.model import design_model
 from hsv.model.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
@@ -59,17 +58,6 @@ def test_codesigned_model_keeps_six_vertices_and_agrees_with_the_ecm(codesign):
     assert accuracy["bode_phase_error_deg"] < 1.5
     assert accuracy["smallest_weight"] >= -1e-9
     assert model.whole.A.shape == (6, 11, 11) and model.polytope.A.shape == (6, 9, 9)
-
-
-@pytest.mark.long
-def test_codesigned_model_at_a_point_is_vehicle_and_filter_in_series(codesign):
-    notch = sections(codesign)
-    model = polytopic_model(codesign.model, load_vehicle(), notch)
-    T = from_true_rate(Filter(*series(continuous(notch))))
-    A, _ = model.whole.at(26100.0, 2450.0)
-    joined = np.linalg.solve(T, A @ T)
-    np.testing.assert_allclose(joined[:9, :9], model.polytope.at(26100.0, 2450.0)[0], atol=1e-9)
-    assert np.abs(joined[:9, 9:]).max() < 1e-9
 
 
 def sections(inputs):

@@ -4,7 +4,7 @@ from numpy.testing import assert_allclose
 
 from hsv.base.errors import DesignError
 from hsv.control.design import find_design, read_design
-from hsv.control.nominal_gain import NominalProblem, certified_cost, decrease_between, nested_gains
+from hsv.control.nominal_gain import NominalProblem, certified_cost, nested_gains
 from hsv.design.baseline import initial_deviation
 
 
@@ -65,21 +65,3 @@ def test_gains_between_two_of_an_interpolated_family_shrink_the_outer_ellipsoid_
             for A, B in zip(problem.A, problem.B, strict=True):
                 assert np.linalg.norm(np.linalg.solve(factor, (A + B @ K) @ factor), 2) < 1.0
             assert np.all(np.sqrt(np.einsum("ij,jk,ik->i", K, np.linalg.inv(P), K)) <= problem.input_bound)
-
-
-def test_the_gains_of_a_switched_family_do_not_shrink_the_ellipsoid_before_them(design, problem):
-    Q = np.linalg.inv(design.nominal_ellipsoids)
-    between = [decrease_between(problem, K[:, :5], q).min() for K, q in zip(design.nominal_gains[1:], Q, strict=False)]
-    assert np.all(np.array(between[:4]) < 0.0)
-
-
-@pytest.mark.long
-def test_an_interpolated_family_is_certified_between_its_ellipsoids(problem, state):
-    outer, inner = nested_gains(problem, state, [1.0, 0.6], interpolated=True)
-    assert outer.between is None and "between_smallest_eigenvalues" not in outer.report()
-    assert inner.report()["between_smallest_eigenvalues"] == inner.between.tolist()
-    assert_allclose(inner.between, decrease_between(problem, inner.K, outer.Q), rtol=1e-9)
-    assert inner.between.min() > 0.0 and inner.decrease.min() >= 0.0 and inner.nesting >= 0.0
-    switched = nested_gains(problem, state, [1.0, 0.6])[1]
-    # One more inequality cannot make the certified cost less: here it takes a third more.
-    assert switched.gamma < inner.gamma < 1.5 * switched.gamma

@@ -2,8 +2,6 @@ import numpy as np
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.control.design import find_design, read_design
-from hsv.design.baseline import _literal
 from hsv.design.tightening import check_plan, tighten
 from hsv.model.vehicle import load_vehicle
 
@@ -30,9 +28,3 @@ def test_a_plan_that_does_not_fit_is_refused_with_the_amount(bounds):
     highest = bounds.upper + np.array([-0.1, 0.02])
     with pytest.raises(DesignError, match=r"upper tightened bound of elevator_deflection by 0\.02 rad"):
         check_plan(bounds, bounds.lower, highest)
-
-
-def test_the_literal_chain_leaves_less_than_the_design_uses(bounds, inputs):
-    literal = _literal(inputs, bounds).nominal.input_bound.array()
-    assert np.all(literal < inputs.nominal.input_bound.array())
-    assert read_design(find_design("baseline")).nominal_input_bound == pytest.approx(inputs.nominal.input_bound.array())

@@ -4,7 +4,6 @@ from marking import long
 from numpy.testing import assert_array_equal
 
 from hsv.flight.closed_loop import fly
-from hsv.model.plant import FlightStatus
 
 SHORT = {"duration": 6.0, "fault__starts": [3.0]}
 HISTORIES = ("state", "filtered_pitch_rate", "deviation", "nominal_input", "u_unsaturated", "command", "actuator")
@@ -41,11 +40,3 @@ def test_compiled_loop_equals_the_components_step_by_step_bit_for_bit(scenario, 
         assert_array_equal(getattr(compiled.history, name), stepped[name], err_msg=name)
     assert compiled.status == stepped["plant_status"][-1]
     assert_array_equal(compiled.curves.saturated, stepped["saturated"])
-
-
-def test_a_flight_has_one_row_more_than_steps_and_finishes():
-    flight = fly(components(duration=1.0))
-    assert len(flight.time) == len(flight.history.state) == 51
-    assert flight.time[-1] == pytest.approx(1.0)
-    assert flight.status is FlightStatus.FINISHED
-    assert flight.fault_start is None

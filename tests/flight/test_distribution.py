@@ -38,12 +38,6 @@ def test_a_normal_distribution_ends_at_three_deviations_and_has_the_moments_of_o
     assert values.std() == pytest.approx(10.0 * np.sqrt(1.0 - cut), rel=1e-5)
 
 
-def test_a_uniform_distribution_lies_evenly_between_its_ends():
-    drawn = Distribution(unit="m", low=-1.0, high=3.0)
-    assert drawn.quantiles(np.array([0.0, 0.25, 1.0])).tolist() == [-1.0, 0.0, 3.0]
-    assert drawn.middle == 1.0
-
-
 def test_of_whole_numbers_each_between_the_ends_is_drawn_as_often():
     drawn = Distribution(unit="1", low=1.0, high=4.0, whole=True)
     assert drawn.quantiles(np.array([0.0, 0.24, 0.26, 0.74, 0.76, 1.0])).tolist() == [1.0, 1.0, 2.0, 3.0, 4.0, 4.0]

@@ -3,7 +3,7 @@
 import shutil
 import subprocess
 import zipfile
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from types import SimpleNamespace
 
 import pytest
@@ -128,6 +128,9 @@ def test_an_fmu_of_fmpys_own_template_flies_as_controller_as_the_page_says(tmp_p
     flown = fly(assemble_flight(load_scenario(str(tmp_path / mapped.file), changes)))
     assert flown.history.command.tolist() == [[*TRIM.values()]] * 101
     assert names_code("pid.fmu") and class_place("pid.fmu") == "pid.fmu"
+    (tmp_path / "model.fmu").write_text("no archive")
+    with refused("model.fmu'.*cannot be loaded"):
+        flight(tmp_path)
 
 
 @pytest.mark.long
@@ -144,16 +147,6 @@ def test_the_exported_controller_flies_the_published_case_1_in_the_loop(exported
     )
     shutil.copy(exported / "controller.fmu", tmp_path)
     assert fly(assemble_flight(load_scenario(str(tmp_path / "own.toml")))).fingerprint == CASE1
-
-
-@pytest.mark.parametrize(
-    ("name", "pattern", "matches"),
-    [("u[1]", "u[1]", True), long("u[1]", "u[*", True), ("u1", "u[1]", False)],
-)
-def test_unconnected_takes_a_pattern_literally_but_for_the_star(tmp_path, name, pattern, matches):
-    template_fmu(tmp_path / "model.fmu", ["h"], TRIM, lambda text: text.replace('name="h"', f'name="{name}"'))
-    with nullcontext() if matches else refused("not a signal of the bench"):
-        flight(tmp_path, f'{OUTPUTS}unconnected = ["{pattern}"]')
 
 
 @pytest.mark.parametrize(
@@ -183,12 +176,6 @@ def test_a_wrong_fmu_is_one_line(tmp_path, table, description, match):
     )
     with refused(match):
         flight(tmp_path, table)
-
-
-def test_what_is_no_archive_is_one_line(tmp_path):
-    (tmp_path / "model.fmu").write_text("no archive")
-    with refused("model.fmu'.*cannot be loaded"):
-        flight(tmp_path)
 
 
 @pytest.mark.parametrize(

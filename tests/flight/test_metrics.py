@@ -101,13 +101,6 @@ def test_decay_time_is_that_of_the_envelope_and_the_slower_mode_counts():
     assert m["elastic_decay_time"] == m["elastic_rate_2_decay_time"]
 
 
-def test_fault_at_the_first_step_leaves_out_what_needs_a_before():
-    m = flight_metrics(flight(fault=0.0, altitude=lambda t: -np.exp(-t)))
-    assert "post_fault_attitude_deviation" not in m
-    assert "altitude_rise_time" not in m
-    assert "altitude_end_error" in m
-
-
 def test_input_ranges_and_saturated_steps():
     m = flight_metrics(
         flight(

@@ -36,15 +36,6 @@ def test_computing_for_whole_periods_is_a_delay_of_the_command_to_the_bit():
     assert np.array_equal(history.actuator[3:], history.command[:-3])
 
 
-def test_time_of_computation_has_no_jump_at_a_whole_period():
-    def elevator(delay):
-        return flown_with({"computational_delay": delay}).history.command[:, 1]
-
-    whole = elevator("20 ms")
-    assert np.abs(elevator("19.999 ms") - whole).max() < 1e-3 * np.abs(elevator("15 ms") - whole).max()
-    assert np.abs(elevator("20.001 ms") - whole).max() < 1e-3 * np.abs(elevator("25 ms") - whole).max()
-
-
 def test_the_loop_bears_the_delay_that_the_linear_one_does():
     # docs/study/hardware.md: 116 ms with ideal actuators.
     def elevator_rms(delay):

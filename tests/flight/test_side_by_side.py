@@ -8,10 +8,7 @@ from flights import components
 from marking import long
 
 from hsv.core import lanes
-from hsv.flight.campaign.campaign import plan
-from hsv.flight.campaign.sample_runner import SampleRunner
 from hsv.flight.closed_loop import fly
-from hsv.flight.metrics import flight_metrics
 from hsv.flight.side_by_side import FlightGroup, TubeLevels
 
 WIDTH = lanes()
@@ -118,15 +115,3 @@ def test_flights_of_different_lengths_or_designs_are_not_taken():
     assert not FlightGroup.takes([first, components("case1", duration=2.0)])
     assert not FlightGroup.takes([first, components("case1_smooth", duration=1.0)])
     assert not FlightGroup.takes([first])
-
-
-def test_a_campaign_flies_its_samples_as_each_alone():
-    campaign = plan("case2", method="sobol", samples=2 * WIDTH, factors={"tube.tau": (0.9, 1.0)})
-    runner = SampleRunner(campaign)
-    flights = range(2 * WIDTH)
-    samples, _ = runner.campaign.draw(flights)
-    for flight, sample, flown in zip(flights, samples, runner.fly_all(flights, samples), strict=True):
-        alone = runner.fly(flight, sample)
-        assert flown.fingerprint == alone.fingerprint
-        assert flown.level == runner.level(alone.data())
-        assert flight_metrics(flown.curves) == alone.metrics

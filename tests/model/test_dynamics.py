@@ -4,7 +4,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from hsv.model.dynamics import advance, derivative, forces, jacobian
+from hsv.model.dynamics import advance, derivative, jacobian
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 
@@ -25,16 +25,6 @@ def test_equations_agree_with_the_published_ones_in_their_own_units(coupling):
     for x, u in random_points():
         expected = published.derivative(x / published.STATE_UNITS, u, COUPLINGS[coupling]) * published.STATE_UNITS
         assert_allclose(derivative(x, u, vehicle), expected.astype(float), rtol=1e-11, atol=1e-11)
-
-
-def test_forces_agree_with_the_published_ones():
-    pound = published.SLUG * published.FOOT
-    for x, u in random_points():
-        lift, drag, thrust, moment, pressure = forces(x, u, load_vehicle().coupled())
-        expected = published.forces(x / published.STATE_UNITS, u)
-        assert_allclose([lift, drag, thrust], np.array(expected[:3], float) * pound, rtol=1e-11)
-        assert moment == pytest.approx(float(expected[3]) * pound * published.FOOT, rel=1e-10)
-        assert pressure > 0.0
 
 
 @pytest.mark.parametrize("coupling", COUPLINGS)

@@ -25,14 +25,6 @@ def test_starts_in_the_trim_of_the_nominal_vehicle_even_if_perturbed():
     assert heavy.step(held).state[2] != nominal.initial.state[2]
 
 
-def test_reset_repeats_the_flight_bit_for_bit():
-    bench = plant()
-    held = bench.initial.input * 1.01
-    first = [bench.reset().state, *(bench.step(held).state for _ in range(50))]
-    second = [bench.reset().state, *(bench.step(held).state for _ in range(50))]
-    assert_array_equal(first, second)
-
-
 @pytest.mark.parametrize(
     "changes",
     [
@@ -128,14 +120,9 @@ def test_an_inlet_feels_angle_of_attack_and_mach_number_of_the_air(changes, spee
     ("name", "value", "message"),
     [
         ("period", 0.0, "parameter period = 0.0: expected double from 0.0001 to 1 s"),
-        ("period", 1, "parameter period = 1: expected double"),
-        ("substeps", 2.0, "parameter substeps = 2.0: expected integer"),
-        ("substeps", True, "parameter substeps = True: expected integer"),
         ("vehicle.model", "XM", "parameter vehicle.model = 'XM': expected one of CM, DM"),
         ("vehicle.coupling", "none", "parameter vehicle.coupling = 'none': expected one of paper_like, derived"),
         ("initial.altitude", 20000.0, "parameter initial.altitude = 20000.0: expected double from 25908 to 26365.2 m"),
-        ("initial.velocity", float("nan"), "parameter initial.velocity = nan: expected double"),
-        ("vehicle.perturbation.mass", -1.0, "parameter vehicle.perturbation.mass = -1.0: expected double"),
     ],
 )
 def test_a_wrong_parameter_is_named(name, value, message):

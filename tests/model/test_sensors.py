@@ -109,12 +109,6 @@ def test_faults_bias_scale_and_run_away():
     assert_allclose(away, STATES[:, Q] + drift, rtol=1e-13, atol=1e-15)
 
 
-def test_frozen_sensor_shows_what_it_showed():
-    result = of_pitch_rate(faults=[(fault("sensor_freeze"), 50, 90)], quantum=1e-5)
-    assert_array_equal(result[50:90], result[50])
-    assert (np.abs(result - STATES[:, Q]) <= 0.6e-5)[np.r_[0:51, 90:STEPS]].all()
-
-
 def test_fault_of_noise_and_drop_out():
     noisy = of_pitch_rate(still(5000), [(fault("sensor_noise", standard_deviation=0.01), 1000)]) - STATES[0, Q]
     assert not noisy[:1000].any() and np.std(noisy[1000:]) == pytest.approx(0.01, rel=0.05)

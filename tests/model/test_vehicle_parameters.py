@@ -58,8 +58,6 @@ def test_perturbation_changes_what_it_names_and_nothing_else():
     [
         ({"mas": 0.1}, "perturbation.mas = 0.1: no such parameter, expected one of mass, moment_of_inertia"),
         ({"mass": float("nan")}, "perturbation.mass = nan: expected a finite relative change"),
-        ({"mass": -1.0}, "perturbation.mass = -1.0: expected"),
-        ({"mass": float("inf")}, "perturbation.mass = inf: expected"),
     ],
 )
 def test_a_wrong_perturbation_is_named(perturbation, message):

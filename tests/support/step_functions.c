@@ -1,23 +1,6 @@
 /* Controllers as bare step functions of hsv_block.h, for tests that fly their addresses. */
 #include "hsv_block.h"
 
-/* Proportional feedback with a leaky integral of the pitch angle; parameters: gain, time (s) of the leak. */
-int32_t leaky(int64_t k, const double *in, double *out, double *state, const double *par)
-{
-    static const double feedback[2][5] = {{-1e-3, -2e-3, 0.0, 0.0, 0.0}, {0.0, 0.0, -2.0, 3.0, 1.2}};
-    const double *x = in + HSV_ESTIMATE, *x_r = in + HSV_REFERENCE, *u_r = in + HSV_REFERENCE_INPUT;
-    (void)k;
-    for (int i = 0; i < 2; i++) {
-        double total = 0.0;
-        for (int j = 0; j < 5; j++)
-            total += feedback[i][j] * ((j == HSV_PITCH_RATE ? in[HSV_FILTERED_PITCH_RATE] : x[j]) - x_r[j]);
-        out[i] = u_r[i] + par[0] * total;
-    }
-    out[1] += 0.05 * state[0];
-    state[0] += 0.02 * (x[3] - x_r[3] - state[0] / par[1]);
-    return 0;
-}
-
 /* Counts its steps in its state, or in its first parameter if the second one is not zero: all copies share that, like a
  * static variable of a library. */
 int32_t counting(int64_t k, const double *in, double *out, double *state, const double *par)

@@ -3,50 +3,20 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.core.arithmetic import LARGEST
-from hsv.design.certified import Plan
 from hsv.design.disturbance import ChannelModel, DisturbanceSet
 from hsv.design.error_system import error_system, tube_errors
 from hsv.design.hardware.models import (
-    REACH,
     Measured,
     air,
     declared,
     delayed,
-    described,
-    sensors,
 )
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario
 from hsv.model.dynamics import advance
-from hsv.model.sensors import sensor_data
 from hsv.model.signals import N_RIGID, N_STATES, PITCH_RATE
 from hsv.model.trim import trim
-
-
-@pytest.mark.long
-def test_noise_counts_with_its_reach_and_bias_once(problem, subject):
-    models, unbounded = described(
-        subject, sensor_set="fine", bias=["pitch_angle = -0.1 deg"], turbulence="2 ft/s", density="1 %"
-    )
-    assert not unbounded
-    unexplained = models.pop("model errors under sensors")(problem.system)
-    assert unexplained.half_width.size == 0 and unexplained.widening.min() >= 0.0 < unexplained.widening[6]
-    assert list(models) == ["fine sensors: noise", "bias of pitch_angle = -0.1 deg", "turbulence 2 ft/s", "density 1 %"]
-    noise, bias, turbulence, density = (model(problem.system).half_width for model in models.values())
-    assert noise[0] == pytest.approx(REACH * 0.3048)
-    assert_allclose(bias, [0.0, 0.0, 0.0, np.radians(0.1), 0.0])
-    assert_allclose(turbulence, [REACH * 0.6096, REACH * 0.6096, 0.0])
-    assert_allclose(density, [0.0, 0.0, 0.01])
-
-
-def test_an_inertial_angle_of_attack_has_the_error_of_the_pitch_angle(problem, subject):
-    """Equal errors of both angles are one of the path angle less: the feedback on one takes from that on the other."""
-    noise = sensors(sensor_data({"sensors.set": "inertial"}, subject.design.period), Plan.of(subject))["sensor noise"]
-    seen, F = noise(problem.system).feedthrough, problem.system.F
-    assert_allclose(seen[:, 3], F[:, 3] + F[:, 2])
-    assert abs(seen[1, 3]) < 0.2 * abs(F[1, 3])
-
 
 SLOW = {"set": "elevator_50", "natural_frequency": "5 rad/s"}
 
@@ -62,21 +32,6 @@ SLOW = {"set": "elevator_50", "natural_frequency": "5 rad/s"}
 )
 def test_what_has_no_bound_is_named(subject, change, named):
     assert declared(subject, load_scenario("case1", change)) == ({}, named)
-
-
-def test_air_of_a_scenario_counts_with_its_reach(problem, subject):
-    changes = {
-        "wind": {"up": "-3 ft/s"},
-        "turbulence": {"sigma_up": "1 ft/s"},
-        "gust": {"starts": ["10 s", "20 s"], "up": ["5 ft/s", "-2 ft/s"], "lengths": ["700 ft", "700 ft"]},
-        "density": {"offset": "-2 %", "sigma": "1 %"},
-    }
-    models, _ = declared(subject, load_scenario("case1", changes))
-    found = {name: model(problem.system).half_width.tolist() for name, model in models.items()}
-    assert found["wind"] == pytest.approx([0.0, 3 * 0.3048, 0.0])
-    assert found["gusts"] == pytest.approx([0.0, 7 * 0.3048, 0.0])
-    assert found["turbulence"] == pytest.approx([0.0, REACH * 0.3048, 0.0])
-    assert found["density"] == pytest.approx([0.0, 0.0, 0.05])
 
 
 @pytest.mark.parametrize("state", range(N_RIGID))

@@ -47,12 +47,6 @@ def test_interrupted_twice_and_resumed_gives_the_same_file_and_flies_nothing_twi
     assert sorted(path.name for path in out.parent.iterdir()) == [out.name]
 
 
-def test_a_finished_campaign_is_not_flown_again(planned, results):
-    executor = Counting()
-    assert run_campaign(planned(), ResultStore(results.path, planned()), executor).flights == 0
-    assert executor.flown == []
-
-
 def test_another_campaign_does_not_mix_with_one_that_is_there(planned, results, out):
     other = planned(seed=4)
     with pytest.raises(CampaignError, match="holds another campaign"):
@@ -77,12 +71,6 @@ def test_restart_leaves_a_campaign_alone_that_is_being_flown(planned, results, o
     assert refused
     assert out.read_bytes() == results.path.read_bytes()
     assert list(out.parent.iterdir()) == [out]
-
-
-def test_a_lock_left_by_a_killed_process_stops_nobody(planned, out):
-    out.with_name(out.name + ".lock").touch()
-    with ResultStore(out, planned()).opened():
-        pass
 
 
 def test_a_damaged_batch_is_flown_again_and_strangers_are_left_out(planned, results, out):

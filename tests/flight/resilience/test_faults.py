@@ -51,15 +51,6 @@ def test_a_fault_that_ends_by_itself_stops_after_its_severity(campaign):
     assert (row.type, row.start, row.stop) == ("hard_over", 100.0, 100.3)
 
 
-def test_corners_are_mirror_images_and_what_solves_in_flight_has_none(campaign):
-    nominal, *corners = campaign.subjects[0].vehicles
-    assert nominal == {} and len(corners) == 4
-    mirrored = [{name: -change for name, change in corner.items()} for corner in corners]
-    assert all(image in corners for image in mirrored)
-    [solving] = plan(("case1_qp",), ("elevator_loss",)).subjects
-    assert solving.vehicles == ({},)
-
-
 def test_a_campaign_survives_its_own_text(campaign):
     assert ResilienceCampaign.from_text(campaign.text).text == campaign.text
     assert [case.text for case in ResilienceCampaign.from_text(campaign.text).cases] == [

@@ -25,14 +25,6 @@ def test_angles_close_the_body_at_the_tail():
     assert math.degrees(airframe().nozzle_ramp_angle) == pytest.approx(14.41, abs=0.005)
 
 
-def test_the_engine_lies_where_thrust_has_its_moment():
-    frame = airframe()
-    assert frame.engine_roof - 0.5 * frame.engine_height == pytest.approx(-8.36 * FOOT, rel=1e-12)
-    x, z = frame.elevator_hinge
-    assert -frame.aft_body < x - 0.5 * frame.elevator_chord and x + 0.5 * frame.elevator_chord < frame.nozzle
-    assert frame.lower(x) < z < frame.upper(x)
-
-
 LENGTHS = (55.0 * FOOT, 45.0 * FOOT)
 
 

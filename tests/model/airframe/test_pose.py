@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hsv.model.airframe.geometry import airframe
-from hsv.model.airframe.pose import BODY, ELEVATOR, FLAMES, FLIGHT_PATH, Sample, composed, segments, transforms
+from hsv.model.airframe.pose import BODY, ELEVATOR, FLIGHT_PATH, Sample, composed, segments, transforms
 from hsv.model.vehicle import load_vehicle
 
 LEVEL_FLIGHT = Sample(0.02, 0.03, 1.1, 0.9, 0.5, 0.2)
@@ -52,14 +52,3 @@ def test_positive_elevator_is_trailing_edge_down(deflection):
     # The published lift by elevator is positive and its moment negative: a surface behind, deflected down.
     vehicle = load_vehicle().decoupled
     assert vehicle.lift_elevator > 0.0 > vehicle.moment_elevator and elevator.x < 0.0
-
-
-def test_the_flame_grows_with_the_fuel_and_hides_in_the_engine_without():
-    def reach(fuel):
-        frames = composed(transforms(LEVEL_FLIGHT._replace(fuel_equivalence_ratio=fuel)), "engine")
-        return [-frames[name].x for name in FLAMES]
-
-    full = airframe().full_fuel_equivalence_ratio
-    assert reach(0.0) == reach(-0.1) == [0.0] * 3
-    assert reach(0.5 * full) == pytest.approx([0.5 * value for value in reach(full)])
-    assert reach(full) == reach(2.0 * full) == pytest.approx([number * airframe().engine for number in (1, 2, 3)])

@@ -56,11 +56,3 @@ def test_a_delayed_command_acts_when_it_arrives(plant, delay):
 
     end = 6 * PERIOD - delay
     assert_allclose(x[:3], answer(end) - answer(end - PERIOD), atol=1e-12)
-
-
-def test_a_delay_and_actuators_follow_one_another(plant):
-    A, B = held_behind(*plant, PERIOD, BOTH, PERIOD)
-    late_A, late_B = held_behind(*plant, PERIOD, BOTH)
-    assert_allclose(A[:6, :6], late_A, atol=1e-15)
-    assert_allclose(A[:6, 6:], late_B, atol=1e-15)
-    assert np.array_equal(B, np.vstack((np.zeros((6, 2)), np.eye(2))))

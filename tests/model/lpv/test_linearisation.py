@@ -94,13 +94,6 @@ def test_model_at_a_node_is_the_vertex(polytope):
         assert_allclose(B, expected_B, rtol=1e-13, atol=1e-16)
 
 
-def test_interpolation_error_between_nodes_is_small(polytope):
-    h, v = 0.5 * (ALTITUDES[1] + ALTITUDES[2]), 0.5 * (VELOCITIES[2] + VELOCITIES[3])
-    A, _ = polytope.at(h, v)
-    exact, _ = zero_order_hold(*linearise(load_vehicle().coupled(), h, v), 0.02)
-    assert np.abs(A - exact).max() < 1e-3 * np.abs(exact - np.eye(9)).max()
-
-
 def test_linearisation_has_the_structural_modes_and_no_inertial_coupling():
     A, _ = linearise(load_vehicle().coupled("derived"), 25908.0, 2347.594)
     assert_array_equal(A[:5, 5:], 0.0)
