@@ -1,5 +1,7 @@
 """Seed small faults, each alone, and report which test of their room detects them; half of them are in C.
 
+The page of parameters, with all ranges and defaults, belongs to every room.
+
 python3 tests/seeded_faults.py REPORT.jsonl [COUNT]: a report that exists is continued.
 """
 
@@ -75,7 +77,7 @@ def detected(group: str, path: Path, place: int, token: str) -> str:
         file.write_text(text[:place] + changed(token) + text[place + len(token) :])
         environment = os.environ | {"PYTHONPATH": f"{copy}:{os.environ.get('PYTHONPATH', '')}", "HSV_CFLAGS": "-O0"}
         room = Path("tests", GROUPS[group][2])
-        tests = [*map(str, (ROOT / room).glob(f"test_{path.stem}.py")), str(room)]
+        tests = [*map(str, (ROOT / room).glob(f"test_{path.stem}.py")), "tests/graph/test_documentation.py", str(room)]
         if path.suffix == ".h":
             tests = ["tests/core/test_vectors.py", "tests/flight/test_golden_flights.py", *tests, "tests/core"]
             build = [sys.executable, "setup.py", "-q", "build_ext", "--inplace", "--force"]

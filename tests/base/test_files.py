@@ -56,7 +56,6 @@ def test_what_cannot_be_read_says_why(tmp_path, name, content, why):
         (parse_toml, "a = " + "[" * (MAX_LEVELS + 1), "]" * (MAX_LEVELS + 1)),
         (parse_json, "[" * 100_000, "]" * 100_000),
         (parse_yaml, "[" * 100_000, "]" * 100_000),
-        (parse_yaml, "{a: " * 100_000, "1" + "}" * 100_000),
     ],
 )
 def test_deep_nesting_is_refused(parse, opening, closing):
@@ -82,12 +81,10 @@ def test_aliases_that_multiply_are_refused_and_others_taken():
     [
         (parse_yaml, "period: 0.02\nperiod: 0.03", "the key 'period' occurs twice at line 2, column 1"),
         (parse_json, '[{"a": 1, "b": 2, "a": 1}]', "the key 'a' occurs twice"),
-        (parse_toml, "a = 1\na = 2", "Cannot overwrite a value"),
         (parse_yaml, "a: !!python/object/apply:os.system [ls]", "could not determine a constructor"),
         (parse_toml, f"a = {'9' * 5000}", "Exceeds the limit"),
         (parse_toml, f"a = 0x{'f' * 5000}", "a whole number of more than 4000 digits"),
         (parse_json, "[1, 2", "Expecting"),
-        (parse_json, b"\xff", "can't decode"),
         (parse_toml, " " * (MAX_BYTES + 1), f"more than {MAX_BYTES} bytes"),
     ],
 )
@@ -120,7 +117,6 @@ def test_tables_are_merged_lists_replaced_and_limits_are_ones_own(tmp_path):
     [
         ("extends = 3\n", r"scenario 'mine': extends = 3: expected a name or the path of a file"),
         ('extends = "cas1"\n', r"scenario 'cas1': expected a path or one of"),
-        ('extends = "other.toml"\n', r"other.toml': cannot be read"),
         ('extends = "mine.toml"\n', r"scenario 'mine': extends: .*mine.toml extends .*mine.toml, expected files that"),
         ('extends = "case1"\ndruation = "3 s"\n', r"scenario 'mine': druation: unknown key"),
     ],

@@ -28,8 +28,6 @@ from hsv.model.signals import INPUT_UNITS, STATE_UNITS
         ("85.5 kft", "m", 26060.4),
         ("7900 ft/s", "m/s", 2407.92),
         ("0.3 deg", "rad", math.radians(0.3)),
-        ("3 deg/s", "rad/s", math.radians(3)),
-        ("3 min", "s", 180.0),
         ("+10 %", "1", 0.1),
         (0.9, "1", 0.9),
         ("1 rpm", "rad/s", math.pi / 30),
@@ -43,16 +41,13 @@ def test_quantities_become_si(text, unit, value):
 @pytest.mark.parametrize(
     ("text", "unit", "problem"),
     [
-        ("85500", "m", "the unit is missing"),
         (85500, "m", "the unit is missing"),
         ("7900 ft", "m/s", "wrong unit"),
         ("1 furlogn", "m", "unknown unit"),
         ("1 [ft", "m", "cannot be read"),
         ("__import__('os')", "m", "no number"),
-        ("", "m", "no number"),
         ("nan ft", "m", "no number"),
         ("1e999 ft", "m", "expected a finite quantity"),
-        ("5 degC", "m", "cannot be read"),
         # Angles are no bare numbers, nor bare numbers angles; a frequency is no angular frequency.
         ("12", "rad", "the unit is missing"),
         ("10 %", "m", "wrong unit"),

@@ -143,14 +143,6 @@ def test_what_a_design_must_not_have_is_named(tmp_path, old, new, problem):
     assert problem in str(caught.value) and str(path) in str(caught.value) and "\n" not in str(caught.value)
 
 
-def test_a_section_of_one_node_goes_over_that_for_all(tmp_path):
-    path = tmp_path / "parameters.yaml"
-    shared = "/**: {ros__parameters: {period: 0.02, notch: {enabled: true}}}\n"
-    path.write_text(f"{shared}plant: {{ros__parameters: {{period: 0.01}}}}\n")
-    assert read_parameters(path) == {"period": 0.02, "notch.enabled": True}
-    assert read_parameters(path, "plant") == {"period": 0.01, "notch.enabled": True}
-
-
 def test_designs_are_found_by_name_and_by_path(tmp_path, monkeypatch):
     monkeypatch.setenv("HSV_DESIGN_PATH", str(tmp_path))
     own = tmp_path / "own.yaml"

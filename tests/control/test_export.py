@@ -12,7 +12,6 @@ from marking import long
 from numpy.testing import assert_array_equal
 
 import hsv.core
-from hsv.base.errors import DesignError
 from hsv.control.design import find_design, read_design
 from hsv.control.export import NUMBERS, SOURCE, controller_files, design_header, step_bounds
 from hsv.control.library import load_block
@@ -123,11 +122,6 @@ def test_a_name_does_not_end_the_comment_that_it_stands_in():
     assert text.splitlines()[0].endswith('of the design "a __ int b____".')
     assert "*/ int" not in text
     assert '"___"' in text
-
-
-def test_a_design_without_a_tube_is_refused():
-    with pytest.raises(DesignError, match=r"tube\.shape: empty, expected a design with a tube"):
-        controller_files(dataclasses.replace(DESIGNS["baseline"], tube=None))
 
 
 @needs_compiler

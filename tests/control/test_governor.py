@@ -136,13 +136,6 @@ def test_a_ramp_is_never_faster_than_it_was_asked_for(step):
     assert end - begin == pytest.approx(np.ptp(column(step, "time")), abs=2 * PERIOD)
 
 
-def test_no_command_and_no_blend_are_refused():
-    with pytest.raises(GovernorError, match="command: none, expected one"):
-        govern()
-    with pytest.raises(GovernorError, match="blend = 0 s: expected above 0"):
-        govern(Leg(0.0, 0.0, *TARGET), blend=0.0)
-
-
 IN_FLIGHT = 100
 """Step at which a command comes."""
 SHARP = [Corner(0.0, *START, 0.0), Corner(1.0, *START, 0.0), Corner(1.0, *NEAR, 0.0), Corner(4.0, *START, 0.0)]

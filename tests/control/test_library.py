@@ -9,7 +9,7 @@ from c_libraries import PROBE, build_probe
 
 from hsv.base.errors import ParameterError
 from hsv.control.controller import CONTROLLER_INPUTS, CONTROLLER_OUTPUTS
-from hsv.control.library import inside, library_digest, library_record, load_block, seen_from
+from hsv.control.library import library_digest, library_record, load_block
 from hsv.model.signals import FILTER_STATE
 
 
@@ -23,15 +23,6 @@ def test_a_flight_keeps_digest_and_source_of_its_library(tmp_path):
     shutil.copy(PROBE, tmp_path)
     record = library_record(controller)
     assert (record.sha256, record.source_name, record.source) == (digest, "probe.c", PROBE.read_bytes())
-
-
-def test_a_scenario_names_libraries_of_its_own_folder(tmp_path):
-    assert inside("build/own.so:lqr", tmp_path) == f"{tmp_path}/build/own.so:lqr"
-    assert seen_from(f"{tmp_path}/build/own.so:lqr", tmp_path) == "./build/own.so:lqr"
-    assert seen_from("/elsewhere/own.so:lqr", tmp_path) == "/elsewhere/own.so:lqr"
-    assert inside("tube_mpc", tmp_path) == seen_from("tube_mpc", tmp_path) == "tube_mpc"
-    with pytest.raises(ParameterError, match="expected a path inside the scenario's folder"):
-        inside("../own.so:lqr", tmp_path)
 
 
 def test_the_layout_of_the_header_is_that_of_the_bench(tmp_path):

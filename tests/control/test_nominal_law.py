@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 
 from hsv.control.design import find_design, read_design
 from hsv.control.nominal_gain import NominalProblem, nominal_gain
@@ -24,10 +23,6 @@ from hsv.model.vehicle import load_vehicle
 SMOOTH = read_design(find_design("smooth"))
 SWITCHED = dataclasses.replace(SMOOTH, interpolated=False)
 BOUNDARY = 1.0 + MEMBERSHIP_TOLERANCE
-
-
-def level(index, x):
-    return x[:5] @ SMOOTH.nominal_ellipsoids[index] @ x[:5]
 
 
 def on_boundary(index, rng):
@@ -53,27 +48,6 @@ def test_the_input_is_continuous_where_the_switched_one_jumps(index):
             jump = np.abs(outer.input - inner.input) / SMOOTH.nominal_input_bound
             largest[name] = max(largest[name], jump.max())
     assert largest["interpolated"] < 1e-4 < 1e-3 < largest["switched"]
-
-
-def test_between_two_ellipsoids_the_gain_is_the_one_whose_own_ellipsoid_has_the_state_on_its_boundary():
-    rng = np.random.default_rng(1)
-    last = len(SMOOTH.nominal_gains) - 1
-    seen = set()
-    for _ in range(300):
-        x = rng.uniform() ** 2 * on_boundary(0, rng)
-        result = step(SMOOTH, x)
-        i = result.gain_index
-        seen.add(i)
-        if i == last:
-            assert_allclose(result.input, SMOOTH.nominal_gains[i] @ x, rtol=1e-12, atol=1e-15)
-            continue
-        share = (level(i + 1, x) - BOUNDARY) / (level(i + 1, x) - level(i, x))
-        assert 0.0 <= share <= 1.0
-        mixed = share * SMOOTH.nominal_ellipsoids[i] + (1.0 - share) * SMOOTH.nominal_ellipsoids[i + 1]
-        assert_allclose(x[:5] @ mixed @ x[:5], BOUNDARY, rtol=1e-9)
-        K = share * SMOOTH.nominal_gains[i] + (1.0 - share) * SMOOTH.nominal_gains[i + 1]
-        assert_allclose(result.input, K @ x, rtol=1e-6, atol=1e-12)
-    assert len(seen) > 3
 
 
 DESIGN = read_design(find_design("baseline"))

@@ -1,10 +1,8 @@
 import dataclasses
 
-import clarabel
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy import sparse
 from scipy.linalg import solve_discrete_are
 
 from hsv.base.errors import DesignError, ParameterError
@@ -79,23 +77,6 @@ def test_plan_of_the_step_keeps_the_bounds_between_block_ends_too(law):
     room = 0.05 * (high - low)
     assert min(first) > low - room and max(first) < high + room
     assert max(first) > high - room
-
-
-def test_plan_is_the_optimum(law):
-    plan = law._solve(STEP[:5])
-    inputs = law._state_map @ STEP[:5]
-    G, rows = law._input_map, np.concatenate((law._bounds[1] - inputs, inputs - law._bounds[0]))
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    solution = clarabel.DefaultSolver(
-        sparse.csc_matrix(np.triu(law._hessian)),
-        np.zeros(2 * BLOCKS),
-        sparse.csc_matrix(np.vstack((G, -G))),
-        rows,
-        [clarabel.NonnegativeConeT(len(rows))],
-        settings,
-    ).solve()
-    assert_allclose(plan.ravel(), np.asarray(solution.x) * np.tile(DESIGN.nominal_input_scale, BLOCKS), atol=1e-5)
 
 
 def test_where_the_solver_fails_the_plan_before_goes_on_and_then_the_family(law):

@@ -62,15 +62,6 @@ def test_of_two_equal_times_the_later_value_holds_from_there_on():
     assert_allclose(defect[249], state[249] - state[250], atol=1e-12)
 
 
-def test_a_time_that_is_no_step_is_met_by_the_next_one():
-    state, *_ = along(ReferenceTrajectory([0.03, 0.03], [LOW[0], HIGH[0]], [LOW[1], HIGH[1]], PERIOD, VEHICLE), 5)
-    assert state[:, 0].tolist() == [LOW[0], LOW[0], HIGH[0], HIGH[0], HIGH[0]]
-    for time, step in ((0.14, 7), (0.58, 29)):  # 0.14 / 0.02 is above 7, and 0.58 / 0.02 below 29, in floating point
-        points = [LOW[0], HIGH[0]], [LOW[1], HIGH[1]]
-        state, *_ = along(ReferenceTrajectory([time, time], *points, PERIOD, VEHICLE), step + 2)
-        assert state[:, 0].tolist() == [LOW[0]] * step + [HIGH[0]] * 2
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

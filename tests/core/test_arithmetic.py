@@ -47,42 +47,18 @@ def near(points, relative=1e-9):
     return np.concatenate((points, noise, np.nextafter(points, -np.inf), np.nextafter(points, np.inf)))
 
 
-ANGLES = np.concatenate(
-    (
-        rng.uniform(-0.8, 0.8, 2 * COUNT),
-        rng.uniform(-10.0, 10.0, COUNT),
-        rng.uniform(-ANGLE_RANGE, ANGLE_RANGE, COUNT),
-        both_signs(magnitudes(1e-300, 1.0, 200)),
-        near(np.arange(1, 60000, 97) * (math.pi / 4)),
-        [0.0, ANGLE_RANGE, -ANGLE_RANGE],
-    )
-)
-SINES = np.concatenate(
-    (
-        rng.uniform(-1.0, 1.0, 2 * COUNT),
-        both_signs(magnitudes(1e-300, 1.0, 200)),
-        both_signs(1.0 - magnitudes(1e-16, 0.1, 200)),
-        [0.0, 0.5, -0.5, 1.0, -1.0, np.nextafter(0.5, 1.0), np.nextafter(1.0, 0.0)],
-    )
-)
-EXPONENTS = np.concatenate(
-    (
-        rng.uniform(-1.0, 1.0, COUNT),
-        rng.uniform(-EXPONENT_RANGE, EXPONENT_RANGE, COUNT),
-        both_signs(magnitudes(1e-300, 1.0, 200)),
-        near(np.arange(1, 1000) * (math.log(2.0) / 2.0)),
-        [0.0, EXPONENT_RANGE, -EXPONENT_RANGE],
-    )
-)
-POSITIVE = np.concatenate(
-    (
-        rng.uniform(0.5, 2.0, COUNT),
-        magnitudes(1e-307, 1e308),
-        1.0 + both_signs(magnitudes(1e-16, 0.3, 400)),
-        near(2.0 ** np.arange(-1000.0, 1000.0, 7.0), 1e-3),
-        [1.0, np.finfo(float).tiny, np.finfo(float).max, math.sqrt(0.5), math.sqrt(2.0)],
-    )
-)
+TINY = both_signs(magnitudes(1e-300, 1.0, 200))
+QUARTERS = near(np.arange(1, 60000, 97) * (math.pi / 4))
+ANGLES = np.r_[rng.uniform(-10, 10, 3 * COUNT), rng.uniform(-ANGLE_RANGE, ANGLE_RANGE, COUNT), TINY, QUARTERS, 0.0, 1e5]
+ENDS = both_signs(1.0 - magnitudes(1e-16, 0.1, 200))
+SINES = np.r_[rng.uniform(-1.0, 1.0, 2 * COUNT), TINY, ENDS, 0.0, near([0.5, -0.5]), 1.0, -1.0]
+STEPS = near(np.arange(1, 1000) * (math.log(2.0) / 2.0))
+EXPONENTS = np.r_[
+    rng.uniform(-1, 1, COUNT), rng.uniform(-EXPONENT_RANGE, EXPONENT_RANGE, COUNT), TINY, STEPS, 0.0, 700.0
+]
+ABOUT_ONE = 1.0 + both_signs(magnitudes(1e-16, 0.3, 400))
+POWERS = near(2.0 ** np.arange(-1000.0, 1000.0, 7.0), 1e-3)
+POSITIVE = np.r_[rng.uniform(0.5, 2.0, COUNT), magnitudes(1e-307, 1e308), ABOUT_ONE, POWERS, np.finfo(float).tiny, 1.0]
 
 
 def largest_error(function, exact, arguments):

@@ -45,15 +45,6 @@ def test_the_error_system_predicts_the_error_of_a_flight_with_actuators(flight, 
         assert_allclose(predicted / size, errors[k + 1] / size, rtol=0.0, atol=1e-8)
 
 
-def test_a_controller_sees_the_states_before_those_of_the_actuators(design, subject):
-    ones = DisturbanceSet(-np.ones(7), np.ones(7))
-    system = tube_problem(design, subject.vehicle, ones).system
-    assert system.seen == 7 == len(system.names) - 3
-    assert np.all(system.F[:, 7:] == 0.0)
-    ideal = tube_problem(subject.design, subject.vehicle, ones).system
-    assert_allclose(system.F[:, :7], ideal.F)
-
-
 @pytest.mark.parametrize(
     ("name", "table", "message"),
     [

@@ -8,13 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import DesignError
-from hsv.design.adjustable import design_adjustable, relaxed_bound, room_at_one
+from hsv.design.adjustable import design_adjustable
 from hsv.design.certified import load_certified
 from hsv.design.disturbance import ChannelModel
 from hsv.design.error_system import error_system
 from hsv.design.inputs import read_inputs, with_tau
 from hsv.design.region import incomplete_share
-from hsv.design.tightening import TightenedInputs
 from hsv.flight.corners import corners, region_parameters
 from hsv.model.vehicle import load_vehicle
 
@@ -72,29 +71,6 @@ def test_full_state_feedback_rebuilds_the_pitch_rate_and_cancels_the_notch(store
     assert max(full["spectral_radii"]) < 1.0  # fine on the model that it was found on
     assert parts["full_state"]["derived"] > 0.5 and parts["structured"]["derived"] < -0.1
     assert parts["full_state"]["paper_like"] > parts["structured"]["paper_like"] + 0.2
-
-
-def test_nominal_bounds_grow_with_the_room(stored, subject):
-    design = subject.design
-    assert np.all(np.array(stored["input_bound"]) > subject.inputs.nominal.input_bound.array())
-    wide = TightenedInputs(np.array([0.1, -0.5]), np.array([1.4, 0.5]))
-    narrow = TightenedInputs(np.array([0.2, -0.5]), np.array([1.3, 0.4]))
-    trim_input = np.array([0.3, 0.2])
-    grown = relaxed_bound(np.array([0.25, 0.19]), trim_input, narrow, wide)
-    assert_allclose(grown, [0.25 * 0.2 / 0.1, 0.19 * 0.3 / 0.2])
-    with pytest.raises(DesignError, match=r"U minus F Z at tau = 1: .* expected room above zero"):
-        relaxed_bound(np.array([0.25, 0.19]), np.array([0.15, 0.2]), narrow, wide)
-    with pytest.raises(DesignError, match=r"U minus F' Z': .* expected room above zero"):
-        relaxed_bound(np.array([0.25, 0.19]), np.array([0.15, 0.2]), wide, narrow)
-    assert np.all(room_at_one(design, subject.vehicle, subject.certificate["tube"]) > 0.0)
-
-
-def test_wrong_factors_are_named():
-    inputs = read_inputs(OFFLINE_DESIGN / "adjustable.toml")
-    with pytest.raises(DesignError, match=r"tau = \[1\.2\]: expected one value, or five, above 0 and at most 1"):
-        with_tau(inputs, [1.2])
-    with pytest.raises(DesignError, match=r"expected a design with an \[adjustable\] table"):
-        with_tau(read_inputs(OFFLINE_DESIGN / "baseline.toml"), [0.8])
 
 
 @pytest.mark.parametrize(

@@ -28,12 +28,6 @@ def test_channels_rebuild_the_disturbance_of_the_rigid_states(flight, subject):
         assert_allclose(signals.remainder[k] + signals.fault[k], signals.delta[k], rtol=0.0, atol=1e-15)
 
 
-def test_the_fault_is_one_tenth_of_the_total_elevator(flight, subject):
-    lost = ChannelModel(subject.design, subject.vehicle).signals(flight).channels[:, 3]
-    assert np.all(lost[:5000] == 0.0)
-    assert_allclose(lost[5000:], -0.1 * flight.history.command[5000:-1, 1], rtol=1e-12)
-
-
 def test_membership_names_channel_and_step():
     low, high = np.array([-1.0] * 3 + [-0.2] + [-1.0] * 3), np.array([2.0] * 3 + [0.0] + [1.0] * 3)
     bounds = DisturbanceSet(*widened(low, high, 1.1))

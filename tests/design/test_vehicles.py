@@ -12,7 +12,6 @@ from hsv.control.tube_law import TubeStatusCode
 from hsv.design.inputs import read_inputs
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.blocks import steps
-from hsv.flight.corners import corners, fraction
 from hsv.flight.scenario import load_scenario
 from hsv.flight.verification import verify
 from hsv.model.vehicle import load_vehicle
@@ -102,12 +101,3 @@ def test_a_wrong_vehicle_of_a_design_is_named(folder, own, message):
     with pytest.raises(DesignError) as caught:
         read_inputs(path)
     assert message in str(caught.value) and "\n" not in str(caught.value)
-
-
-def test_a_quarter_of_the_corners_is_measured_from_ten_uncertain_parameters_on():
-    names = [name for name, _ in zip(load_vehicle().decoupled._fields, range(12), strict=False)]
-    for n, flown in ((0, 1), (3, 8), (9, 512), (10, 256), (12, 1024)):
-        bounds = dict.fromkeys(names[:n], 0.1)
-        rows = fraction(bounds)
-        assert len(rows) == 1 + flown and rows[0] == {}
-        assert all(row in corners(bounds) for row in rows[:5])

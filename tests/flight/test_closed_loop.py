@@ -3,7 +3,10 @@ from flights import components, step_by_step
 from marking import long
 from numpy.testing import assert_array_equal
 
+from hsv.bags.description import CARRIED, CLOCK, TOPICS
+from hsv.flight.blocks import LOOP, Signals
 from hsv.flight.closed_loop import fly
+from hsv.model.signals import SignalType
 
 SHORT = {"duration": 6.0, "fault__starts": [3.0]}
 HISTORIES = ("state", "filtered_pitch_rate", "deviation", "nominal_input", "u_unsaturated", "command", "actuator")
@@ -40,3 +43,20 @@ def test_compiled_loop_equals_the_components_step_by_step_bit_for_bit(scenario, 
         assert_array_equal(getattr(compiled.history, name), stepped[name], err_msg=name)
     assert compiled.status == stepped["plant_status"][-1]
     assert_array_equal(compiled.curves.saturated, stepped["saturated"])
+
+
+def test_every_signal_of_the_loop_has_one_source_and_follows_it_within_a_step():
+    outputs = [signal for each in LOOP for signal in each.outputs]
+    assert len(outputs) == len({signal.name for signal in outputs})
+    given: set[SignalType] = set()
+    for each in LOOP:
+        assert given.issuperset(each.inputs), each.name
+        assert {*outputs}.issuperset((*each.delayed, *each.state)), each.name
+        given.update(each.outputs)
+
+
+def test_every_signal_travels_on_a_topic_and_has_a_place_in_the_loop():
+    given = {signal for each in LOOP for signal in each.outputs}
+    assert {signal for carried in CARRIED.values() for signal in carried} == given
+    assert CARRIED.keys() == TOPICS.keys() - {CLOCK}
+    assert {signal.name for signal in given} <= Signals.__annotations__.keys() | vars(Signals).keys()

@@ -199,4 +199,4 @@ def test_a_failure_inside_the_fmu_ends_the_flight_in_one_line(tmp_path, statemen
 def test_without_a_compiler_the_export_is_refused_in_one_line(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with refused("there is no C compiler cc", ParameterError):
-        write_fmu(tmp_path / "controller.fmu", exported_controller(read_design(find_design("baseline"))))
+        write_fmu(tmp_path / "vehicle.fmu", exported_vehicle(load_scenario("case1")))

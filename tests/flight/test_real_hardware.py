@@ -36,17 +36,6 @@ def test_computing_for_whole_periods_is_a_delay_of_the_command_to_the_bit():
     assert np.array_equal(history.actuator[3:], history.command[:-3])
 
 
-def test_the_loop_bears_the_delay_that_the_linear_one_does():
-    # docs/study/hardware.md: 116 ms with ideal actuators.
-    def elevator_rms(delay):
-        changes = {"fault": [], "duration": "160 s", "link": {"computational_delay": delay}}
-        history = fly(assemble_flight(load_scenario("case1", changes))).history
-        return np.degrees(history.command[-1000:, 1].std())
-
-    assert elevator_rms("100 ms") < 1e-3
-    assert elevator_rms("130 ms") > 1.0
-
-
 def test_an_estimator_makes_the_hard_sensors_flyable():
     def elevator_rms(**changes):
         flight = fly(assemble_flight(load_scenario("case1", {"sensors": {"set": "ghv"}, "seed": 1} | changes)))

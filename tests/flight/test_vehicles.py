@@ -89,16 +89,6 @@ def test_envelope_and_uncertainty_are_those_of_the_vehicle(folder):
     assert bounds["mass"] == 0.05 and bounds["thrust_moment_arm"] == 0.02 and bounds["lift_alpha"] == 0.04
 
 
-def test_a_sampled_scenario_takes_its_vehicle_along(folder):
-    campaign = plan(str(folder / "flight.toml"), factors={"vehicle.coupling": (0.2, 0.65)})
-    (folder / "mine.toml").unlink()
-    for end, coupling in (("low", "0.2"), ("high", "0.65")):
-        text = campaign.file(0, [getattr(factor, end) for factor in campaign.factors])
-        sampled = parse_scenario(text, "sampled").vehicle
-        assert sampled.described.decoupled.mass == 4600.0 and sampled.coupling == coupling
-        assert abs(sampled.perturbation["mass"]) == 0.05
-
-
 @pytest.mark.parametrize(
     ("design", "changes", "status"),
     [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable
 from contextlib import suppress
@@ -209,18 +208,3 @@ def test_the_result_of_a_campaign(fuzz: Fuzz, campaign: Results, tmp_path: Path)
         assert found.campaign == campaign.campaign and found.envelope.encode() == campaign.envelope.encode()
 
     fuzz(mutated(campaign.path.read_bytes()), read)
-
-
-def test_the_description_of_a_campaign(fuzz: Fuzz, campaign: Results, tmp_path: Path) -> None:
-    out = tmp_path / "mine.parquet"
-    store = ResultStore(out, campaign.campaign)
-    store.folder.mkdir()
-    described = store.folder / "campaign.json"
-
-    def read(given: Mutated) -> None:
-        described.write_bytes(given.data)
-        with store.opened() as there:
-            assert there == set()
-        assert not out.exists()
-
-    fuzz(mutated(json.dumps(json.loads(campaign.campaign.text), indent=1).encode()), read)

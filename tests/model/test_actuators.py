@@ -57,16 +57,6 @@ def test_step_response_of_second_order(frequency, damping):
         assert fine[1].max() == pytest.approx(0.46 * frequency, rel=5e-3)
 
 
-@pytest.mark.parametrize("order", [0, 1, 2])
-def test_large_step_moves_at_the_rate_limit(order):
-    h, limit = 0.005, 0.5
-    position, rate, _ = respond((order, 150.0, 0.7), np.full(40, 1.0), h, rate=limit)
-    moving = slice(8, 36)
-    assert_allclose(np.diff(position)[moving], limit * h, rtol=1e-12)
-    assert_allclose(rate[moving], limit, rtol=1e-12)
-    assert np.abs(np.diff(position, prepend=0.0)).max() <= limit * h * (1.0 + 1e-12)
-
-
 def test_without_parameters_all_is_ideal_within_the_limits_of_the_vehicle():
     data = actuator_data({}, VEHICLE, PERIOD)
     assert data.ideal and not data.order.any()

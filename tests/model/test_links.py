@@ -8,7 +8,6 @@ from core_calls import receive
 from numpy.testing import assert_array_equal
 
 from hsv.base.errors import ParameterError
-from hsv.core import lib
 from hsv.model.links import command_link, computation, link_state, measurement_link
 
 T = 0.02
@@ -16,7 +15,6 @@ STEPS = 4000
 SENT = np.array([26000.0, 2400.0, 0.03, 0.04, 0.01, 1.0, 2.0, 0.3, 0.4]) * (
     1.0 + 0.1 * np.sin(np.outer(np.arange(STEPS), np.linspace(0.11, 0.27, 9)))
 )
-MEASUREMENT = 0
 
 
 def passed(link, sent=SENT, seed=0, before=None):
@@ -27,16 +25,6 @@ def passed(link, sent=SENT, seed=0, before=None):
 
 def measured(sent=SENT, seed=0, **fields):
     return passed(measurement_link({f"link.measurement.{name}": value for name, value in fields.items()}), sent, seed)
-
-
-def drawn(stream, channel, seed=0, steps=STEPS):
-    """Return the two uniform numbers of every step; numpy has the words of a counter after those of the one before."""
-    rows = []
-    for step in range(steps):
-        counter = (stream + channel) * 2**64 + step - 1
-        words = np.random.Philox(counter=counter, key=seed).random_raw(2)
-        rows.append((words >> np.uint64(11)).astype(float) / 2.0**53)
-    return np.array(rows).T
 
 
 def held(taken):
@@ -62,15 +50,6 @@ def test_time_of_computation_is_whole_periods_and_the_rest():
         found = computation({"link.computational_delay": time}, T)
         assert found == (whole, pytest.approx(rest, abs=1e-9))
         assert (found[1] == 0.0) == (rest == 0.0)
-
-
-def test_lost_payloads_are_those_that_were_drawn_and_the_last_one_is_held():
-    lost = drawn(lib.LINK_LOSS, MEASUREMENT, seed=3)[0] < 0.2
-    assert abs(lost.sum() - 0.2 * STEPS) < 4.0 * math.sqrt(0.2 * 0.8 * STEPS)
-    last = np.maximum.accumulate(np.where(lost, 0, np.arange(STEPS)))
-    assert_array_equal(measured(seed=3, loss=0.2), SENT[last])
-    # Of a link that delays, the payload of the step is lost, not the one that is sent then.
-    assert_array_equal(measured(seed=3, loss=0.2, delay=2.0), SENT[np.maximum(last - 2, 0)])
 
 
 def test_losses_in_bursts_have_their_share_and_their_mean_length():

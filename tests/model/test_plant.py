@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 
 from hsv.base.errors import ParameterError
-from hsv.model.dynamics import advance
+from hsv.base.units import FOOT
+from hsv.model.dynamics import in_model_range
 from hsv.model.faults.schedule import ActiveFault
 from hsv.model.faults.table import Fault
 from hsv.model.plant import PLANT_PARAMETERS, FlightStatus, Plant, PlantFaults
@@ -82,16 +83,6 @@ ADDED = [
 ]
 
 
-def test_the_vehicle_flies_in_the_wind_and_density_of_its_atmosphere():
-    bench = plant(wind__forward=20.0, wind__up=-3.0, density__offset=0.05)
-    x, held = bench.initial.state.copy(), bench.initial.input
-    for _ in range(3):
-        x = advance(x, held, bench.vehicle, 0.02, 2, np.array([20.0, -3.0, 1.05, 1.0, 1.0, 1.0, 0.0]))
-        result = bench.step(held)
-        assert_allclose(result.state, x, rtol=1e-14)
-        assert_allclose(result.air, [20.0, -3.0, 1.05])
-
-
 @pytest.mark.parametrize(
     ("changes", "speed", "sound"),
     [
@@ -129,3 +120,24 @@ def test_a_wrong_parameter_is_named(name, value, message):
     with pytest.raises(ParameterError) as caught:
         Plant.from_parameters({**DEFAULTS, name: value})
     assert str(caught.value).startswith(message)
+
+
+ANGLE_LIMIT = 0.35
+CRUISE = np.array([85_500.0 * FOOT, 7_900.0 * FOOT, 0.03, 0.03, 0.0, 0.1, 0.0, 0.1, 0.0])
+"""A state of Case 1, SI."""
+
+
+@pytest.mark.parametrize(
+    ("index", "value", "inside"),
+    [
+        (2, -0.36, False),
+        (3, 0.36, False),
+        (1, 0.0, False),
+        (8, np.nan, False),
+        (0, np.inf, False),
+    ],
+)
+def test_states_in_and_out_of_the_range_of_the_model(index: int, value: float, inside: bool) -> None:
+    state = CRUISE.copy()
+    state[index] = value
+    assert bool(in_model_range(state, ANGLE_LIMIT)) is inside

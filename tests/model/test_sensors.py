@@ -53,6 +53,11 @@ def test_constants_are_drawn_once_a_flight():
     assert np.std(scales) == pytest.approx(0.1, rel=0.15)
 
 
+def test_drift_begins_with_its_standard_deviation_and_decays_with_its_time():
+    data = sensor_data({"sensors.pitch_rate.drift_sigma": [1.0], "sensors.pitch_rate.drift_time": [0.5]}, T)
+    assert (data.drift_sigma[Q], data.drift_decay[Q]) == (1.0, pytest.approx(math.exp(-T / 0.5)))
+
+
 def test_lag_latency_quantum_and_range_are_those_of_their_fields():
     states = still(100)
     states[1:, Q] += 0.05
@@ -62,14 +67,6 @@ def test_lag_latency_quantum_and_range_are_those_of_their_fields():
     assert_array_equal(of_pitch_rate(latency=3), STATES[np.maximum(np.arange(STEPS) - 3, 0), Q])
     assert_allclose(of_pitch_rate(quantum=1e-4), 1e-4 * np.round(STATES[:, Q] / 1e-4), atol=1e-12)
     assert_array_equal(of_pitch_rate(minimum=0.0095, maximum=0.0104), np.clip(STATES[:, Q], 0.0095, 0.0104))
-
-
-def test_lost_samples_are_held():
-    result = of_pitch_rate(drop_out=0.2)
-    fresh = result == STATES[:, Q]
-    assert 0.7 < fresh.mean() < 0.9 and fresh[0]
-    last = np.maximum.accumulate(np.where(fresh, np.arange(STEPS), 0))
-    assert_array_equal(result, STATES[last, Q])
 
 
 def test_inertial_angle_of_attack_shares_the_error_of_the_pitch_angle():
@@ -124,6 +121,7 @@ def test_fault_of_noise_and_drop_out():
         ({"sensors.set": "good"}, "sensors.set = 'good': expected one of ideal, fine, ghv"),
         ({"sensors.pitch_rate.noise": [-1.0]}, r"sensors.pitch_rate.noise\[0\] = -1.0: expected"),
         ({"sensors.pitch_rate.noise": [1.0, 2.0]}, "sensors.pitch_rate.noise: 2 values, expected one"),
+        ({"sensors.pitch_rate.drift_sigma": [1e-3]}, "sensors.pitch_rate.drift_sigma: expected with a drift_time only"),
         ({"sensors.altitude.latency": [1.5]}, r"altitude.latency\[0\] = 1.5: expected double array from 0 to 50,"),
         ({"sensors.altitude.minimum": [2.0], "sensors.altitude.maximum": [1.0]}, "minimum = 2 m: expected less than"),
     ],

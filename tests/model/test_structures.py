@@ -17,25 +17,20 @@ lift = { lift_alpha = { value = "5.5" }, lift_zero = { value = "0.3" } }
 drag = { drag_zero = { value = "0.012" }, drag_lift = { value = "0.02" } }
 thrust = { thrust_fuel = { value = "600" } }
 pitch_damping = { damping_zero = { value = "-8" } }
-[rigid_body]
-mass = { value = "500 kg" }
-moment_of_inertia = { value = "900 kg m^2" }
-gravity = { value = "9.81 m/s^2" }
-[pitching_moment]
-moment_alpha = { value = "-0.8" }
-moment_zero = { value = "0.05" }
-moment_elevator = { value = "-1.1" }
-[atmosphere]
-reference_density = { value = "1.225 kg/m^3" }
-reference_altitude = { value = "0 m" }
-density_scale_height = { value = "8500 m" }
-[envelope]
-altitude = { minimum = "500 m", maximum = "3000 m" }
-velocity = { minimum = "25 m/s", maximum = "60 m/s" }
-angle = { maximum = "20 deg" }
-[input_limits]
-fuel_equivalence_ratio = { minimum = 0.0, maximum = 1.0 }
-elevator_deflection = { minimum = "-25 deg", maximum = "25 deg" }
+rigid_body.mass.value = "500 kg"
+rigid_body.moment_of_inertia.value = "900 kg m^2"
+rigid_body.gravity.value = "9.81 m/s^2"
+pitching_moment.moment_alpha.value = "-0.8"
+pitching_moment.moment_zero.value = "0.05"
+pitching_moment.moment_elevator.value = "-1.1"
+atmosphere.reference_density.value = "1.225 kg/m^3"
+atmosphere.reference_altitude.value = "0 m"
+atmosphere.density_scale_height.value = "8500 m"
+envelope.altitude = { minimum = "500 m", maximum = "3000 m" }
+envelope.velocity = { minimum = "25 m/s", maximum = "60 m/s" }
+envelope.angle.maximum = "20 deg"
+input_limits.fuel_equivalence_ratio = { minimum = 0.0, maximum = 1.0 }
+input_limits.elevator_deflection = { minimum = "-25 deg", maximum = "25 deg" }
 """
 
 FLY = """

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hsv.base.errors import TrimError
-from hsv.model.dynamics import derivative, forces
+from hsv.model.dynamics import derivative
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 
@@ -27,17 +27,6 @@ def test_residual_is_rounding_all_over_the_envelope(coupling):
             assert np.all(point.input < LIMITS.input_maximum)
             assert point.state[0] == altitude
             assert point.state[1] == velocity
-
-
-def test_level_flight_carries_its_weight_and_needs_no_moment():
-    vehicle = load_vehicle().coupled()
-    point = trim(vehicle, 25908.0, 2400.0)
-    lift, drag, thrust, moment, *_ = forces(point.state, point.input, vehicle)
-    alpha = point.state[2]
-    assert point.state[3] == alpha
-    assert lift + thrust * math.sin(alpha) == pytest.approx(vehicle.mass * vehicle.gravity, rel=1e-12)
-    assert thrust * math.cos(alpha) == pytest.approx(drag, rel=1e-12)
-    assert abs(moment) < 1e-9 * thrust * vehicle.mean_aerodynamic_chord
 
 
 @pytest.mark.parametrize(

@@ -70,16 +70,6 @@ def test_its_coefficients_at_mach_15_are_the_constant_set_of_the_literature_to_t
     assert damping == pytest.approx(-0.2289, abs=5e-5)
 
 
-def test_its_weight_in_cruise_is_relieved_by_a_third_because_the_earth_is_round(vehicle):
-    h, v = CRUISE
-    lifted = forces(trim(vehicle, h, v).state, trim(vehicle, h, v).input, vehicle)
-    radius = vehicle.planet_radius + h
-    gravity = vehicle.gravitational_parameter / radius**2
-    assert v * v / radius / gravity == pytest.approx(0.34, abs=5e-3)
-    alpha = trim(vehicle, h, v).state[2]
-    assert lifted[0] + lifted[2] * np.sin(alpha) == pytest.approx(vehicle.mass * (gravity - v * v / radius), rel=1e-9)
-
-
 def test_derivatives_by_the_complex_step_agree_with_differences_on_both_sides_of_a_full_fuel_ratio(vehicle):
     point = trim(vehicle, *CRUISE)
     for fuel in (0.4, 1.2):

@@ -8,21 +8,8 @@ import pytest
 from hsv.base.errors import DesignError
 from hsv.control.design import find_design
 from hsv.design.certified import load_certified
-from hsv.design.disturbance import DisturbanceSet
-from hsv.design.error_system import ErrorSystem
 from hsv.design.sets.counter_example import counter_examples
-from hsv.design.sets.star_norms import StarNorms, star_norms
-from hsv.design.tube_problem import TubeProblem
-
-
-def problem_of(vertices, columns, lower, upper):
-    """Return the problem of a small system whose feedback is the sum of its states."""
-    A, G = np.array(vertices, float), np.array(columns, float)
-    n, d = G.shape[1:]
-    system = ErrorSystem(
-        A, np.zeros((len(A), n, 2)), G, np.ones((2, n)), np.zeros((2, d)), tuple(f"x{i}" for i in range(n))
-    )
-    return TubeProblem(system, DisturbanceSet(np.array(lower, float), np.array(upper, float)))
+from hsv.design.sets.star_norms import StarNorms
 
 
 @pytest.fixture(scope="module")
@@ -70,23 +57,6 @@ def test_certificate_holds_and_fails_just_beyond(tight):
     Q[3, 1] = 0.0
     with pytest.raises(DesignError, match=r"Q\[3, 1\] is not positive definite"):
         smaller.certify()
-
-
-def test_level_at_the_start_tells_errors_inside_from_those_outside(tight):
-    norms, error = tight.star_norms, np.zeros(len(tight.centre))
-    start = norms.level_at_start(tight.problem, tight.centre)
-    assert 0.0 < start <= 1.0
-    assert norms.level_at_start(tight.problem, tight.centre, error) <= start
-    error[3] = 2.0 * tight.half_width[3]
-    assert norms.level_at_start(tight.problem, tight.centre, error) > 1.0
-
-
-def test_an_unstable_system_has_none():
-    problem = problem_of([1.01 * np.eye(5)], [np.eye(5)], -np.ones(5), np.ones(5))
-    with pytest.raises(DesignError, match="star norms: a vertex is not stable"):
-        star_norms(problem, np.zeros(5))
-    with pytest.raises(DesignError, match=r"counter-examples: spectral radius of a vertex = 1\.01, expected below 1"):
-        counter_examples(problem)
 
 
 @pytest.mark.parametrize(

@@ -129,12 +129,6 @@ def test_a_worker_without_the_program_or_with_another_one_is_refused_by_its_addr
         wait_until(lambda: not cluster.scheduler.workers)
 
 
-@pytest.mark.parametrize("workers", [-1, 100_000])
-def test_an_impossible_number_of_workers_is_refused(workers):
-    with pytest.raises(CampaignError, match=f"workers = {workers}: expected 0 to 4096"), make_executor(workers):
-        pass
-
-
 def end_of_the_third(text, batch):
     """Fly a batch; with the third the worker ends."""
     if batch == 3:

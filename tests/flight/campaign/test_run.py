@@ -58,21 +58,6 @@ def test_another_campaign_does_not_mix_with_one_that_is_there(planned, results, 
     assert run_campaign(other, ResultStore(out, other), Executor(), restart=True).flights == other.samples
 
 
-def test_restart_leaves_a_campaign_alone_that_is_being_flown(planned, results, out):
-    campaign, refused = planned(), []
-
-    def restart_from_elsewhere(done):
-        if 0 < done < campaign.samples:
-            with pytest.raises(CampaignError, match="in use") as error, ResultStore(out, campaign).opened(restart=True):
-                pass
-            refused.append(error)
-
-    run_campaign(campaign, ResultStore(out, campaign), Executor(), progress=restart_from_elsewhere)
-    assert refused
-    assert out.read_bytes() == results.path.read_bytes()
-    assert list(out.parent.iterdir()) == [out]
-
-
 def test_a_damaged_batch_is_flown_again_and_strangers_are_left_out(planned, results, out):
     campaign = planned(samples=44)
     with pytest.raises(KeyboardInterrupt):

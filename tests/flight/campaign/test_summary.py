@@ -22,15 +22,6 @@ def test_clopper_pearson_of_the_textbook():
     assert clopper_pearson(5, 10) == pytest.approx((0.187086, 0.812914), abs=1e-6)
 
 
-def test_shares_count_the_flights_within_each_limit(results):
-    found = {share.name: share for share in shares(results)}
-    assert found["flown_to_the_end"].within == results.campaign.samples
-    level = results.column("tube_level")
-    assert found["tube_level"].within == np.count_nonzero(level <= 1.0)
-    low, high = found["tube_level"].interval
-    assert low < found["tube_level"].fraction <= high
-
-
 def test_distributions_and_worst_flights_agree_with_the_columns(results):
     found = {d.name: d for d in distributions(results)}
     assert found["attitude_from_nominal"].maximum == results.column("attitude_from_nominal").max()

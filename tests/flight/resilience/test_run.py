@@ -1,11 +1,15 @@
 """Running a campaign to its end, whatever happens in between."""
 
+import numpy as np
 import pytest
 from node_processes import short_scenario
 
 from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
+from hsv.flight.metrics import FlightData
 from hsv.flight.resilience.campaign import plan
+from hsv.flight.resilience.faults import TRIED, Moment
+from hsv.flight.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND, Boundary, SubjectRunner, boundary, distances
 from hsv.flight.resilience.store import CaseStore
 from hsv.flight.sources import drop_older
 
@@ -62,3 +66,57 @@ def test_only_the_newest_cases_of_a_campaign_are_kept(tmp_path):
         (tmp_path / name).mkdir()
     drop_older(tmp_path / f"case1_{new}")
     assert {path.name for path in tmp_path.iterdir()} == {f"case1_{new}", f"case1_no_notch_{old}"}
+
+
+def as_it_is(severity):
+    return severity
+
+
+@pytest.mark.parametrize("limit", [0.003, 0.31, 0.5, 0.99])
+def test_bisection_encloses_a_threshold(limit):
+    def survives(severity):
+        return severity < limit
+
+    known = {severity: survives(severity) for severity in (0.1, 0.5, 0.9)}
+    found = boundary(survives, known, 0.02, as_it_is)
+    assert found.survived < limit <= found.lost and found.lost - found.survived <= 0.02 + 1e-9
+
+
+def test_the_ends_of_a_range_may_be_survived_or_lost():
+    assert boundary(lambda severity: True, {0.2: True}, 0.02, as_it_is) == Boundary(1.0, None)
+    assert boundary(lambda severity: False, {0.2: False}, 0.02, as_it_is) == Boundary(None, 0.0)
+
+
+def flight(altitude, attitude):
+    """A flight of a step a second, at rest but for altitude (m) and pitch angle (rad)."""
+    n = len(altitude)
+    state, zeros = np.zeros((n, 9)), np.zeros((n, 9))
+    state[:, 0], state[:, 3] = altitude, attitude
+    two = np.zeros((n, 2))
+    return FlightData(np.arange(float(n)), state, zeros, zeros, two, two, np.zeros(n), 2.0)
+
+
+def test_recovery_is_the_last_exit_from_the_band():
+    still, apart = flight(np.zeros(10), np.zeros(10)), np.zeros(10)
+    apart[[1, 3, 5]] = 2.0 * ALTITUDE_BAND
+    attitude, altitude, recovery = distances(flight(apart, np.zeros(10)), still, 2.0)
+    assert (attitude, altitude, recovery) == (0.0, 2.0 * ALTITUDE_BAND, 4.0)
+    apart[9] = 2.0 * ALTITUDE_BAND
+    assert distances(flight(apart, np.zeros(10)), still, 2.0)[2] is None
+    tilted = flight(np.zeros(10), np.full(10, 0.9 * ATTITUDE_BAND))
+    assert distances(tilted, still, 2.0) == (pytest.approx(0.9 * ATTITUDE_BAND), 0.0, 0.0)
+
+
+def test_a_flight_that_ends_early_is_compared_as_far_as_it_goes():
+    still = flight(np.zeros(10), np.zeros(10))
+    short = flight(np.zeros(6), np.linspace(0.0, 1.0, 6))
+    assert distances(short, still, 2.0) == (1.0, 0.0, None)
+
+
+def test_a_fault_without_effect_leaves_the_flight_where_it_is():
+    campaign, fault = plan(("case1",), ("elevator_loss",)), TRIED["elevator_loss"]
+    runner = SubjectRunner(campaign.subjects[0], Moment.during)
+    flown = runner.outcome("mild", 2, fault, 1.0)
+    assert (flown.survived, flown.attitude, flown.altitude, flown.recovery_time) == (True, 0.0, 0.0, 0.0)
+    lost = runner.outcome("severe", 0, fault, 0.0)
+    assert not lost.survived and 0.0 < lost.time_to_loss < 10.0 and lost.recovery_time is None

@@ -98,8 +98,3 @@ def test_of_what_replaces_the_position_the_newest_wins():
         deflection, _ = flown(order)
         assert_array_equal(deflection[10 * SUBSTEPS : 20 * SUBSTEPS], 0.1)
         assert_allclose(deflection[20 * SUBSTEPS], 0.1 - 0.5 * H)
-
-
-def test_stops_of_the_actuator_hold_whatever_fails():
-    assert flown([(elevator("bias", offset=0.5), 0)])[0].max() == STOP
-    assert flown([(elevator("effector_scale", factor=-1.0), 0), (elevator("bias", offset=-0.5), 0)])[0].min() == -STOP

@@ -120,16 +120,6 @@ def test_parameters_that_are_written_otherwise_are_refused(text):
         FaultInjector.from_parameters({**values, "fault.parameters": [text]})
 
 
-def test_columns_of_different_length_are_refused_by_name():
-    values = {
-        "fault.channels": [ELEVATOR, FUEL],
-        "fault.types": ["loss_of_effectiveness"] * 2,
-        "fault.parameters": ["effectiveness=0.9"],
-    }
-    with pytest.raises(ParameterError, match=r"fault.parameters: 1 values, expected as many as fault.channels, 2"):
-        FaultInjector.from_parameters({**values, "fault.starts": [1.0, 2.0]})
-
-
 def test_parameters_repeat_what_was_injected_and_cleared_in_flight():
     flown = injector_of((loss(0.9), 5), (loss(0.7, FUEL), 2, 4), (Fault.of("altitude", "sensor_freeze", {}), 0))
     told = []

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 
 from hsv.base.errors import DesignError
-from hsv.model.lpv.tensor_product import hull_weights, relaxed, smallest_weight, tensor_product
+from hsv.model.lpv.tensor_product import hull_weights, smallest_weight, tensor_product
 
 ALTITUDES = np.linspace(100.0, 300.0, 17)
 VELOCITIES = np.linspace(10.0, 20.0, 13)
@@ -94,14 +94,6 @@ def test_smallest_weight_sees_between_breakpoints():
     weights = np.stack((dip(x), 1.0 - dip(x)), axis=1)
     assert_allclose(smallest_weight(x, weights), min(dip(np.linspace(0, 4, 100_001)).min(), -4.0), rtol=1e-6)
     assert_allclose(smallest_weight(x, dip(x)[:, None]), dip(np.linspace(0, 4, 100_001)).min(), rtol=1e-6)
-
-
-def test_relaxed_lifts_the_least_weight_to_zero_and_keeps_the_sum():
-    weights = np.array([[-0.1, 0.6, 0.5], [0.2, 0.3, 0.5]])
-    lifted = relaxed(weights, -0.1)
-    assert_allclose(lifted.min(), 0.0, atol=1e-16)
-    assert_allclose(lifted.sum(axis=1), 1.0)
-    assert np.array_equal(relaxed(lifted, 0.05), lifted)
 
 
 def test_dependent_functions_are_refused():

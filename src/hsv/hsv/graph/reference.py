@@ -11,6 +11,7 @@ from hsv.control.design import DESIGN_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.flight.blocks import LOOP
 from hsv.graph.node_parameters import NODE_PARAMETERS
+from hsv.model.faults.table import FAULT_KINDS, OCCURRENCE_PARAMETERS
 from hsv.model.signals import VARYING
 from hsv.model.vehicle import VEHICLE_PARAMETERS
 
@@ -39,12 +40,17 @@ The signals and the topics whose messages contain them. A size that depends on t
 
 """
 
+_FAULTS = """## Types of faults
+Their channels and parameters, as in `fault.parameters`. Every type also has the parameters of the last rows.
+
+"""
+
 
 def reference() -> str:
-    """Return the page: the loop, its signals, and one table per node."""
+    """Return the page: the loop, its signals, one table per node, and the types of faults."""
     parts = [_HEADER, _LOOP + _loop() + _SIGNALS + _signals(), "## Every node\n" + _table(LOCKSTEP_PARAMETERS)]
     parts += [f"## {node}\n" + _table(table) for node, table in NODE_PARAMETERS.items()]
-    return "\n".join(parts)
+    return "\n".join([*parts, _FAULTS + _faults()])
 
 
 def _loop() -> str:
@@ -77,6 +83,19 @@ def _table(parameters: Iterable[Parameter]) -> str:
         if p.name in vehicle:
             default = "from the vehicle"
         rows.append(f"| {p.name} | {default} | {p.constraint} | {p.description} | {'' if p.read_only else 'yes'} |")
+    return "\n".join(rows) + "\n"
+
+
+def _faults() -> str:
+    rows = ["| type | channel | parameter | default | expected |", "| --- | --- | --- | --- | --- |"]
+    for name, kind in FAULT_KINDS.items():
+        own = [(channel, p, p.of(channel)) for channel in kind.channels for p in kind.parameters]
+        rows += [
+            f"| {name} | {on} | {p.name} | {p.default if p.default is not None else ''} | {q.constraint} |"
+            for on, p, q in own
+        ]
+    for p in OCCURRENCE_PARAMETERS:
+        rows.append(f"| any | any | {p.name} | {p.default} | {p.of('engine').constraint} |")
     return "\n".join(rows) + "\n"
 
 
