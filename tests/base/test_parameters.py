@@ -27,13 +27,7 @@ ARRAY = Parameter("gains", [1.0], "gains", minimum=0.0)
 
 
 @pytest.mark.parametrize(
-    ("parameter", "value"),
-    [
-        (PERIOD, 0.01),
-        (PERIOD, np.float64(0.01)),
-        (ARRAY, [0.0, 2.5]),
-        (ARRAY, np.array([1.0])),
-    ],
+    ("parameter", "value"), [(PERIOD, 0.01), (PERIOD, np.float64(0.01)), (ARRAY, [0.0, 2.5]), (ARRAY, np.array([1.0]))]
 )
 def test_admissible_values_pass_unchanged(parameter, value):
     assert parameter.check(value) == value

@@ -6,16 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hsv.base.errors import QuantityError
-from hsv.base.units import (
-    _KNOWN,
-    PAPER_UNITS,
-    _squared,
-    factor,
-    parse_quantity,
-    percent,
-    square_by_pint,
-    to_paper,
-)
+from hsv.base.units import _KNOWN, PAPER_UNITS, _squared, factor, parse_quantity, percent, square_by_pint, to_paper
 from hsv.cli.output import unit_key
 from hsv.flight.metrics import METRICS
 from hsv.model.signals import INPUT_UNITS, STATE_UNITS

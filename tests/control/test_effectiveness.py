@@ -6,11 +6,7 @@ from flights import components
 from marking import long
 
 from hsv.base.errors import ParameterError
-from hsv.control.effectiveness import (
-    EffectivenessMode,
-    effectiveness_along,
-    effectiveness_in,
-)
+from hsv.control.effectiveness import EffectivenessMode, effectiveness_along, effectiveness_in
 from hsv.control.tube_law import tube_memory
 from hsv.core import doubles, lib, records, vector
 from hsv.flight.assembly import assemble_flight

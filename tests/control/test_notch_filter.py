@@ -6,13 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import ParameterError
-from hsv.control.notch_filter import (
-    MAX_SECTIONS,
-    NOTCH_PARAMETERS,
-    NotchFilter,
-    NotchSection,
-    series,
-)
+from hsv.control.notch_filter import MAX_SECTIONS, NOTCH_PARAMETERS, NotchFilter, NotchSection, series
 
 PERIOD = 0.02
 BASELINE = NotchSection(15.0, 0.02, 15.0, 0.5)

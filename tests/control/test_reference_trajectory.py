@@ -70,6 +70,14 @@ def test_of_two_equal_times_the_later_value_holds_from_there_on():
         ({"reference.times": [0.0]}, r"reference\.altitudes: 2 values, expected as many as reference.times, 1"),
         ({"reference.altitudes": [26060.4, math.nan]}, r"reference\.altitudes\[1\] = nan"),
         ({"reference.altitudes": [26060.4, 30000.0]}, r"reference\.altitudes\[1\] = 30000.0: expected .* 25908 to"),
+        (
+            {"reference.times": [1.0, 30.0], "reference.blend": 2.0},
+            r"reference\.blend = 2: expected at most the time of",
+        ),
+        (
+            {"reference.times": [5.0, 5.0], "reference.blend": 2.0},
+            r"reference\.blend = 2: expected 0 with a step, as at",
+        ),
         ({"reference.trim": "level"}, r"reference\.trim = 'level': expected one of climbing, static"),
     ],
 )
@@ -133,15 +141,3 @@ def test_a_blended_corner_is_a_steady_pull_up():
         assert_allclose(rates[[2, 4]], 0.0, atol=1e-12)
     static = along(ReferenceTrajectory((1.5, 3.5), *RAMP[1:], "static", 0.2), 200)[0]
     assert np.all(static[:, 4] == 0.0)
-
-
-@pytest.mark.parametrize(
-    ("times", "message"),
-    [
-        ((1.0, 30.0), r"reference\.blend = 2: expected at most the time of the command, 1 s"),
-        ((5.0, 5.0), r"reference\.blend = 2: expected 0 with a step, as at 5 s, or a ramp in its place"),
-    ],
-)
-def test_what_cannot_be_blended_is_refused(times, message):
-    with pytest.raises(ParameterError, match=message):
-        ReferenceTrajectory(times, *RAMP[1:], blend=2.0)

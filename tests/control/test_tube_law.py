@@ -40,10 +40,7 @@ def test_law_is_equation_36(tau):
         feedback = tau * DESIGN.feedback_gain @ (measured - REFERENCE - deviation)
         assert_allclose(result.u_feedback, feedback, rtol=1e-9, atol=1e-12)
         assert_allclose(result.u_unsaturated, feedback + u_n + REFERENCE_INPUT, rtol=1e-9)
-        assert_array_equal(
-            result.input,
-            np.clip(result.u_unsaturated, LIMITS.input_minimum, LIMITS.input_maximum),
-        )
+        assert_array_equal(result.input, np.clip(result.u_unsaturated, LIMITS.input_minimum, LIMITS.input_maximum))
         assert result.tau.tolist() == [tau]
 
 

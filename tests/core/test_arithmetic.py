@@ -6,16 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from hsv.core.arithmetic import (
-    arcsine,
-    arctangent2,
-    exponential,
-    logarithm,
-    philox,
-    sine_cosine,
-    solve,
-    tangent,
-)
+from hsv.core.arithmetic import arcsine, arctangent2, exponential, logarithm, philox, sine_cosine, solve, tangent
 
 ANGLE_RANGE, EXPONENT_RANGE, RATIO_RANGE = 1e5, 700.0, 1e140
 

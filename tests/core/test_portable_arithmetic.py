@@ -66,10 +66,9 @@ def problems(source: str) -> list[str]:
             found.append((node.lineno, "**"))
         elif isinstance(node, ast.Attribute):
             module = node.value.id if isinstance(node.value, ast.Name) else ""
-            inexact = {
-                "math": node.attr not in MATH,
-                "np": node.attr not in EXACT_NUMPY,
-            }.get(module, node.attr in INEXACT_METHODS)
+            inexact = {"math": node.attr not in MATH, "np": node.attr not in EXACT_NUMPY}.get(
+                module, node.attr in INEXACT_METHODS
+            )
             if inexact:
                 found.append((node.lineno, f"{module}.{node.attr}"))
         elif isinstance(node, ast.Name) and node.id in INEXACT_NAMES:

@@ -19,18 +19,13 @@ OTHER = Path(__file__).parents[1] / "golden" / "stiffened"
 """Vehicle and design of the golden flights that are not Parker's."""
 
 MINE = """extends = "parker"
-[rigid_body]
-mass = { value = "4600 kg", uncertainty = "5 %" }
-[geometry]
-thrust_moment_arm = { uncertainty = "2 %" }
-[lift]
-lift_alpha = { uncertainty = "4 %" }
-[envelope]
-altitude = { maximum = "87000 ft" }
-velocity = { minimum = "2350 m/s", maximum = "2600 m/s" }
-[inertial_coupling.measured]
-inertial_coupling_1 = { value = "-150 kg^0.5 m" }
-inertial_coupling_2 = { value = "110 kg^0.5 m" }
+rigid_body.mass = { value = "4600 kg", uncertainty = "5 %" }
+geometry.thrust_moment_arm.uncertainty = "2 %"
+lift.lift_alpha.uncertainty = "4 %"
+envelope.altitude.maximum = "87000 ft"
+envelope.velocity = { minimum = "2350 m/s", maximum = "2600 m/s" }
+inertial_coupling.measured.inertial_coupling_1.value = "-150 kg^0.5 m"
+inertial_coupling.measured.inertial_coupling_2.value = "110 kg^0.5 m"
 """
 
 FLIGHT = 'extends = "case1"\ntitle = "mine"\nvehicle = "{}"\n'

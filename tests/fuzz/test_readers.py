@@ -40,12 +40,7 @@ QUICK, LONG = 5, 10_000
 Fuzz = Callable[[st.SearchStrategy[Mutated], Callable[[Mutated], object]], None]
 
 
-@pytest.fixture(
-    params=[
-        pytest.param(QUICK, id="short"),
-        pytest.param(LONG, id="long", marks=[pytest.mark.fuzz]),
-    ]
-)
+@pytest.fixture(params=[pytest.param(QUICK, id="short"), pytest.param(LONG, id="long", marks=[pytest.mark.fuzz])])
 def fuzz(request: pytest.FixtureRequest) -> Fuzz:
     """Return what gives mutated files to a reader, in an order that is the same every time in the short form."""
     examples = request.config.getoption("--fuzz-inputs") if request.param == LONG else QUICK

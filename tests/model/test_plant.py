@@ -129,13 +129,7 @@ CRUISE = np.array([85_500.0 * FOOT, 7_900.0 * FOOT, 0.03, 0.03, 0.0, 0.1, 0.0, 0
 
 @pytest.mark.parametrize(
     ("index", "value", "inside"),
-    [
-        (2, -0.36, False),
-        (3, 0.36, False),
-        (1, 0.0, False),
-        (8, np.nan, False),
-        (0, np.inf, False),
-    ],
+    [(2, -0.36, False), (3, 0.36, False), (1, 0.0, False), (8, np.nan, False), (0, np.inf, False)],
 )
 def test_states_in_and_out_of_the_range_of_the_model(index: int, value: float, inside: bool) -> None:
     state = CRUISE.copy()

@@ -76,12 +76,7 @@ def move_effectors(
 
 
 def actuator_step(
-    order: int,
-    map: Sequence[float],
-    state: Sequence[float],
-    command: float,
-    limits: Sequence[float],
-    h: float,
+    order: int, map: Sequence[float], state: Sequence[float], command: float, limits: Sequence[float], h: float
 ) -> np.ndarray:
     """Return position, rate and mean position (3) ``h`` (s) after a ``state`` (position, rate).
 

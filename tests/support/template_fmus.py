@@ -18,11 +18,7 @@ Edit = Callable[[str], str]
 
 
 def template_fmu(
-    path: Path,
-    inputs: list[str],
-    outputs: dict[str, float],
-    description: Edit = str,
-    model: Edit = str,
+    path: Path, inputs: list[str], outputs: dict[str, float], description: Edit = str, model: Edit = str
 ) -> None:
     """Write an FMI 3.0 FMU of FMPy's template; the edits change its description and its source."""
     made = ModelDescription()

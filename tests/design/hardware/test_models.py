@@ -5,12 +5,7 @@ from numpy.testing import assert_allclose
 from hsv.core.arithmetic import LARGEST
 from hsv.design.disturbance import ChannelModel, DisturbanceSet
 from hsv.design.error_system import error_system, tube_errors
-from hsv.design.hardware.models import (
-    Measured,
-    air,
-    declared,
-    delayed,
-)
+from hsv.design.hardware.models import Measured, air, declared, delayed
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario
