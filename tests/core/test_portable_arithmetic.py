@@ -21,13 +21,10 @@ MATH = {"isfinite", "isnan", "inf", "nan", "pi", "ceil", "floor", "isqrt", "radi
 
 EXACT_NUMPY = {
     *("ndarray", "float64", "int64", "complex128", "uint64", "bool_", "intp", "inf", "nan", "finfo", "pi", "newaxis"),
-    "void",
     *("array", "asarray", "ascontiguousarray", "empty", "empty_like", "zeros", "zeros_like", "ones", "ones_like"),
     *("full", "eye", "arange", "broadcast_to", "stack", "concatenate", "column_stack", "reshape", "ravel", "copy"),
-    "split",
     *("abs", "sqrt", "floor", "clip", "minimum", "maximum", "max", "min", "argmax", "argmin", "ptp", "round", "diff"),
-    *("outer", "sort"),
-    "iscomplexobj",
+    *("outer", "sort", "split", "void", "iscomplexobj"),
     *("all", "any", "isfinite", "isnan", "where", "flatnonzero", "searchsorted", "array_equal", "count_nonzero"),
 }
 """Of numpy: what makes and moves arrays, compares, or computes element by element in one exact operation."""

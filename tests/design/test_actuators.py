@@ -1,4 +1,4 @@
-"""A design that knows its actuators: their states in the error system, the lag of the plan, what a controller sees."""
+"""A design that knows its actuators: their states in the error system."""
 
 import dataclasses
 import tomllib

@@ -1,4 +1,4 @@
-"""The adjustable design: what is certified for every factor, and what the paper's rules would give instead."""
+"""The adjustable design: what is certified for every factor, and what cannot be adjusted."""
 
 import dataclasses
 from pathlib import Path

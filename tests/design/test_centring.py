@@ -1,4 +1,4 @@
-"""Linear matrix inequalities with one answer: the point of the central path, whatever rounds on the way to it."""
+"""Linear matrix inequalities with one answer, whatever rounds on the way to it; rounding of what is certified."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Flights with actuators, noisy sensors, wind and faults: the same in every bit however they are flown."""
+"""Flights with actuators, noisy sensors, wind and faults, and an estimator."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Actuators against the step responses, limits and coefficients that control engineering has for them."""
+"""Actuators: published coefficients, the step response of the textbook, sets and fields."""
 
 import math
 

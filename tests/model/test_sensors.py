@@ -1,4 +1,4 @@
-"""Sensors: variances, correlation, exact delays, bounds of quantisation, faults; channels keep to themselves."""
+"""Sensors: each field does what it says, to its own channel; named sets; faults."""
 
 import math
 

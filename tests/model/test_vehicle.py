@@ -1,4 +1,4 @@
-"""Vehicle files: what they hold, what they extend, what is refused, and how they come to nodes and back."""
+"""Vehicles: files, parameters, coupling, perturbations, what is refused, and how they come to nodes and back."""
 
 import copy
 import sys

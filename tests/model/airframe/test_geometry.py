@@ -1,4 +1,4 @@
-"""The geometry of the airframe and its bending modes."""
+"""The airframe: its published geometry, bending modes, frames of the bent body, and the robot description."""
 
 import math
 from collections import Counter

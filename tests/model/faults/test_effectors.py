@@ -1,4 +1,4 @@
-"""Faults of actuators and effectors: each law against its formula on every substep, and how they are composed."""
+"""Faults of actuators and effectors against their formulas, on every substep."""
 
 import math
 
@@ -28,13 +28,13 @@ def elevator(kind, **parameters):
     return Fault.of(ELEVATOR, kind, parameters)
 
 
-def flown(faults, commands=WAVE, actuator=None, seed=0):
+def flown(faults, commands=WAVE, actuator=None):
     """Return what the elevator does on every substep, and its actuator's states."""
     data = actuator_data(actuator or {}, VEHICLE, T)
     rows = fault_rows([DYNAMICS, EFFECTOR], [row if len(row) == 3 else (*row, NEVER) for row in faults], T)
     effector, state, deflections, states = TRIM.copy(), actuators_at_rest(TRIM), [], []
     for k, command in enumerate(commands):
-        begin_faults(rows, k, seed)
+        begin_faults(rows, k, 0)
         for j in range(SUBSTEPS):
             move_effectors(data, (state, effector), rows, k, j, np.array([0.4, command]), ALPHA)
             deflections.append(effector[1])

@@ -1,4 +1,4 @@
-"""Faults on the command and on the engine: each law against its formula, when they act, and how they are composed."""
+"""Faults on the command and on the engine: their formulas, when they act, how they are composed, what is refused."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""Discretisation, extended models, modes and frequency responses."""
+"""Discretisation, extended models, modes and frequency responses; actuators and delays before the vehicle."""
 
 from functools import partial
 
