@@ -26,7 +26,7 @@ def test_every_shipped_scenario_can_be_written(name):
     values = scenario.vehicle.perturbation
     written = parse_scenario(campaign.file(0, [values.get(factor.name, 0.0) for factor in campaign.factors]), name)
     assert written.parameters() == {
-        **campaign.flown(0, [0.0] * 10).parameters(),
+        **campaign.flown(0, [0.0] * len(campaign.factors)).parameters(),
         **scenario.parameters(),
         "seed": 10**7,
     }
