@@ -283,7 +283,8 @@ def test_faults_and_factors_come_and_go_in_flight(processes: Processes) -> None:
 
 @pytest.mark.skipif("rclcpp" not in prefixes(), reason="the installation has no rclcpp")
 def test_the_controller_in_cpp_flies_as_the_one_in_python(processes: Processes) -> None:
-    scenario, commands = short_scenario(processes.folder), []
+    scenario = short_scenario(processes.folder)
+    commands: list[list[np.ndarray]] = []
     for example, package in (("cpp_node", "hsv_example_cpp"), ("node", "hsv_example_node")):
         shutil.copytree(ROOT / "examples" / example, processes.folder / example)
         built = processes.run("bash", "-c", f"cd {example} && python3 -m colcon build")
