@@ -44,7 +44,9 @@ def short_case2(folder):
 
 
 def flown(processes, scenario, name, *words):
-    done = processes.run("hsv", "run", scenario, "--no-report", "--bag", processes.folder / name, *words)
+    # On a busy machine a node may be silent for longer than a person would wait.
+    command = ("hsv", "run", scenario, "--no-report", "--step-timeout", "30", "--bag", processes.folder / name)
+    done = processes.run(*command, *words)
     assert done.returncode == 0, done.stdout
     return Bag(processes.folder / name)
 
