@@ -20,6 +20,8 @@ def test_starts_in_the_trim_of_the_nominal_vehicle_even_if_perturbed():
     nominal, heavy = plant(), plant(vehicle__perturbation__mass=0.1)
     assert heavy.vehicle.mass == 1.1 * nominal.vehicle.mass
     assert_array_equal(heavy.reset().state, nominal.reset().state)
+    still_air = [0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0]
+    assert nominal.memory().conditions.tolist() == still_air
     held = nominal.initial.input
     assert abs(nominal.step(held).state[0] - nominal.initial.state[0]) < 1e-9
     assert abs(heavy.step(held).state[1] - nominal.initial.state[1]) < 1.0

@@ -30,6 +30,7 @@ OTHER = str(Path(__file__).parents[1] / "golden" / "stiffened.toml")
 def test_every_registered_vehicle_is_whole_and_trims_all_over_its_envelope(name):
     vehicle = load_vehicle(name)
     assert vehicle.title
+    assert vehicle.centre == (np.mean(vehicle.altitude_range), np.mean(vehicle.velocity_range))
     for coupling in vehicle.couplings:
         for altitude in np.linspace(*vehicle.altitude_range, 3):
             for velocity in np.linspace(*vehicle.velocity_range, 3):

@@ -96,6 +96,36 @@ def test_a_worker_that_does_not_answer_is_reported_and_refused(monkeypatch, clus
     assert waited[-1] == "waiting for the answers of all workers"
 
 
+@pytest.mark.long
+def test_workers_that_do_not_come_are_waited_for_a_while_and_not_silently(monkeypatch, cluster):
+    monkeypatch.setattr("hsv.flight.campaign.executors.WORKERS", 0.5)
+    waited = []
+    with (
+        pytest.raises(CampaignError, match=r"no workers after 0\.5 s"),
+        make_executor(0, cluster.scheduler_address, waited.append),
+    ):
+        pass
+    assert waited == ["waiting for the scheduler's workers"]
+
+
+@pytest.mark.long
+def test_a_lost_scheduler_is_a_failed_run_that_goes_on_later(planned, cluster, out):
+    campaign, store = planned(samples=320), ResultStore(out, planned(samples=320))
+    cluster.scale(1)
+
+    def lose(done):
+        if done:
+            cluster.close()
+
+    with (
+        make_executor(0, cluster.scheduler_address) as workers,
+        pytest.raises(RunError, match="the scheduler is lost"),
+    ):
+        run_campaign(campaign, store, workers, progress=lose)
+    with store.opened() as finished:
+        assert finished
+
+
 @contextmanager
 def dask_worker(address, folder, environment, *flags):
     """A worker started by hand, as on another machine."""

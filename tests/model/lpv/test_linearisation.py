@@ -112,6 +112,7 @@ def test_oscillator_has_its_frequency_and_damping():
     assert mode.natural_frequency == pytest.approx(7.0)
     assert mode.damping_ratio == pytest.approx(0.3)
     assert mode.pole.imag > 0.0
+    assert [mode.damping_ratio for mode in modes(np.diag([2.0, 0.0]))] == [-1.0, 0.0]
 
 
 A, B = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.array([[0.0], [4.0]])
