@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hsv.bags.description import INTERFACE_VERSION
+from hsv.bags.info import describe
 from hsv.bags.reader import Bag
 from hsv.bags.steps import bag_warnings, expected_stamps, irregularities, joined
 from hsv.bags.writer import BagWriter
@@ -62,16 +63,26 @@ def test_no_common_step_is_refused(kit, tmp_path):
         joined(_bag(kit, tmp_path, [0], [1]), (STATE, FORCES))
 
 
-@pytest.mark.parametrize("announced", [{"last_step": 400_000_000}, {"period": -1.0}, {"period": float("nan")}])
-def test_a_bag_that_tells_of_more_steps_than_any_flight_has_is_not_believed(kit, tmp_path, announced):
+def announced_bag(kit, folder, **announced):
+    """Return a bag of three steps of a run that announces others."""
     kinds = {STATE: KINDS[STATE], "/hsv/run": "hsv_msgs/msg/Run"}
-    writer = BagWriter(tmp_path / "bag", [kit.topic(name, kind) for name, kind in kinds.items()])
+    writer = BagWriter(folder / "bag", [kit.topic(name, kind) for name, kind in kinds.items()])
     values = {"last_step": 2, "period": 0.02, "interface_version": INTERFACE_VERSION, **announced}
     writer.write("/hsv/run", 0, kit.messages.serialize(kit.messages.make(kinds["/hsv/run"], **values)))
     for step in range(3):
         writer.write(STATE, step * PERIOD, kit.messages.stamped(kinds[STATE], step * PERIOD, step, status=0))
     writer.close()
-    bag = Bag(tmp_path / "bag")
+    return Bag(folder / "bag")
+
+
+def test_a_bag_that_ends_before_its_run_is_incomplete_in_text_and_in_json(kit, tmp_path):
+    described = describe(announced_bag(kit, tmp_path, last_step=4))
+    assert described["complete"] is False and "ends at t = 0.04 s of 0.08 s" in described["warnings"]
+
+
+@pytest.mark.parametrize("announced", [{"last_step": 400_000_000}, {"period": -1.0}, {"period": float("nan")}])
+def test_a_bag_that_tells_of_more_steps_than_any_flight_has_is_not_believed(kit, tmp_path, announced):
+    bag = announced_bag(kit, tmp_path, **announced)
     tracemalloc.start()
     with pytest.raises(RecordingError, match=r"tells of \d+ steps of \S+ s, expected at most 5000000 of at most 1 s"):
         expected_stamps(bag)

@@ -138,6 +138,8 @@ def test_a_bag_that_is_cut_off_is_used_and_said_to_be_cut_off(hsv, bag, tmp_path
     assert ran.code == 0 and ran.err.count("\n") == 1
     assert ran.err.startswith(f"hsv: warning: {cut}: truncated after ") and "hsv recover completes it" in ran.err
     assert RESULTS[command] == [] or (tmp_path / RESULTS[command][-1]).is_file()
+    if command == "info":
+        assert hsv("info", str(cut), "--json").json["complete"] is False
 
 
 @pytest.mark.parametrize("command", ["info", long("replay")])

@@ -51,6 +51,7 @@ WRONG = [
     (PITCH_RATE + "noise = []", "sensors.pitch_rate.noise = []: expected one value at least"),
     (PITCH_RATE + 'minimum = "25 deg/s"\nmaximum = "20 deg/s"', "expected less than maximum, 20 deg/s"),
     (PITCH_RATE + 'drift_sigma = "1 deg/s"', "sensors.pitch_rate.drift_sigma: expected with a drift_time only"),
+    (PITCH_RATE + 'drift_time = "10 s"', "sensors.pitch_rate.drift_time: expected with a drift_sigma only"),
     ("[link]\ncommand = 1", "link.command = 1: expected a table of delay, jitter, loss, burst, corruption, checksum"),
     ("[link.command]\ndelay = 51", "link.command.delay = 51: expected a whole number from 0 to 50"),
     ('[link.measurement]\nloss = "90 %"\nburst = 2', "link.measurement.burst = 2.0: expected 0, or at least 9"),

@@ -65,6 +65,11 @@ class Late(Mine):
         return super().step(inputs) if inputs.step < 20 else self.answer
 
 
+class Leaving(Mine):
+    def reset(self):
+        raise SystemExit(5)
+
+
 class Raising(Mine):
     def step(self, inputs):
         raise ZeroDivisionError("no gain")
@@ -94,6 +99,8 @@ def test_settings_reach_the_controller_in_si_units():
     [
         ("Late", (np.nan, 0.0), r"Late, step 20: answered \[nan, 0.0\], expected 2 finite"),
         ("Late", (0.3,), r"Late, step 20: answered \(0.3,\), expected 2 finite numbers: fuel"),
+        ("Late", np.array([1j, 0.0]), r"Late, step 20: answered array\(\[0\.\+1\.j, 0\.\+0\.j\]\), expected 2 finite"),
+        ("Leaving", None, r"Leaving, reset: SystemExit: 5"),
         ("Raising", None, r"Raising, step 0: ZeroDivisionError: no gain \(test_foreign_controllers.py:\d+\)$"),
     ],
 )

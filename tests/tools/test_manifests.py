@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,13 +12,17 @@ import pytest
 import yaml
 from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import parse_package
+from packaging.specifiers import SpecifierSet
 
 import hsv
 
 ROOT = Path(__file__).parents[2]
 MANIFESTS = sorted([*ROOT.glob("src/*/package.xml"), *ROOT.glob("ros_ws/src/hsv_*/package.xml")])
-KEYS = {name: f"python3-{name}" for name in ("cffi", "jinja2", "numpy", "rich", "yaml")}
-"""By imported module: its key in rosdep, where Ubuntu's version suffices."""
+DISTRIBUTION = {"cffi": "1.16.0", "jinja2": "3.1.2", "numpy": "1.26.4", "rich": "13.7.1", "yaml": "6.0.1"}
+"""Versions of Ubuntu 24.04 by imported module; a module that is too old there has no rosdep key in the manifests."""
+
+KEYS = {name: f"python3-{name}" for name in DISTRIBUTION}
+"""By imported module: its key in rosdep."""
 
 WITHOUT_KEY = {"clarabel", "control", "cvxpy", "distributed", "fmpy", "foxglove", "gymnasium", "lz4", "markupsafe"}
 WITHOUT_KEY |= {"matplotlib", "mcap", "pandas", "pint", "piqp", "pyarrow", "pydantic", "rosbags", "scipy", "tomli_w"}
@@ -68,6 +73,17 @@ def test_a_package_has_a_changelog_of_its_name(manifest):
     changelog = get_changelog_from_path(str(manifest.parent / "CHANGELOG.rst"))
     versions = [version for version, _, _ in changelog.foreach_version()]
     assert versions and all(changelog.get_content_of_version(version) for version in versions)
+
+
+@pytest.mark.parametrize(("module", "version"), DISTRIBUTION.items())
+def test_a_key_stands_for_a_version_that_suffices(module, version):
+    bounds = re.findall(rf'"({module.replace("yaml", "pyyaml")})([<>=][^"]*)"', (ROOT / "src/hsv/setup.py").read_text())
+    assert [name for name, bound in bounds if SpecifierSet(bound).contains(version)]
+
+
+def test_modules_without_a_key_are_named_in_the_documentation():
+    page = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
+    assert all(f"`{module.replace('_', '-')}`" in page for module in WITHOUT_KEY)
 
 
 @pytest.mark.long
