@@ -30,6 +30,7 @@ TWO_NOTCHES = {
         ("case1_rmpc", SHORT),
         ("case1_integral_heavy", SHORT),
         ("case2_baseline", {"duration": 40.0, "nominal__filtered": True} | FACTOR),
+        ("case1_qp", {"duration": 1.0, "fault__starts": [0.5]}),
         long("case1_qp", {"duration": 104.0}),
         ("case1", SHORT | TWO_NOTCHES),
         ("case1", {"duration": 0.0}),

@@ -149,6 +149,7 @@ BOTH = {"random_on": 1.0, "random_off": 1.0, "intermittent_period": 2.0}
         (ELEVATOR, "bias", {"value": 0.1}, "fault.value: unknown parameter, expected one of offset, "),
         (ELEVATOR, "lock_in_place", {"offset": 1.0}, "fault.offset: unknown parameter, expected one of"),
         (ELEVATOR, "bias", {"offset": 0.6}, "fault.offset = 0.6: expected double from -0.5235987756 to 0.523598"),
+        (ELEVATOR, "bias", {"offset": True}, "fault.offset = True: expected double from -0.5235987756 to 0.523598"),
         (ELEVATOR, "delay", {"steps": 2.5}, "fault.steps = 2.5: expected double from 1 to 50, whole"),
         (ELEVATOR, "hard_over", {"rate": 0.0}, "fault.rate = 0: expected a rate whose sign selects the stop"),
         (ELEVATOR, "stop_limit", CROSSED, "fault.lower = 10 deg: expected at most upper, 5 deg"),
