@@ -4,7 +4,6 @@ import copy
 
 import numpy as np
 import pytest
-from marking import long
 from numpy.testing import assert_allclose
 
 from hsv.control.checks import Subject, load_subject
@@ -57,23 +56,25 @@ def test_a_shipped_design_passes_with_its_flights_and_sequences(name):
     assert failed == []
 
 
-@pytest.mark.parametrize(
-    ("field", "value", "named"),
-    [
-        long(("disturbance", "measured", "lower", 0), -0.39, "tube.disturbance.measured.lower[0]"),
-        long(("disturbance", "measured", "upper_flight", 2), 17, "tube.disturbance.measured.upper[2]"),
-        long(("flights", "flights"), 1024, "tube.flights.flights"),
-        long(("flights", "worst_level"), 0.2, "tube.flights: level"),
-        (("tightening", "plan", "highest", 1), 0.2, "nominal plan of flown corners, highest"),
-    ],
-)
-def test_a_falsified_statement_about_flights_is_noticed(baseline, field, value, named):
+FALSIFIED = {
+    ("disturbance", "measured", "lower", 0): (-0.39, "tube.disturbance.measured.lower[0]"),
+    ("disturbance", "measured", "upper_flight", 2): (17, "tube.disturbance.measured.upper[2]"),
+    ("flights", "flights"): (1024, "tube.flights.flights"),
+    ("flights", "worst_level"): (0.2, "tube.flights: level"),
+    ("tightening", "plan", "highest", 1): (0.2, "nominal plan of flown corners, highest"),
+}
+"""By statement of the certificate: a false value of it, and the check that fails."""
+
+
+def test_falsified_statements_about_flights_are_noticed(baseline):
     certificate = copy.deepcopy(baseline.certificate)
-    table = certificate["tube"]
-    for key in field[:-1]:
-        table = table[key]
-    table[field[-1]] = value
-    assert named in [check.name for check in flight_checks(Subject(baseline.design, certificate)) if not check.ok]
+    for (*path, last), (value, _) in FALSIFIED.items():
+        table = certificate["tube"]
+        for key in path:
+            table = table[key]
+        table[last] = value
+    failed = {check.name for check in flight_checks(Subject(baseline.design, certificate)) if not check.ok}
+    assert failed >= {named for _, named in FALSIFIED.values()}
 
 
 def test_no_sequence_leaves_the_set_and_the_seed_decides(baseline):
