@@ -99,7 +99,7 @@ def test_the_nodes_fly_in_terminals_of_their_own(checkout):
 
 @pytest.mark.long
 def test_a_flight_answers_as_it_is_printed(checkout):
-    commands = [command for page in PAGES for command in printed(page) if command in IN_FLIGHT]
+    commands = list(dict.fromkeys(command for page in PAGES for command in printed(page) if command in IN_FLIGHT))
     assert len(commands) == len(IN_FLIGHT)
     with own_environment() as environment:
         processes = Processes(environment, checkout)
