@@ -1,4 +1,4 @@
-"""A disk that is full, and output that nobody takes: one line, exit code 2, and no half of a file."""
+"""A disk that is full, and output that no process reads: one line, exit code 2, and no half of a file."""
 
 import os
 import subprocess

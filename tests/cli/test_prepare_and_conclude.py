@@ -111,7 +111,7 @@ def test_conclude_closes_the_bag_of_a_killed_recorder_and_says_where_it_breaks_o
     assert not recover(bag).changed
 
 
-def test_conclude_removes_the_folder_of_a_bag_that_nobody_has_written(hsv, tmp_path):
+def test_conclude_removes_the_folder_of_a_bag_without_a_file(hsv, tmp_path):
     (tmp_path / "empty").mkdir()
     ran = hsv("conclude", "empty", "--failure", "recorder ended with exit code 2")
     assert ran.code == 1 and ran.error == "recorder ended with exit code 2"

@@ -128,7 +128,7 @@ def test_interrupt_ends_all_and_closes_the_bag(processes, number):
 def test_a_run_that_is_interrupted_before_its_first_step_leaves_no_bag(processes):
     bag = processes.folder / "waiting"
     run = processes.start("hsv", "run", "case1", "--external", "--composed", "--bag", bag)
-    # The recorder has its file, and waits with all others for a controller that nobody starts.
+    # The recorder has its file, and waits with all others for a controller that is never started.
     wait_until(lambda: (bag / "waiting_0.mcap").exists(), [run.pid])
     run.send_signal(signal.SIGINT)
     output = output_of(run)

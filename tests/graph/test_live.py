@@ -65,7 +65,7 @@ def test_five_viewers_one_of_whom_never_reads_change_no_bit(processes, tmp_path)
     assert flight_fingerprint(bag) == fly(assemble_flight(load_scenario(str(scenario)))).fingerprint
     for reader in readers:
         reader.wait()
-        # At ten times real time nobody promises that a busy machine leaves them time for every message.
+        # At ten times real time a busy machine may not leave them time for every message.
         assert_as_recorded(reader, bag)
     # Whoever comes late sees the flight from its start to its end, and how it ended.
     times = late.times(len(LIVE_CURVES))
@@ -121,7 +121,7 @@ def test_at_real_time_pace_nothing_is_missed(processes, tmp_path):
 
 @pytest.mark.long
 @pytest.mark.parametrize("composed", [(), ("--composed",)], ids=["separate", "composed"])
-def test_at_full_speed_a_stopped_live_node_holds_nobody_up(processes, tmp_path, composed):
+def test_at_full_speed_a_stopped_live_node_delays_no_other_node(processes, tmp_path, composed):
     scenario = short_scenario(tmp_path, duration=120)
     words = [scenario, "--bag", tmp_path / "bag", "--real-time-factor", "0", *composed]
     watched = Watched(processes, *words)
