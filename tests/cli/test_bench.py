@@ -6,9 +6,8 @@ import pytest
 from ros_domain import own_domain
 
 from hsv.base.errors import RunError
-from hsv.cli.bench.figure import Figure
+from hsv.cli.bench.figure import Figure, read_run
 from hsv.cli.bench.measure import graph_lap, ring_lap
-from hsv.cli.bench.record import as_json, changes, read_run
 
 
 @pytest.mark.long
@@ -24,7 +23,7 @@ def test_the_groups_that_were_asked_for_are_measured_and_held_against_a_recorded
     path = tmp_path / "before.json"
     path.write_text(json.dumps(kept))
     ran = hsv(*words, "--compare", path)
-    assert ran.code == 1 and "SLOWER by" in ran.out
+    assert ran.code == 1 and ": SLOWER, " in ran.out
 
 
 @pytest.mark.long
@@ -74,9 +73,10 @@ def test_ratios_are_taken_pair_by_pair_and_judged_by_the_limit():
 )
 def test_a_change_beyond_the_spread_counts(tmp_path, before, after, slower):
     path = tmp_path / "run.json"
-    path.write_text(json.dumps(as_json({"laps": [before]}, {})))
-    [change] = changes([after], read_run(path))
-    assert change.slower == pytest.approx(slower) and change.before == before.ratio
+    path.write_text(json.dumps({"commit": "abc", "figures": [before.as_dict("laps")]}))
+    commit, recorded = read_run(path)
+    assert commit == "abc" and recorded["graph"].ratio == before.ratio
+    assert after.slower(recorded["graph"]) == pytest.approx(slower)
 
 
 def test_a_group_that_cannot_be_measured_is_named_and_is_an_error_if_asked_for(hsv, monkeypatch, tmp_path):

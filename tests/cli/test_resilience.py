@@ -24,9 +24,9 @@ def resilience(hsv, tmp_path):
 
 def test_two_controllers_and_two_faults_make_a_page_with_every_cell(resilience, hsv, tmp_path):
     ran = resilience("--json")
-    assert ran.code == 0 and "flights on 1 core: about" in ran.err
+    assert ran.code == 0
     values = ran.json
-    assert values["expected_s"] > 0.0 and values["flown_in_s"] > 0.0
+    assert values["flown_in_s"] > 0.0
     assert values["cases_flown_now"] == 2 * 2 * 2 and len(values["cells"]) == 2 * 2 * 2 * 3
     assert {cell["flights"] for cell in values["cells"]} == {5}
     page = (tmp_path / "out/index.html").read_text()

@@ -8,7 +8,6 @@ from pyarrow import parquet
 from hsv.base.errors import CampaignError
 from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
-from hsv.flight.campaign.sample_runner import fly_batch
 from hsv.flight.campaign.store import ResultStore, read_result, result_digest
 from hsv.flight.campaign.summary import Results
 from hsv.flight.campaign.table import CAMPAIGN, DIGEST
@@ -22,8 +21,7 @@ class Counting(Executor):
 
     def fly(self, job, text, batches, *label):
         for batch, content in super().fly(job, text, batches):
-            if job is fly_batch:
-                self.flown.append(batch)
+            self.flown.append(batch)
             yield batch, content
 
 

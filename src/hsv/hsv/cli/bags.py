@@ -12,8 +12,21 @@ from typer import Option
 
 from hsv.base.errors import ParameterError, RecordingError, RunError, one_of
 from hsv.base.units import significant
-from hsv.cli.options import BagArgument, JsonOption, SuppliedDesignOption, SuppliedScenarioOption, TrustOption
-from hsv.cli.output import console, folded, new_table, print_bag_warnings, print_json, print_written, say, stages
+from hsv.cli.output import (
+    BagArgument,
+    JsonOption,
+    SuppliedDesignOption,
+    SuppliedScenarioOption,
+    TrustOption,
+    console,
+    folded,
+    new_table,
+    print_bag_warnings,
+    print_json,
+    print_written,
+    say,
+    stages,
+)
 
 if TYPE_CHECKING:
     from hsv.bags.compare import Comparison, Difference

@@ -13,8 +13,12 @@ from typer import Argument, Option
 from hsv.base.errors import DesignError, ParameterError, QuantityError
 from hsv.base.files import json_text
 from hsv.base.units import UnitSystem, in_words, significant
-from hsv.cli.options import DesignArgument, ForceOption, JsonOption, ScenarioArgument, UnitsOption
 from hsv.cli.output import (
+    DesignArgument,
+    ForceOption,
+    JsonOption,
+    ScenarioArgument,
+    UnitsOption,
     check_folder,
     check_new,
     check_target,

@@ -15,9 +15,13 @@ from typer.core import TyperGroup
 
 from hsv.base.errors import CampaignError, ParameterError, RecordingError, RunError
 from hsv.base.units import UnitSystem, significant
-from hsv.cli.options import BagArgument, JsonOption, ScenarioArgument, TrustOption, UnitsOption
 from hsv.cli.output import (
+    BagArgument,
     Interrupted,
+    JsonOption,
+    ScenarioArgument,
+    TrustOption,
+    UnitsOption,
     check_folder,
     check_target,
     console,
@@ -391,7 +395,7 @@ def fly(
 
     Example: hsv montecarlo fly case1 --samples 1000 --seed 7 --factor "fault[0].start=90 s..110 s"
     """
-    from hsv.cli.summary import announce, show_campaign
+    from hsv.cli.summary import show_campaign
     from hsv.flight.campaign.campaign import plan
     from hsv.flight.campaign.executors import make_executor
     from hsv.flight.campaign.run import run_campaign
@@ -419,12 +423,12 @@ def fly(
         make_executor(workers, scheduler, errors.print) as flying,
         flights(campaign.scenario_name, campaign.samples) as progress,
     ):
-        flown = run_campaign(campaign, store, flying, restart=restart, expect=announce, progress=progress)
+        flown = run_campaign(campaign, store, flying, restart=restart, progress=progress)
     # The results are trusted: their code is that of the user's own scenario.
     results = Results(out, trust=True)
     show_campaign(results, units, json, page, flown.flights)
     if flown.flights and not json:
-        say(f"flown in {significant(flown.wall_time)} s, expected: {significant(flown.expected)} s")
+        say(f"flown in {significant(flown.wall_time)} s")
     if results.crashed.all():
         raise RunError(f"all {campaign.samples} flights crashed, the first: {results.row(0)['crashed']}")
 
@@ -563,7 +567,6 @@ def resilience(
 
     Example: hsv resilience --controllers case1,case1_rmpc --faults elevator_loss,elevator_delay
     """
-    from hsv.cli.summary import announce
     from hsv.flight.campaign.executors import make_executor
     from hsv.flight.campaign.run import run_campaign
     from hsv.flight.resilience.campaign import CONTROLLERS, plan
@@ -583,12 +586,12 @@ def resilience(
         make_executor(workers, scheduler, errors.print) as flying,
         flights("resilience", sum(case.flights for case in campaign.batches)) as progress,
     ):
-        flown = run_campaign(campaign, store, flying, expect=announce, progress=progress)
+        flown = run_campaign(campaign, store, flying, progress=progress)
     results = ResilienceResults.read(campaign, store)
     options = [word for pair in (("--controllers", controllers), ("--faults", faults)) if pair[1] for word in pair]
     written = write_results(results, out, shlex.join(["hsv", "resilience", *options]))
     if json:
-        values = {"cases_flown_now": flown.batches, "flown_in_s": flown.wall_time, "expected_s": flown.expected}
+        values = {"cases_flown_now": flown.batches, "flown_in_s": flown.wall_time}
         print_json({"written": list(map(str, written)), **values, "cells": _cells(results)})
     else:
         names = [subject.name for subject in results.campaign.subjects]
@@ -596,7 +599,7 @@ def resilience(
         cells = [["{} of {}".format(*results.squares[fault, name].survived) for name in names] for fault in rows]
         print_matrix("flights survived", [fault.replace("_", " ") for fault in rows], names, cells)
         if flown.batches:
-            say(f"flown in {flown.wall_time:.0f} s, expected: {flown.expected:.0f} s")
+            say(f"flown in {flown.wall_time:.0f} s")
         say(f"written {', '.join(map(str, written))}")
     crashes = [flight.crashed for flight in results.flights]
     if all(crashes):

@@ -13,9 +13,11 @@ from rich.text import Text
 from typer import Argument, Option
 
 from hsv.base.errors import HsvError, ParameterError, QuantityError, RunError, one_of
-from hsv.base.units import UnitSystem, in_system, significant
-from hsv.cli.options import JsonOption, ListJsonOption, UnitsOption
+from hsv.base.units import UnitSystem, in_system
 from hsv.cli.output import (
+    JsonOption,
+    ListJsonOption,
+    UnitsOption,
     console,
     errors,
     folded,
@@ -31,7 +33,6 @@ from hsv.cli.output import (
 
 if TYPE_CHECKING:
     from hsv.cli.bench.figure import Figure
-    from hsv.cli.bench.record import Change
 
 
 class Kind(StrEnum):
@@ -265,12 +266,13 @@ def bench(
 
     Example: hsv bench --only in_process --only startup
     """
-    from hsv.cli.bench.measure import groups
-    from hsv.cli.bench.record import as_json, changes, not_measured, read_run
+    from hsv.cli.bench.figure import read_run
+    from hsv.cli.bench.measure import groups, machine
+    from hsv.graph.preparation import commit
 
     if not 0.0 < scale <= 100.0:
         raise QuantityError(f"scale = {scale}: expected above 0, at most 100")
-    recorded = read_run(compare) if compare else None
+    since, recorded = read_run(compare) if compare else ("", {})
     available = groups(scale)
     for name in only or ():
         if name not in available:
@@ -286,23 +288,30 @@ def bench(
             except RunError as error:
                 # Without a compiler or a built workspace, the rest can still be measured.
                 skipped[name] = str(error)
-    figures = [figure for found in measured.values() for figure in found]
-    since = changes(figures, recorded) if recorded else []
-    absent = not_measured(figures, recorded, only) if recorded else []
+    figures = {figure.name: figure for found in measured.values() for figure in found}
+    slower = {name: figure.slower(recorded[name]) for name, figure in figures.items() if name in recorded}
+    absent = [name for name, old in recorded.items() if name not in figures and (not only or old.group in only)]
     if json:
-        slower = {change.figure.name: change.slower for change in since}
-        compared = {"slower_than_recorded": slower, "recorded_but_not_measured": absent} if recorded else {}
-        print_json(as_json(measured, skipped) | compared)
+        described = [figure.as_dict(group) for group, found in measured.items() for figure in found]
+        run = {"commit": commit(), "machine": machine(), "figures": described, "skipped": skipped}
+        compared = {"slower_than_recorded": slower, "recorded_but_not_measured": absent} if compare else {}
+        print_json(run | compared)
     else:
-        _print_figures(figures)
+        _print_figures(list(figures.values()))
         if not only:
             for name, reason in skipped.items():
                 errors.print(f"{name}: not measured: {reason}", soft_wrap=True)
-        if recorded:
-            _print_changes(since, recorded.commit, len(figures), absent)
+        if compare:
+            say(Text(f"since {since}", "bold"))
+            for name, change in slower.items():
+                word, style = ("SLOWER", "bold red") if change > 0.0 else ("faster" if change else "as before", "")
+                say(
+                    Text(f"    {name}: {word}, {recorded[name].ratio:.3g} before, {figures[name].ratio:.3g} now", style)
+                )
+            say(*(f"    {name}: recorded there, not measured here" for name in absent))
     if only and skipped:
         raise RunError("; ".join(f"only = {name!r}: not measured: {reason}" for name, reason in skipped.items()))
-    if any(change.slower > 0.0 for change in since):
+    if any(change > 0.0 for change in slower.values()):
         raise typer.Exit(1)
 
 
@@ -318,19 +327,3 @@ def _print_figures(figures: list[Figure]) -> None:
         say(folded(text, 4, first=4))
         promise = "; ".join(filter(None, (figure.verdict, figure.note)))
         say(Text(folded(promise, 4, first=4), "bold red" if "WORSE" in promise else ""))
-
-
-def _print_changes(since: list[Change], commit: str, measured: int, absent: list[str]) -> None:
-    """Print what became slower or faster since a recorded run of a ``commit``, and what could not be compared."""
-    say(Text(f"since {commit}", "bold"))
-    for change in since:
-        if change.slower:
-            word, style = ("SLOWER", "bold red") if change.slower > 0.0 else ("faster", "green")
-            text = f"{word} by {abs(change.slower):.0%}, {significant(change.before)} before: {change.figure.what}"
-            say(Text(folded(text, 4, first=4), style))
-    same = sum(not change.slower for change in since)
-    alone = measured - len(since)
-    others = f"; {alone} not in that run" if alone else ""
-    say(folded(f"as before: {same} of {measured}{others}", 4, first=4))
-    if absent:
-        say(folded(f"recorded there, not measured here: {', '.join(absent)}", 4, first=4))

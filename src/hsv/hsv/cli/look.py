@@ -11,8 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument, Option
 
 from hsv.base.units import UnitSystem, in_words, significant
-from hsv.cli.options import BagArgument, JsonOption, SuppliedDesignOption, SuppliedScenarioOption, UnitsOption
 from hsv.cli.output import (
+    BagArgument,
+    JsonOption,
+    SuppliedDesignOption,
+    SuppliedScenarioOption,
+    UnitsOption,
     check_target,
     console,
     new_table,

@@ -1,4 +1,4 @@
-"""Print numbers with their units: tables for people, JSON with the unit in every key for programs; check targets."""
+"""Options that commands share; numbers with their units as tables for people, as JSON for programs; check targets."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import mkdtemp
 from textwrap import TextWrapper
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 from unicodedata import category
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
+from typer import Argument, Option
 
 from hsv.base.errors import ParameterError, reason
 from hsv.base.files import json_text
@@ -31,6 +32,23 @@ if TYPE_CHECKING:
 
 Quantity = tuple[float, str]
 """A number and its SI unit."""
+
+BagArgument = Annotated[Path, Argument(help="Bag directory, or its .mcap file.")]
+DesignArgument = Annotated[
+    str, Argument(help="Design: a parameter file with its certificate next to it, or a shipped name.")
+]
+ScenarioArgument = Annotated[str, Argument(help="Name of a shipped scenario, or path of a TOML file.")]
+
+ForceOption = Annotated[bool, Option("--force", help="Overwrite existing files.")]
+GraphNamespaceOption = Annotated[str, Option("--namespace", help="Namespace of the graph, such as /veh1.")]
+JsonOption = Annotated[bool, Option("--json", help="Print JSON, with the unit in every key.")]
+ListJsonOption = Annotated[bool, Option("--json", help="Print JSON, with a unit for every number.")]
+SuppliedDesignOption = Annotated[Path | None, Option("--design", help="Design of a bag without attachments.")]
+SuppliedScenarioOption = Annotated[str | None, Option("--scenario", help="Scenario of a bag without attachments.")]
+TrustOption = Annotated[bool, Option("--trust", help="Run code that the file names, such as controllers.")]
+UnitsOption = Annotated[
+    UnitSystem, Option(help="SI with degrees and percent, strict SI, or the paper's ft, ft/s, deg.")
+]
 
 _COLUMN = 12
 """Width (characters) of a column of a matrix, including the gap."""

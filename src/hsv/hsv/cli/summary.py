@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from rich.text import Text
 
 from hsv.base.errors import RunError
-from hsv.base.units import UnitSystem, duration_in_words, in_system, significant, unit_in
-from hsv.cli.output import console, errors, folded, json_system, new_table, print_json, say, to_json
+from hsv.base.units import UnitSystem, in_system, significant, unit_in
+from hsv.cli.output import console, folded, json_system, new_table, print_json, say, to_json
 from hsv.flight.fingerprint import as_published, published_in_words
 from hsv.flight.flight import step_times_in_words
 from hsv.flight.limits import Verdict, in_units, limits_kept, not_judged, verdict_sentence, verdicts
@@ -20,7 +20,6 @@ from hsv.flight.metrics import METRICS, Group, in_words, is_share
 from hsv.flight.scenario import Scenario
 
 if TYPE_CHECKING:
-    from hsv.flight.campaign.run import Capacity
     from hsv.flight.campaign.summary import Results
 
 _LISTED = 5
@@ -164,16 +163,6 @@ def print_section(title: str, lines: Mapping[str, object]) -> None:
         first, *others = str(text).split("\n")
         words = first if isinstance(text, Path) else folded(first, width, first=width)[width:]
         say(f"  {name:{width - 2}}{words}", *(f"  {other}" for other in others))
-
-
-def announce(capacity: Capacity) -> None:
-    """Print the expected size and duration of a campaign."""
-    cores = "core" if capacity.cores == 1 else "cores"
-    errors.print(
-        f"{capacity.flights} flights on {capacity.cores} {cores}: about {duration_in_words(capacity.wall_time)} "
-        f"({significant(capacity.wall_time * capacity.cores / 3600.0, 2)} core hours), "
-        f"{significant(capacity.bytes / 1e6, 2)} MB of disk space"
-    )
 
 
 def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, flown: int | None = None) -> None:

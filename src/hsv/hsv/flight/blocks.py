@@ -10,11 +10,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from operator import attrgetter
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInput, ControllerResult
+from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInput
 from hsv.model import signals as types
 from hsv.model.signals import N_INPUTS, PITCH_RATE, SignalType
 
@@ -24,68 +25,23 @@ if TYPE_CHECKING:  # a node imports only its own component
     from hsv.control.notch_filter import NotchFilter
     from hsv.flight.closed_loop import Components
     from hsv.model.faults.injector import FaultInjector
-    from hsv.model.faults.schedule import ActiveFault
     from hsv.model.plant import Plant
 
 
-class Signals:
-    """Signals between the blocks in a step, SI; each block writes its outputs.
+class Signals(SimpleNamespace):
+    """Signals between the blocks in a step, SI, by their names in :mod:`hsv.model.signals`; each block writes its own.
 
-    The attributes except step, period and stamp are the signals of :mod:`hsv.model.signals`.
+    Further attributes are the step, its control period T (s), and its simulated time in messages.
     """
 
     step = -1
     """Step k; -1 before the first step"""
-    period: float
-    """Control period T, s"""
-    stamp: tuple[int, int] = (0, 0)
+    stamp = 0, 0
     """Simulated time in the messages of the step: seconds and nanoseconds"""
-
-    state: np.ndarray
-    """True state x (9)"""
     status = 0
     """:class:`hsv.model.plant.FlightStatus` of the state"""
-    forces: tuple[float, float, float, float, float]
-    """Lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa"""
-    effector: np.ndarray
-    """Positions of the effectors (2)"""
-    air: np.ndarray
-    """Forward and upward wind (m/s) and relative density (3) over the previous period"""
-    measurement: np.ndarray
-    """Measured state (9)"""
-
-    estimate: np.ndarray
-    """State for feedback (9): the measurement, or the estimate if an estimator is enabled"""
-    filtered_pitch_rate: float
-    """q_f, rad/s"""
-    filter_state: np.ndarray
-    """State s (2 sections) of the notch filter before its update"""
-
-    reference: np.ndarray
-    """x_r (9)"""
-    reference_input: np.ndarray
-    """u_r (2)"""
-    deviation: np.ndarray
-    """x_n (9)"""
-    nominal_input: np.ndarray
-    """u_n (2)"""
-    gain: np.ndarray
-    """K (2, 9) if it was computed in flight, else empty"""
-    gain_index: int
-    """Index of the nested gain, 0 for the outermost ellipsoid"""
-    nominal_status: int
-    """:class:`hsv.control.nominal_law.NominalStatus`"""
-
-    command: np.ndarray = np.zeros(N_INPUTS)
+    command = np.zeros(N_INPUTS)
     """Input u (2); until the controller has been stepped, that of the previous step (zero before step 0)"""
-    saturated: np.ndarray
-    """Mask (2) of the inputs changed by the limits"""
-    diagnostics: ControllerResult
-    """Complete result of the controller"""
-    actuator: np.ndarray
-    """Input of the actuators (2): the command after link and faults"""
-    active_faults: tuple[ActiveFault, ...]
-    """Active faults of the step"""
 
 
 @dataclass(frozen=True)

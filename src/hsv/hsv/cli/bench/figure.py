@@ -1,12 +1,29 @@
-"""A figure of the bench: two sides of the same work, measured alternately, and their ratio."""
+"""A figure of the bench: two sides of the same work, measured alternately, their ratio, and its change since a run."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
+
+from hsv.base.errors import DocumentError, QuantityError
+from hsv.base.files import parse_json, read_text
+
+RESOLUTION = 0.05
+"""Largest relative change that the same commit shows from run to run on an idle machine."""
+
+
+class Recorded(NamedTuple):
+    """A figure of a recorded run: its group, ratio, and the 10th and 90th percentile of the ratios."""
+
+    group: str
+    ratio: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -38,6 +55,20 @@ class Figure:
         limit = f"at most {self.limit:g}"
         return f"{limit}, as promised" if self.ratio <= self.limit else f"WORSE than the limit, {limit}"
 
+    def as_dict(self, group: str) -> dict[str, Any]:
+        """Return the figure with all samples for the JSON that :func:`read_run` reads."""
+        judged = {"ratio": self.ratio, "spread": self.spread, "verdict": self.verdict}
+        return {**asdict(self), "group": group, **judged}
+
+    def slower(self, before: Recorded) -> float:
+        """Return the relative change since a recorded run, positive if the figure became slower.
+
+        It is zero up to :data:`RESOLUTION`, and where the percentiles overlap.
+        """
+        low, high = self.spread
+        change = self.ratio / before.ratio - 1.0
+        return change if abs(change) > RESOLUTION and (low > before.high or high < before.low) else 0.0
+
 
 def interleaved(
     ours: Callable[[], object],
@@ -65,3 +96,22 @@ def readable(seconds: float) -> str:
     """Return a time with three digits, in s, ms or us."""
     scale, unit = (1.0, "s") if seconds >= 1.0 else (1e3, "ms") if seconds >= 1e-3 else (1e6, "us")
     return f"{scale * seconds:.3g} {unit}"
+
+
+def read_run(path: Path) -> tuple[str, Mapping[str, Recorded]]:
+    """Return the commit of a run that ``hsv bench --json`` printed to a file, and its figures by name.
+
+    Raises:
+        QuantityError: It cannot be read, or is no such output.
+    """
+    try:
+        run = parse_json(read_text(path))
+        figures = {
+            str(figure["name"]): Recorded(str(figure["group"]), float(figure["ratio"]), *map(float, figure["spread"]))
+            for figure in run["figures"]
+        }
+        if not all(figure.ratio > 0.0 for figure in figures.values()):
+            raise ValueError("a ratio that is not positive")
+        return str(run["commit"]), figures
+    except (DocumentError, KeyError, TypeError, ValueError) as error:
+        raise QuantityError(f"compare = {str(path)!r}: {error}, expected the output of hsv bench --json") from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import platform
 import resource
 import shutil
 import subprocess
@@ -51,6 +52,14 @@ def groups(scale: float = 1.0) -> dict[str, Callable[[], list[Figure]]]:
         "graph": lambda: against_ring(times(5)),
         "montecarlo": lambda: corners(times(3), max(os.cpu_count() or 1, 2)),
     }
+
+
+def machine() -> str:
+    """Return processor, cores, system, Python and the load of the machine, in one line."""
+    info = Path("/proc/cpuinfo").read_text().splitlines()
+    models = [line.partition(": ")[2] for line in info if line.startswith("model name")]
+    system = f"{platform.system()}, Python {platform.python_version()}, load average {os.getloadavg()[0]:.1f}"
+    return f"{[*models, platform.machine()][0]}, {os.cpu_count()} cores, {system}"
 
 
 def c_flight(components: Components) -> Callable[[], History]:

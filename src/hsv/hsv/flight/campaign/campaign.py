@@ -17,9 +17,10 @@ import tomli_w
 from hsv.base.errors import CampaignError, one_of
 from hsv.base.files import parse_json
 from hsv.base.units import percent, rounded, written
+from hsv.control.design import design_of
 from hsv.control.library import library_digest
 from hsv.core.arithmetic import SEED_PARAMETER
-from hsv.flight.assembly import assemble, blamed_on, design_parameters, scenario_parameters
+from hsv.flight.assembly import assemble_flight, blamed_on, design_parameters
 from hsv.flight.campaign.run import Batch
 from hsv.flight.distribution import KINDS, Distribution
 from hsv.flight.scenario import Scenario, scenario_at_means, scenario_table, scenario_text, set_field
@@ -302,9 +303,7 @@ def _check_ends(campaign: Campaign) -> None:
     """Refuse factors that the scenario does not admit at their ends, all at once or one by one, the others half-way."""
     low, high, mean = ([getattr(f, end) for f in campaign.factors] for end in ("low", "high", "middle"))
     for ends in (low, high):
-        flown = campaign.flown(0, ends)
-        with blamed_on(flown):
-            assemble({**campaign.design, **scenario_parameters(flown)})
+        assemble_flight(campaign.flown(0, ends), design_of(campaign.design))
         for index, value in enumerate(ends):
             campaign.flown(0, [*mean[:index], value, *mean[index + 1 :]])
 

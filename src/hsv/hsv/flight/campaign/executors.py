@@ -6,7 +6,6 @@ import asyncio
 import logging
 import multiprocessing
 import os
-import pickle
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Iterator
@@ -115,14 +114,13 @@ class _PoolExecutor(Executor, ABC):
 
     def _alone(self, job: Job, text: str, batch: int, label: Callable[[int], str]) -> bytes:
         """Return the result of a batch that is flown with no other batch in flight."""
-        for _ in range(2):  # the first time, it may have been a process that had nothing to do
-            future = self._submit(job, text, batch)
-            try:
-                self._first({future: batch}, label)
-                return self._result(future)
-            except BrokenProcessPool:
-                self._renew()
-        raise RunError(f"campaign: {label(batch)}: the worker process ended; {_KEPT}")
+        future = self._submit(job, text, batch)
+        try:
+            self._first({future: batch}, label)
+            return self._result(future)
+        except BrokenProcessPool as error:
+            self._renew()
+            raise RunError(f"campaign: {label(batch)}: the worker process ended; {_KEPT}") from error
 
     def _first(self, flying: dict[Future[bytes], int], label: Callable[[int], str]) -> Collection[Future[bytes]]:
         """Wait for the first results, and return their futures."""
@@ -220,23 +218,8 @@ class ProcessExecutor(_PoolExecutor):
 def _to_file(folder: str, job: Job, text: str, batch: int) -> bytes:
     """Fly a batch, and return the path of the file with its result."""
     path = Path(folder, str(batch))
-    path.write_bytes(_portably(job, text, batch))
+    path.write_bytes(job(text, batch))
     return bytes(path)
-
-
-def _portably(job: Job, text: str, batch: int) -> bytes:
-    """Fly a batch; an exception that cannot be unpickled again is replaced by one that can."""
-    failure: Exception
-    try:
-        return job(text, batch)
-    except Exception as error:
-        failure = error
-    try:
-        pickle.loads(pickle.dumps(failure))
-    except Exception:
-        failure = RunError(f"{type(failure).__name__}: {failure}")
-    # Raised here, it has no context: tblib, which Dask installs, would pickle that, too.
-    raise failure
 
 
 def _is_stopped(pid: int | None) -> bool:
@@ -347,23 +330,13 @@ def _connected(address: str, notice: Notice) -> Iterator[Any]:
             raise silent from error
         if not client.nthreads():
             notice("waiting for the scheduler's workers")
-        if not _in_time(client.nthreads, WORKERS):
-            raise CampaignError(f"scheduler = {address!r}: no workers after {WORKERS:g} s, expected one at least")
+        try:
+            client.wait_for_workers(1, WORKERS)
+        except TimeoutError as error:
+            raise CampaignError(
+                f"scheduler = {address!r}: no workers after {WORKERS:g} s, expected one at least"
+            ) from error
         yield client
-
-
-def _in_time(done: Callable[[], Any], limit: float, notice: Callable[[], None] = lambda: None) -> bool:
-    """Wait until something is done; return whether it was within ``limit`` (s), and call ``notice`` if it is slow."""
-    start, noticed = time.monotonic(), False
-    while not done():
-        waited = time.monotonic() - start
-        if waited > limit:
-            return False
-        if waited > NOTICE and not noticed:
-            noticed = True
-            notice()
-        time.sleep(min(_LOOK, limit))
-    return True
 
 
 async def _answers(address: str, waiting: Callable[[], None]) -> bool:
@@ -404,7 +377,9 @@ def _check_workers(client: Any, address: str, notice: Notice) -> None:
     pool = ThreadPoolExecutor(1)
     answers = pool.submit(client.run, worker_program, on_error="return")
     pool.shutdown(wait=False)
-    if not _in_time(answers.done, WORKERS, partial(notice, "waiting for the answers of all workers")):
+    if not wait([answers], NOTICE).done:
+        notice("waiting for the answers of all workers")
+    if not wait([answers], WORKERS - NOTICE).done:
         raise CampaignError(f"scheduler = {address!r}: a worker does not answer, expected {program()} on each")
     for worker, answer in sorted(answers.result().items()):
         if answer == program():

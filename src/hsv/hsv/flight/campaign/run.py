@@ -1,4 +1,4 @@
-"""The engine of campaigns: it flies the missing batches, stores their results, and estimates the remaining time."""
+"""The engine of campaigns: it flies the missing batches and stores their results."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -22,36 +21,25 @@ class Batch(NamedTuple):
     label: str
     """Name in messages"""
     flights: int
-    kind: int = 0
-    """Number of the kind of flights; those of one kind take about the same time"""
 
 
 class Plan(Protocol):
-    """The definition of a campaign."""
+    """The definition of a campaign: the text from which workers read it, and its batches."""
 
     @property
-    def text(self) -> str:
-        """The campaign as a text, from which workers read it."""
+    def text(self) -> str: ...  # noqa: D102
 
     @property
-    def batches(self) -> Sequence[Batch]:
-        """All batches."""
+    def batches(self) -> Sequence[Batch]: ...  # noqa: D102
 
 
 class Store(ABC):
-    """The place where the results of a campaign are kept, and the jobs that make them."""
+    """The place where the results of a campaign are kept, and the job that makes them."""
 
-    def __init__(self, place: Path, lock: Path, fly: Job, time: Job) -> None:
-        """Keep the results in a file or folder.
-
-        Args:
-            place: The file or folder.
-            lock: A file next to it.
-            fly: The job that flies a batch.
-            time: The job that returns how long (s, as a text) a flight takes, by the number of its kind.
-        """
+    def __init__(self, place: Path, lock: Path, fly: Job) -> None:
+        """Keep the results of the job ``fly`` in a file or folder ``place``, with the file ``lock`` next to it."""
         self._place, self._lock = place, lock
-        self.fly, self.time = fly, time
+        self.fly = fly
 
     @contextmanager
     def opened(self, *, restart: bool = False) -> Iterator[set[int]]:
@@ -76,33 +64,16 @@ class Store(ABC):
     def keep(self, batch: int, content: bytes) -> None:
         """Store the result of a batch atomically."""
 
-    @abstractmethod
-    def space(self, flights: int, batches: int) -> int:
-        """Return the disk space (bytes) that the results of so many batches take."""
-
-    @abstractmethod
-    def finish(self) -> None:
+    def finish(self) -> None:  # noqa: B027
         """Complete the results once all batches are there."""
 
 
-@dataclass(frozen=True)
-class Capacity:
-    """The flights that are still to be flown, and their cost: wall time (s) on ``cores``, and bytes on the disk."""
+class Flown(NamedTuple):
+    """The flights and batches that a run has flown, and the time (s) that it took."""
 
     flights: int
-    cores: int
+    batches: int
     wall_time: float
-    bytes: int
-
-
-@dataclass(frozen=True)
-class Flown:
-    """The flights and batches that a run has flown, the time (s) that it took, and the expected time."""
-
-    flights: int = 0
-    batches: int = 0
-    wall_time: float = 0.0
-    expected: float = 0.0
 
 
 def run_campaign(
@@ -111,7 +82,6 @@ def run_campaign(
     executor: Executor,
     *,
     restart: bool = False,
-    expect: Callable[[Capacity], None] = lambda capacity: None,
     progress: Callable[[int], None] = lambda flights: None,
 ) -> Flown:
     """Fly the missing flights of a campaign.
@@ -121,7 +91,6 @@ def run_campaign(
         store: Keeps the results; batches that are there already are not flown again.
         executor: Flies the batches.
         restart: Whether to discard existing results first.
-        expect: Called once, before the first batch, with the capacity that the run needs.
         progress: Called with the number of finished flights, those found at the start included.
 
     Raises:
@@ -131,11 +100,7 @@ def run_campaign(
     with store.opened(restart=restart) as finished:
         batches = plan.batches
         missing = [number for number in range(len(batches)) if number not in finished]
-        done = sum(batches[number].flights for number in finished)
-        needed = Capacity(0, executor.cores, 0.0, 0)
-        if missing:
-            needed = capacity(plan, store, executor, missing)
-            expect(needed)
+        found = done = sum(batches[number].flights for number in finished)
         progress(done)
         started = time.perf_counter()
         for number, content in executor.fly(store.fly, plan.text, missing, lambda number: batches[number].label):
@@ -143,23 +108,7 @@ def run_campaign(
             done += batches[number].flights
             progress(done)
         store.finish()
-        return Flown(needed.flights, len(missing), time.perf_counter() - started, needed.wall_time)
-
-
-def capacity(plan: Plan, store: Store, executor: Executor, missing: Sequence[int]) -> Capacity:
-    """Return the capacity that the ``missing`` batches need, from flights that are timed on all cores at once."""
-    cores, left = max(executor.cores, 1), [plan.batches[number] for number in missing]
-    kinds = sorted({batch.kind for batch in left})
-    spent: dict[int, list[float]] = {kind: [] for kind in kinds}
-    # All cores fly: what they take from each other, and other work from them, is in the measurement.
-    timed = [kinds[index % len(kinds)] for index in range(max(cores, len(kinds)))]
-    for kind, content in executor.fly(store.time, plan.text, timed):
-        spent[kind].append(float(content))
-    seconds = {kind: sum(times) / len(times) for kind, times in spent.items()}
-    wall_time = sum(batch.flights * seconds[batch.kind] for batch in left) / cores
-    longest = max(batch.flights * seconds[batch.kind] for batch in left)
-    flights = sum(batch.flights for batch in left)
-    return Capacity(flights, cores, max(wall_time, longest), store.space(flights, len(left)))
+        return Flown(done - found, len(missing), time.perf_counter() - started)
 
 
 @contextmanager

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from copy import copy
-from dataclasses import replace
 from functools import lru_cache
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -18,7 +15,6 @@ from hsv.control.library import LibraryController
 from hsv.core import lanes
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
-from hsv.flight.campaign.executors import Job
 from hsv.flight.campaign.table import encode
 from hsv.flight.campaign.variants import FlightVariants
 from hsv.flight.closed_loop import Components, fly, watched
@@ -26,12 +22,6 @@ from hsv.flight.flight import Flight
 from hsv.flight.metrics import FlightCurves, FlightData, flight_metrics
 from hsv.flight.side_by_side import FlightGroup, TubeLevels
 from hsv.model.dynamics import in_model_range
-
-_LONG = 10.0
-"""Seconds from which on a flight is timed by its first steps only."""
-
-_FIRST_STEPS = 198
-"""Number of these steps. It holds as many solutions of a problem that is solved every 2 s as the rest of the flight."""
 
 Outcome = dict[str, float | bool | str | None]
 
@@ -106,12 +96,6 @@ class SampleRunner:
         """Fly the scenario itself."""
         return fly(self._variants.unchanged)
 
-    def flight_time(self) -> float:
-        """Return about how long (s) a flight takes, measured with the scenario itself."""
-        self._time(1)  # builds what the flights share
-        seconds = self._time(min(_FIRST_STEPS, self.steps))
-        return seconds if seconds > _LONG else self._time(self.steps)
-
     def level(self, flight: FlightData) -> float | None:
         """Return the largest level of a flight in the tube, None if no set holds for it."""
         return self._levels.worst(flight)
@@ -140,21 +124,6 @@ class SampleRunner:
             rows.append({"flight": flight, "seed": int(seed), **drawn, **self.outcome(flown)})
         return encode(self.campaign, rows, envelope)
 
-    def _time(self, steps: int) -> float:
-        parts = self._variants.unchanged
-        plant = copy(parts.plant)
-        plant.steps = steps
-        pieces = [replace(parts, plant=plant)] * lanes()
-        started = time.perf_counter()
-        if FlightGroup.takes([parts] * lanes()):
-            for flight, _ in self._group.fly(pieces, self._levels.set):
-                _ = flight.metrics, flight.fingerprint
-            seconds = (time.perf_counter() - started) / len(pieces)
-        else:
-            fly(pieces[0]).data()
-            seconds = time.perf_counter() - started
-        return seconds * self.steps / steps
-
     def _read_alone(self, components: Components) -> FlightReading | ControllerError:
         try:
             flight = fly(components)
@@ -182,34 +151,17 @@ def sample_runner(text: str) -> SampleRunner:
 
 
 def fly_batch(text: str, batch: int) -> bytes:
-    """Fly a batch of the campaign written in ``text``, see :meth:`SampleRunner.fly_batch`."""
-    return _in_library_process(_fly_batch, text, batch)
+    """Fly a batch of the campaign written in ``text``, see :meth:`SampleRunner.fly_batch`.
 
-
-def time_flight(text: str, kind: int) -> bytes:
-    """Return about how long (s, as a text) a flight of the campaign written in ``text`` takes."""
-    return _in_library_process(_time_flight, text, kind)
-
-
-def _fly_batch(text: str, batch: int) -> bytes:
-    return sample_runner(text).fly_batch(batch)
-
-
-def _time_flight(text: str, kind: int) -> bytes:
-    try:
-        return repr(sample_runner(text).flight_time()).encode()
-    except ControllerError:  # which the rows of the flights tell
-        return b"0.0"
-
-
-def _in_library_process(job: Job, text: str, number: int) -> bytes:
-    """Run ``job``, in the child process of the controller's library if there is one.
-
-    If the library crashes, the flights are flown again, each with a child process of its own.
+    The flights run in the child process of the controller's library if there is one. If the library crashes, they are
+    flown again, each with a child process of its own.
     """
     runner = sample_runner(text)
     if isinstance(runner.controller, LibraryController):
         with suppress(ControllerError), watched(runner.controller, runner.steps + 1) as (_, request):
-            result: Any = request("call", job, text, number)
-            return bytes(result)
-    return job(text, number)
+            return bytes(request("call", _fly_batch, text, batch))
+    return _fly_batch(text, batch)
+
+
+def _fly_batch(text: str, batch: int) -> bytes:
+    return sample_runner(text).fly_batch(batch)

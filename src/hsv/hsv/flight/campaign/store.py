@@ -15,7 +15,7 @@ from hsv.base.files import open_regular, read_text
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
 from hsv.flight.campaign.run import Store, replace_file, write_whole, writing
-from hsv.flight.campaign.sample_runner import fly_batch, time_flight
+from hsv.flight.campaign.sample_runner import fly_batch
 from hsv.flight.campaign.table import CAMPAIGN, DIGEST, ENVELOPE, WRITTEN, schema
 
 _CAMPAIGN_FILE = "campaign.json"
@@ -28,7 +28,7 @@ class ResultStore(Store):
     """The store of the batches of one campaign; a stored batch is complete even if the process is killed."""
 
     def __init__(self, out: Path, campaign: Campaign) -> None:
-        super().__init__(out, out.with_name(out.name + ".lock"), fly_batch, time_flight)
+        super().__init__(out, out.with_name(out.name + ".lock"), fly_batch)
         self.out = out
         self.folder = out.with_name(out.name + ".parts")
         self._campaign = campaign
@@ -75,12 +75,6 @@ class ResultStore(Store):
                 writer.add_key_value_metadata(kept | {DIGEST: result_digest(kept)})
             replace_file(temporary, self.out)
         shutil.rmtree(self.folder)
-
-    def space(self, flights: int, batches: int) -> int:
-        """Return the disk space (bytes) of so many batches and of the result, before compression."""
-        row, envelope = 8 * len(schema(self._campaign)), len(Envelope.empty().encode())
-        # A batch has its envelope twice, the second time in the schema, in base 64.
-        return flights * row + round(batches * envelope * (1.0 + 4.0 / 3.0)) + self._campaign.samples * row + envelope
 
     def _describe(self) -> None:
         described = self.folder / _CAMPAIGN_FILE

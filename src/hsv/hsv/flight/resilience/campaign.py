@@ -27,9 +27,6 @@ CONTROLLERS = ("case1", "case2", "case1_qp", "case1_integral_heavy", "case1_rmpc
 _EVERY = 8
 """Stride in the list of screening corners; it selects two corners and their mirror images."""
 
-BISECTION = 5
-"""Expected number of flights of a bisection, for the estimate of a campaign's time."""
-
 
 @dataclass(frozen=True)
 class Subject:
@@ -87,8 +84,8 @@ class Case:
 
     @property
     def flights(self) -> int:
-        """Number of flights; those of the bisection are estimated."""
-        return len(TRIED[self.fault].values) * len(self.subject.vehicles) + BISECTION
+        """Number of flights, without those of the bisection."""
+        return len(TRIED[self.fault].values) * len(self.subject.vehicles)
 
     @property
     def label(self) -> str:
@@ -113,7 +110,7 @@ class ResilienceCampaign:
     @property
     def batches(self) -> list[Batch]:
         """A batch for each case."""
-        return [Batch(case.label, case.flights, case.kind) for case in self.cases]
+        return [Batch(case.label, case.flights) for case in self.cases]
 
     @cached_property
     def cases(self) -> list[Case]:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import Any
@@ -169,17 +167,6 @@ def _campaign(text: str) -> ResilienceCampaign:
 @lru_cache(maxsize=_RUNNERS)
 def _runner(text: str, subject: int, moment: Moment) -> SubjectRunner:
     return SubjectRunner(_campaign(text).subjects[subject], moment)
-
-
-def time_flight(text: str, kind: int) -> bytes:
-    """Return how long (s, as a text) a flight of a subject takes without a fault, by the subject's number."""
-    runner = _runner(text, kind, Moment.after)
-    with suppress(ControllerError):  # which the results of the flights tell
-        runner.without(0)
-    started = time.perf_counter()
-    with suppress(ControllerError):
-        runner.fly(0)
-    return repr(time.perf_counter() - started).encode()
 
 
 def fly_case(text: str, number: int) -> bytes:

@@ -7,11 +7,8 @@ from pathlib import Path
 from hsv.base.files import parse_json, read_text
 from hsv.flight.campaign.run import Store, write_whole
 from hsv.flight.resilience.campaign import Case, ResilienceCampaign
-from hsv.flight.resilience.flights import Boundary, FlownFault, fly_case, time_flight
+from hsv.flight.resilience.flights import Boundary, FlownFault, fly_case
 from hsv.flight.sources import DIGITS, code_digest, digest_of, drop_older
-
-_SPACE = 8000
-"""Disk space (bytes) of a case: its numbers and the scenarios of its worst flights"""
 
 Outcome = tuple[tuple[FlownFault, ...], Boundary]
 """Flights of a case, and the severities between which the controller is lost."""
@@ -22,7 +19,7 @@ class CaseStore(Store):
 
     def __init__(self, out: Path, campaign: ResilienceCampaign) -> None:
         self.folder = out / "cases"
-        super().__init__(self.folder, self.folder / ".lock", fly_case, time_flight)
+        super().__init__(self.folder, self.folder / ".lock", fly_case)
         self._cases = campaign.cases
         # The digest is of the code that is loaded: files may change during the flights.
         self._code = code_digest().encode()
@@ -36,13 +33,6 @@ class CaseStore(Store):
         path = self._path(self._cases[batch])
         write_whole(path, content)
         drop_older(path)
-
-    def finish(self) -> None:
-        """Do nothing: the results are the files of the cases."""
-
-    def space(self, flights: int, batches: int) -> int:
-        """Return the disk space (bytes) of a number of cases."""
-        return _SPACE * batches
 
     def read(self, case: Case) -> Outcome | None:
         """Return the results of a case, None if it was not flown or its file is damaged."""
