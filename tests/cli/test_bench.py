@@ -6,8 +6,7 @@ import pytest
 from ros_domain import own_domain
 
 from hsv.base.errors import RunError
-from hsv.cli.bench.figure import Figure, read_run
-from hsv.cli.bench.measure import graph_lap, ring_lap
+from hsv.cli.bench import Figure, graph_lap, read_run, ring_lap
 
 
 @pytest.mark.long
@@ -84,7 +83,7 @@ def test_a_group_that_cannot_be_measured_is_named_and_is_an_error_if_asked_for(h
         raise RunError("domain 7: in use")
 
     quick = Figure("quick", "ours", "theirs", (1.0,), (2.0,), 1.0)
-    monkeypatch.setattr("hsv.cli.bench.measure.groups", lambda scale: {"quick": lambda: [quick], "graph": fails})
+    monkeypatch.setattr("hsv.cli.bench.groups", lambda scale: {"quick": lambda: [quick], "graph": fails})
     ran = hsv("bench", "--only", "graph", "--only", "quick")
     assert ran.code == 1 and "1 s against 2 s of theirs: ratio 0.5" in ran.out
     assert ran.err.splitlines()[-1] == "hsv: error: only = 'graph': not measured: domain 7: in use"

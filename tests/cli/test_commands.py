@@ -16,6 +16,7 @@ from hsv.cli.output import print_json, unit_key
 from hsv.control.design import find_design
 from hsv.flight.metrics import METRICS
 from hsv.flight.scenario import scenario_text
+from hsv.model.vehicle import load_vehicle
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference" / "case1"
 
@@ -54,6 +55,13 @@ def test_an_old_name_is_answered_in_one_line_with_the_new_one(hsv, old):
     assert ran.code == 2 and ran.out == ""
     assert ran.error == f"hsv {old} {MOVED[old]}"
     assert {*re.findall(r"hsv (\S+)", MOVED[old])} <= {*COMMANDS}
+
+
+def test_trim_and_linearise_of_another_vehicle_are_inside_its_envelope(hsv):
+    envelope = load_vehicle("winged_cone")
+    words = ("--vehicle", "winged_cone", "--json")
+    for found in (hsv("trim", *words).json, hsv("linearise", *words).json["operating_point"]):
+        assert (found["altitude_m"], found["velocity_m_per_s"]) == pytest.approx(envelope.centre)
 
 
 def test_the_damping_of_a_pole_at_the_origin_is_a_dash(hsv):

@@ -4,7 +4,7 @@ import io
 
 from hsv.base.units import UnitSystem
 from hsv.cli import output
-from hsv.cli.summary import print_section
+from hsv.cli.output import print_section
 
 NAME = "run[old] [/x] :bug:"
 

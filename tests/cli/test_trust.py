@@ -10,8 +10,8 @@ from marking import long
 from pyarrow import parquet
 from recorded_flight import record_flight
 
+from hsv.flight.campaign.sample_runner import CAMPAIGN, DIGEST
 from hsv.flight.campaign.store import result_digest
-from hsv.flight.campaign.table import CAMPAIGN, DIGEST
 from hsv.model.vehicle import vehicle_text
 
 MODULE = """

@@ -27,7 +27,6 @@ from hsv.flight.flight import Flight
 from hsv.flight.metrics import METRICS
 from hsv.flight.scenario import Scenario
 from hsv.flight.scenario import load_scenario as load
-from hsv.model.signals import PUBLISHED_ALTITUDE, PUBLISHED_VELOCITY
 from hsv.model.trim import Trim, trim_at
 from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
 
@@ -114,8 +113,8 @@ def montecarlo(
 
 
 def trim(
-    altitude: float | str = PUBLISHED_ALTITUDE,
-    velocity: float | str = PUBLISHED_VELOCITY,
+    altitude: float | str = "",
+    velocity: float | str = "",
     climb_rate: float | str = 0.0,
     acceleration: float | str = 0.0,
     *,
@@ -127,8 +126,8 @@ def trim(
     Its ``quantities`` are state and input by name, with their units.
 
     Args:
-        altitude: m, or a text with its unit.
-        velocity: m/s, or a text with its unit.
+        altitude: m, or a text with its unit; empty: the published one, or the middle of the vehicle's envelope.
+        velocity: m/s, or a text with its unit; likewise.
         climb_rate: m/s, or a text with its unit.
         acceleration: m/s^2, or a text with its unit.
         vehicle: Name or path; empty: the paper's.
@@ -137,8 +136,8 @@ def trim(
     Raises:
         QuantityError, TrimError, VehicleError: Names the argument that is wrong, or says that nothing balances there.
     """
-    parameters = load_vehicle(vehicle or DEFAULT_VEHICLE).coupled(coupling)
-    return trim_at(parameters, altitude, velocity, climb_rate, acceleration)
+    described = load_vehicle(vehicle or DEFAULT_VEHICLE)
+    return trim_at(described.coupled(coupling), *described.condition(altitude, velocity), climb_rate, acceleration)
 
 
 def plot(flights: Flight | Mapping[str, Flight], *, units: str = UnitSystem.metric) -> Figure:

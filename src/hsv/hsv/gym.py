@@ -61,10 +61,9 @@ Info = dict[str, Any]
 
 
 class _Draws:
-    """The flights of a scenario from which an episode is drawn."""
+    """The flights of a scenario from which an episode is drawn; the arguments are those of :class:`TrackEnv`."""
 
     def __init__(self, scenario: str, scale: float, factors: Factors | None) -> None:
-        """Read the scenario; the arguments are those of :class:`TrackEnv`."""
         name = Path(scenario).stem
         _, distributions = scenario_at_means(scenario_table(scenario_text(scenario), name), name)
         drawn = scale or factors or distributions
@@ -139,13 +138,10 @@ class _Episodes:
         return np.concatenate((self.history.estimate, error), 1)
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Fly a step with ``actions`` (n, 2), or begin anew where an episode is over.
+        """Fly a step with finite ``actions`` (n, 2), or begin anew where an episode is over.
 
         Returns:
             Reward, whether the episode terminates, and whether it is truncated (n each).
-
-        Raises:
-            ControllerError: An action is not finite.
         """
         if not np.isfinite(actions).all():
             raise ControllerError(f"action = {actions.tolist()}: expected finite numbers")

@@ -8,9 +8,9 @@ from pyarrow import parquet
 from hsv.base.errors import CampaignError
 from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
+from hsv.flight.campaign.sample_runner import CAMPAIGN, DIGEST
 from hsv.flight.campaign.store import ResultStore, read_result, result_digest
 from hsv.flight.campaign.summary import Results
-from hsv.flight.campaign.table import CAMPAIGN, DIGEST
 
 
 class Counting(Executor):

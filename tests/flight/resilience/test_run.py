@@ -10,7 +10,7 @@ from hsv.flight.metrics import FlightData
 from hsv.flight.resilience.campaign import plan
 from hsv.flight.resilience.faults import TRIED, Moment
 from hsv.flight.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND, Boundary, SubjectRunner, boundary, distances
-from hsv.flight.resilience.store import CaseStore
+from hsv.flight.resilience.summary import CaseStore
 from hsv.flight.sources import drop_older
 
 FAULTS = ("elevator_loss", "pitch_rate_drop_out")

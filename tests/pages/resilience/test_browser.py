@@ -7,8 +7,7 @@ from page_checks import PageChecks
 from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
 from hsv.flight.resilience.campaign import plan
-from hsv.flight.resilience.store import CaseStore
-from hsv.flight.resilience.summary import ResilienceResults
+from hsv.flight.resilience.summary import CaseStore, ResilienceResults
 from hsv.pages.resilience import write_results
 
 pytestmark = pytest.mark.viewer

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,6 +28,7 @@ from hsv.cli.output import (
     print_estimate,
     print_json,
     print_matrix,
+    print_section,
     print_table,
     print_written,
     quantity_table,
@@ -39,7 +39,6 @@ from hsv.cli.output import (
     unit_key,
     writing,
 )
-from hsv.model.signals import PUBLISHED_ALTITUDE, PUBLISHED_VELOCITY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,8 +57,10 @@ if TYPE_CHECKING:
 _DESIGN_SECONDS = {"baseline": 175.0, "adjustable": 294.0}
 """Measured time of these two designs, with 1025 flights each."""
 
-AltitudeOption = Annotated[str, Option(help="Altitude with unit, e.g. '85500 ft'.")]
-VelocityOption = Annotated[str, Option(help="Velocity with unit, e.g. '7900 ft/s'.")]
+AltitudeOption = Annotated[
+    str, Option(help="Altitude with unit, e.g. '85500 ft'; default: a published point, or the envelope's middle.")
+]
+VelocityOption = Annotated[str, Option(help="Velocity with unit, e.g. '7900 ft/s'; default likewise.")]
 CouplingOption = Annotated[
     str, Option(help="Inertial coupling: a set of the vehicle, or a multiple of derived, as 0.65.")
 ]
@@ -83,8 +84,8 @@ HALF_WIDTHS = {
 
 
 def trim(
-    altitude: AltitudeOption = PUBLISHED_ALTITUDE,
-    velocity: VelocityOption = PUBLISHED_VELOCITY,
+    altitude: AltitudeOption = "",
+    velocity: VelocityOption = "",
     climb_rate: Annotated[str, Option(help="Climb rate with unit, e.g. '10 ft/s'.")] = "0 m/s",
     acceleration: Annotated[str, Option(help="Acceleration with unit, e.g. '4 ft/s^2'.")] = "0 m/s^2",
     vehicle: VehicleOption = "",
@@ -100,8 +101,9 @@ def trim(
     from hsv.model.trim import trim_at
     from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
 
-    parameters = load_vehicle(vehicle or DEFAULT_VEHICLE).coupled(coupling)
-    found = trim_at(parameters, altitude, velocity, climb_rate, acceleration)
+    described = load_vehicle(vehicle or DEFAULT_VEHICLE)
+    parameters = described.coupled(coupling)
+    found = trim_at(parameters, *described.condition(altitude, velocity), climb_rate, acceleration)
     units_of_forces = {"lift": "N", "drag": "N", "thrust": "N", "pitching_moment": "N m", "dynamic_pressure": "Pa"}
     acting = zip(units_of_forces.items(), forces(found.state, found.input, parameters), strict=True)
     quantities = found.quantities | {name: (value, unit) for (name, unit), value in acting}
@@ -112,8 +114,8 @@ def trim(
 
 
 def linearise(
-    altitude: AltitudeOption = PUBLISHED_ALTITUDE,
-    velocity: VelocityOption = PUBLISHED_VELOCITY,
+    altitude: AltitudeOption = "",
+    velocity: VelocityOption = "",
     vehicle: VehicleOption = "",
     coupling: CouplingOption = "",
     model: Annotated[str, Option(help="Model: coupled (CM), decoupled (DM), with notch filter (ECM).")] = "CM",
@@ -266,11 +268,8 @@ def design(
         compared = {"compared_sets": [row.as_dict() for row in rows]} if rows else {}
         print_json(result.report | compared | {"file": str(target)})
         return
-    if inputs.adjustable:
-        console.print(_steps(result.report, units))
-    else:
-        _summary(result.report)
-    say(f"written              {target}, {certificate_path(target).name}")
+    _summary(result.report)
+    say(f"written {target}, {certificate_path(target).name}")
     if rows:
         title = "Invariant sets: half-widths about the centre"
         sets = [(row.name, _half_widths(row.half_width, row.feedback, row.size)) for row in rows]
@@ -312,62 +311,20 @@ def _check(shipped: Subject, found: ControlDesign, json: bool) -> None:
 
 
 def _summary(report: dict[str, Any]) -> None:
-    feedback, tube = report["feedback"], report["tube"]
-    say(
-        f"vertices             {report['vertices']}",
-        f"spectral radius A+BF {max(feedback['spectral_radii']):.6f} (rigid states, worst vertex)",
-        f"(24) eigenvalue      {min(feedback['lmi_smallest_eigenvalues']):.3g} (least over the vertices)",
-        f"nominal gains        {len(report['nominal'])}",
-        f"invariant set        {tube['invariant_set']['kind']}, certified at every vertex",
-    )
-    level = tube["flights"]["worst_level"]
-    if level is not None:
-        say(f"worst level          {level:.3f} (of 1, over {tube['flights']['flights']} flights)")
-
-
-def _steps(report: dict[str, Any], units: UnitSystem) -> Table:
-    """Return the seven steps of Algorithm 1 with their results."""
-    import numpy as np
-
-    from hsv.control.design import compact
-    from hsv.model.signals import STATE_UNITS
-
-    feedback, tube, adjustable = report["feedback"], report["tube"], report["adjustable"]
-    accuracy, model = report["model"]["accuracy"], report["model"]
-    sections = ", ".join(f"{section['zero_frequency']:g} rad/s" for section in report["inputs"]["notch"])
-    half_widths = zip(tube["invariant_set"]["half_width"], STATE_UNITS, strict=False)  # of the rigid states only
-    sizes = [in_words(value, unit, units) for value, unit in half_widths]
-    fuel, elevator = adjustable["input_bound"]
-    bounds = f"{in_words(fuel, '1', units)}, {in_words(elevator, 'rad', units)}"
-    beyond = adjustable["complete_fault"]
-    parts = adjustable["full_state"]["largest_real_part"]
-    least = np.array(adjustable["tau"])
-    tau = ", ".join(f"{value:g}" for value in compact(least))
-    span = f"{tau} to 1" if least.min() < 1.0 else tau
-    rows = {
-        "notch filter": f"centre {sections}",
-        "extended states coupling model": f"{9 + 2 * len(report['inputs']['notch'])} states, the filter's among them",
-        "co-designed polytopic model": f"{' x '.join(str(n) for n in model['vertices'])} vertices, Bode within "
-        f"{significant(accuracy['bode_magnitude_error_db'])} dB, "
-        f"{in_words(radians(accuracy['bode_phase_error_deg']), 'rad', units)}",
-        "feedback gain F'": f"spectral radius {max(feedback['spectral_radii']):.5f}; one Lyapunov function for tau "
-        f"{span}, whole fault",
-        "adjustable factor tau, set Z'": f"tau {tau}; {', '.join(sizes)}",
-        "nominal gain K'": f"{len(report['nominal'])} gains, |u_n| at most {bounds}",
-        "control law u'": f"worst level {tube['flights']['worst_level']:.3f} of 1 in W', "
-        f"{beyond['worst_level']:.3f} with the whole fault, {beyond['flights']} flights each",
+    """Print the numbers by which a design is judged; those of Algorithm 1 where its factor is adjustable."""
+    feedback, tube, flights = report["feedback"], report["tube"], report["tube"]["flights"]
+    lines = {
+        "vertices": report["vertices"],
+        "feedback gain": f"spectral radius of A + BF at most {max(feedback['spectral_radii']):.6f} (rigid states)",
+        "(24)": f"least eigenvalue {min(feedback['lmi_smallest_eigenvalues']):.3g}",
+        "nominal gains": len(report["nominal"]),
+        "invariant set": f"{tube['invariant_set']['kind']}, certified at every vertex",
+        "worst level": f"{flights['worst_level']:.3f} of 1, in {flights['flights']} flights",
     }
-    table = new_table("step", "name", "value", title="Algorithm 1", head=False)
-    for number, (name, value) in enumerate(rows.items(), 1):
-        table.add_row(f"({number})", name, value)
-        if number == 4:
-            table.add_row(
-                "",
-                "",
-                f"full-state F' would cancel the notch: rightmost pole {parts['full_state']['derived']:+.2f} / s "
-                f"with derived coupling, {parts['structured']['derived']:+.2f} / s as designed",
-            )
-    return table
+    if adjustable := report.get("adjustable"):
+        whole, tau = adjustable["complete_fault"], ", ".join(f"{value:g}" for value in adjustable["tau"])
+        lines["factor tau"] = f"from {tau}; worst level {whole['worst_level']:.3f} of 1 with the whole fault"
+    print_section("design", lines)
 
 
 def verify(

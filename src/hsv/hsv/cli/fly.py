@@ -236,13 +236,8 @@ def prepare(
                 "folder": str(target),
                 "parameter_files": [str(path) for path in prepared.parameter_files],
                 "nodes": [
-                    {
-                        "name": node.name,
-                        "package": node.package,
-                        "executable": node.executable,
-                        "ends_run": node is nodes[-1],
-                        "in_flight": node is not LIVE,
-                    }
+                    {name: getattr(node, name) for name in ("name", "package", "executable")}
+                    | {"ends_run": node is nodes[-1], "in_flight": node is not LIVE}
                     for node in nodes
                 ],
                 "landed_exit_codes": LANDED,
@@ -275,7 +270,6 @@ def conclude(
 
 
 def _live_port(live: bool, port: int | None) -> int | None:
-    """Return the port of the live view, ``None`` without one."""
     if port is not None and not live:
         raise ParameterError(f"live-port = {port}: expected with --live only")
     return (8765 if port is None else port) if live else None
@@ -291,12 +285,7 @@ def _conclude(
     every: bool = False,
     wall_time: float | None = None,
 ) -> None:
-    """Print the summary of the flight in a closed ``bag``, and write its report into the bag's folder.
-
-    Raises:
-        RecordingError: The bag holds no flight with its scenario, or the report cannot be written.
-        RunError: The flight diverged or was broken off; the summary is printed before.
-    """
+    """Print the summary of the flight in a closed ``bag``, and write its report into the bag's folder."""
     from hsv.bags.flight import flight_data
     from hsv.bags.info import describe
     from hsv.bags.reader import Bag
@@ -407,9 +396,15 @@ def fly(
         if corners and value is not None:
             raise CampaignError(f"{name} = {value}: expected no --{name} with --corners, which defines the flights")
     method = "corners" if corners else (sampling or Sampling.uniform).value
-    factors = dict(map(_factor, factor or ()))
-    if len(factors) < len(factor or ()):
-        raise CampaignError(f"factor = {factor}: a field is given twice, expected once")
+    factors: dict[str, tuple[object, object]] = {}
+    for text in factor or ():
+        field, ends = (part.strip() for part in text.partition("=")[::2])
+        low, dots, high = ends.partition("..")
+        if not dots:
+            raise CampaignError(f"factor = {text!r}: expected FIELD=LEAST..LARGEST")
+        if field in factors:
+            raise CampaignError(f"factor = {text!r}: a field is given twice, expected once")
+        factors[field] = low.strip(), high.strip()
     count = _SAMPLES if samples is None else samples
     campaign = plan(scenario, method=method, samples=count, seed=seed, scale=scale, commit=commit(), factors=factors)
     if out is None:
@@ -466,8 +461,8 @@ def replay(
     Example: hsv montecarlo replay campaigns/case1_corners.parquet --flight 17 --over-dds
     """
     from hsv.cli.summary import sample_words
+    from hsv.flight.campaign.sample_runner import OUTCOMES
     from hsv.flight.campaign.summary import Results
-    from hsv.flight.campaign.table import OUTCOMES
     from hsv.graph.campaign_replay import replay_in_process, replay_over_dds
 
     if bag and not over_dds:
@@ -542,15 +537,6 @@ def scenario(
     print(text, end="")
 
 
-def _factor(text: str) -> tuple[str, tuple[str, str]]:
-    """Return field, minimum and maximum of a factor from its text."""
-    field, _, ends = text.partition("=")
-    low, dots, high = ends.partition("..")
-    if not dots:
-        raise CampaignError(f"factor = {text!r}: expected FIELD=LEAST..LARGEST")
-    return field.strip(), (low.strip(), high.strip())
-
-
 def resilience(
     controllers: Annotated[str, Option(help="Scenarios, separated by commas; default: Tube-MPC, robust MPC.")] = "",
     faults: Annotated[str, Option(help="Faults (see --list) or their types, with commas between; default: all.")] = "",
@@ -571,14 +557,16 @@ def resilience(
     from hsv.flight.campaign.run import run_campaign
     from hsv.flight.resilience.campaign import CONTROLLERS, plan
     from hsv.flight.resilience.faults import TRIED
-    from hsv.flight.resilience.store import CaseStore
-    from hsv.flight.resilience.summary import ResilienceResults, parameter_words
+    from hsv.flight.resilience.summary import CaseStore, ResilienceResults, parameter_words
     from hsv.pages.resilience import write_results
 
     if listed:
         print_titles({name: parameter_words(name) for name in TRIED}, json)
         return
-    campaign = plan(_names(controllers) or CONTROLLERS, _tried(faults) or tuple(TRIED))
+    scenarios, kinds = ([name.strip() for name in text.split(",") if text] for text in (controllers, faults))
+    # A type of hsv list faults stands for all faults of this type.
+    tried = [[fault for fault, each in TRIED.items() if each.kind == kind] or [kind] for kind in kinds]
+    campaign = plan(scenarios or CONTROLLERS, tuple(dict.fromkeys(chain.from_iterable(tried))) or tuple(TRIED))
     check_folder(out, "out")
     store = CaseStore(out, campaign)
     with (
@@ -606,30 +594,15 @@ def resilience(
         raise RunError(f"all {len(crashes)} flights crashed, the first: {crashes[0]}")
 
 
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in text.split(",")) if text else ()
-
-
-def _tried(text: str) -> tuple[str, ...]:
-    """Return the faults to try; a type of ``hsv list faults`` stands for all faults of this type."""
-    from hsv.flight.resilience.faults import TRIED
-
-    named = [[fault for fault, tried in TRIED.items() if tried.kind == name] or [name] for name in _names(text)]
-    return tuple(dict.fromkeys(chain.from_iterable(named)))
-
-
 def _cells(results: ResilienceResults) -> list[dict[str, Any]]:
     from hsv.flight.resilience.faults import TRIED
     from hsv.pages.resilience import flight_file
 
     found = []
     for (fault, controller), square in results.squares.items():
+        tried = TRIED[fault]
         for moment, cells in square.cells.items():
             ends = square.boundaries[moment]
-            values = {
-                name: None if end is None else TRIED[fault].value(end)
-                for name, end in (("largest_survived", ends.survived), ("least_lost", ends.lost))
-            }
             found += [
                 {
                     "controller": controller,
@@ -637,7 +610,7 @@ def _cells(results: ResilienceResults) -> list[dict[str, Any]]:
                     "time": moment.name,
                     "severity": cell.severity,
                     "value": cell.flights[0].value,
-                    "unit": TRIED[fault].unit,
+                    "unit": tried.unit,
                     "survived": cell.survived,
                     "flights": len(cell.flights),
                     "attitude_rad": cell.attitude,
@@ -645,7 +618,8 @@ def _cells(results: ResilienceResults) -> list[dict[str, Any]]:
                     "recovery_time_s": cell.recovery_time,
                     "time_to_loss_s": cell.time_to_loss,
                     "worst_flight": flight_file(cell),
-                    **values,
+                    "largest_survived": None if ends.survived is None else tried.value(ends.survived),
+                    "least_lost": None if ends.lost is None else tried.value(ends.lost),
                 }
                 for cell in cells
             ]

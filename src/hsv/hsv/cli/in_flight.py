@@ -107,10 +107,16 @@ def command(
     Example: hsv command "86000 ft" "8100 ft/s" --blend "4 s"
     """
     from hsv.bags.description import SET_COMMAND_CLIENT
+    from hsv.base.units import parse_quantity
 
-    point = _si(altitude, "m", "altitude"), _si(velocity, "m/s", "velocity")
-    options = ["--duration", _si(duration, "s", "duration"), "--blend", _si(blend, "s", "blend")]
-    _become(SET_COMMAND_CLIENT, "command", options, point, namespace, json)
+    given = (
+        (altitude, "m", "altitude"),
+        (velocity, "m/s", "velocity"),
+        (duration, "s", "duration"),
+        (blend, "s", "blend"),
+    )
+    *point, length, half = (repr(parse_quantity(*each)) for each in given)
+    _become(SET_COMMAND_CLIENT, "command", ["--duration", length, "--blend", half], point, namespace, json)
 
 
 def watch(
@@ -150,23 +156,13 @@ def topic(
     _become(TOPIC, "topic", options, filter(None, [name]), namespace, json)
 
 
-def _si(text: str, unit: str, name: str) -> str:
-    """Return a quantity in words as a number in an SI unit, with all digits."""
-    from hsv.base.units import parse_quantity
-
-    return repr(parse_quantity(text, unit, name))
-
-
 def _become(
     node: NodeDescription, command: str, options: Sequence[str], values: Iterable[str], namespace: str, json: bool
 ) -> NoReturn:
-    """Run the client ``node`` of ``hsv COMMAND`` in place of this process.
-
-    A client with commands of its own has them at the head of ``options``. The positional ``values`` follow a double
-    dash, because some begin with a dash themselves, as negative numbers do.
-    """
+    """Run the client ``node`` of ``hsv COMMAND`` in place of this process; a command of its own heads ``options``."""
     from hsv.graph.launcher import become
 
     words = ["--prog", f"hsv {command}", *(["--json"] if json else []), *options]
     values = list(values)
+    # Some values begin with a dash themselves, as negative numbers do.
     become(node, [*words, *(["--", *values] if values else [])], namespace)

@@ -32,7 +32,7 @@ from hsv.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from hsv.cli.bench.figure import Figure
+    from hsv.cli.bench import Figure
 
 
 class Kind(StrEnum):
@@ -85,10 +85,7 @@ def _list_scenarios(name: str, json: bool) -> None:
     text, stem = scenario_text(name), Path(name).stem
     table = scenario_table(text, stem)
     scenario_at_means(table, stem)
-    if json:
-        print_json(table)
-    else:
-        print(text, end="")
+    print_json(table) if json else print(text, end="")
 
 
 def _list_vehicles(name: str, json: bool) -> None:
@@ -266,8 +263,7 @@ def bench(
 
     Example: hsv bench --only in_process --only startup
     """
-    from hsv.cli.bench.figure import read_run
-    from hsv.cli.bench.measure import groups, machine
+    from hsv.cli.bench import groups, machine, read_run
     from hsv.graph.preparation import commit
 
     if not 0.0 < scale <= 100.0:
@@ -317,7 +313,7 @@ def bench(
 
 def _print_figures(figures: list[Figure]) -> None:
     """Print one paragraph per figure: a table of all figures is wider than a terminal."""
-    from hsv.cli.bench.figure import readable
+    from hsv.cli.bench import readable
 
     for figure in figures:
         ours, theirs = (readable(sorted(times)[len(times) // 2]) for times in (figure.ours, figure.theirs))

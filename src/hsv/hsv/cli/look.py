@@ -22,6 +22,7 @@ from hsv.cli.output import (
     new_table,
     print_bag_warnings,
     print_json,
+    print_section,
     print_written,
     say,
     to_json,
@@ -174,10 +175,7 @@ def info(
 
 
 def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, Any], RecordingError | None]:
-    """Return the contents of a bag, and the error if it is damaged; print them unless as ``json``.
-
-    A bag that lacks a topic, as ``ros2 bag record`` writes it with a filter, has no metrics.
-    """
+    """Return the contents of a bag, and the error if it is damaged; print them unless as ``json``."""
     from hsv.bags.flight import MEASURED, flight_data
     from hsv.bags.info import describe
     from hsv.bags.steps import completeness
@@ -209,7 +207,6 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
 
 
 def _print_description(description: dict[str, Any], units: UnitSystem) -> None:
-    from hsv.cli.summary import print_section
     from hsv.flight.fingerprint import published_in_words
     from hsv.flight.flight import step_times_in_words
 
@@ -226,7 +223,7 @@ def _print_description(description: dict[str, Any], units: UnitSystem) -> None:
         "faults": _intervals(description["faults"], partial(_fault, units)),
         **_equipment(description["equipment"], units),
         "control law": step_times_in_words(times) if (times := description["step_times"]) else "not recorded",
-        "saturation": _saturation(description["saturation"]),
+        "saturation": _numbers(description["saturation"]),
         "tube": _tube(description["tube"]),
         "fingerprint": f"{published}\n{description['fingerprint'] or ''}".rstrip(),
     }
@@ -259,45 +256,38 @@ def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str,
     from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
     from hsv.pages.panels import AIR_PANELS
 
-    if equipment is None:
-        return {}
     si = dict(zip((*STATE_NAMES, *INPUT_NAMES), (*STATE_UNITS, *INPUT_UNITS), strict=True))
+    si |= {name: panel.unit for name, panel in AIR_PANELS.items()}
 
-    def quantities(numbers: dict[str, float]) -> str:
-        return ", ".join(f"{name} {in_words(value, si[name], units)}" for name, value in numbers.items())
+    def line(key: str, form: str) -> str:
+        numbers = (equipment or {}).get(key, {}).items()
+        ends = ((name, value if isinstance(value, list) else [value]) for name, value in numbers)
+        words = (f"{name} {' to '.join(in_words(v, si.get(name, '1'), units) for v in given)}" for name, given in ends)
+        return form.format(text) if (text := ", ".join(words)) else ""
 
-    def span(name: str, ends: list[float]) -> str:
-        return f"{name} {' to '.join(in_words(value, AIR_PANELS[name].unit, units) for value in ends)}"
-
-    held = ", ".join(f"{name} in {count} steps" for name, count in equipment["held_steps"].items())
     lines = {
-        "sensors": ("rms error ", quantities(equipment["measurement_error_rms"]), ""),
-        "links": ("held ", held, ""),
-        "effectors": ("up to ", quantities(equipment["effector_largest_difference"]), " from the commanded position"),
-        "air": ("", ", ".join(span(name, ends) for name, ends in equipment["air_range"].items()), ""),
+        "sensors": line("measurement_error_rms", "rms error {}"),
+        "held steps": line("held_steps", "{}"),
+        "effectors": line("effector_largest_difference", "up to {} from the commanded position"),
+        "air": line("air_range", "{}"),
     }
-    return {key: f"{head}{text}{end}" for key, (head, text, end) in lines.items() if text}
+    return {key: text for key, text in lines.items() if text}
 
 
-def _saturation(saturation: dict[str, Any] | None) -> str:
-    if saturation is None:
+def _numbers(values: dict[str, Any] | None) -> str:
+    """Return the numbers of a part of a description by their keys."""
+    if values is None:
         return "not recorded"
-    fuel, elevator = saturation["fuel_equivalence_ratio_steps"], saturation["elevator_deflection_steps"]
-    return f"{saturation['steps']} steps (fuel equivalence ratio {fuel}, elevator deflection {elevator})"
+    return ", ".join(
+        f"{key.replace('_', ' ')} {value:.3g}" if isinstance(value, float) else f"{key.replace('_', ' ')} {value}"
+        for key, value in values.items()
+        if isinstance(value, int | float)
+    )
 
 
 def _tube(tube: dict[str, Any] | None) -> str:
-    if tube is None:
-        return "not recorded"
-    if not tube["checked_steps"]:
-        return "no invariant set in this design"
-    outside = f"{tube['outside_steps']} of {tube['checked_steps']} steps outside"
-    text = f"largest level {tube['largest_level']:.3g}, {outside}"
-    if tube["uncertified_steps"]:
-        text += ", for a vehicle that the design is not certified for"
-    if tube["uncertified_hardware_steps"]:
-        text += ", with hardware or air that the design is not certified for"
+    if tube is None or not tube["checked_steps"]:
+        return _numbers(tube) if tube is None else "no invariant set in this design"
     excursions = tube["excursions"]
-    shown = _intervals(excursions[:SHOWN_EXCURSIONS], lambda _: "")
     more = f" and {len(excursions) - SHOWN_EXCURSIONS} more" if len(excursions) > SHOWN_EXCURSIONS else ""
-    return f"{text}: {shown}{more}" if excursions else text
+    return f"{_numbers(tube)}; outside: {_intervals(excursions[:SHOWN_EXCURSIONS], lambda _: '')}{more}"

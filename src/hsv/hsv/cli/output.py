@@ -81,11 +81,7 @@ class Interrupted(Exception):  # noqa: N818 - an interruption by the user is no 
 
 @contextmanager
 def resumable(folder: Path) -> Iterator[None]:
-    """Report after Ctrl-C, in one line, that finished results are stored in ``folder``.
-
-    Raises:
-        Interrupted: After Ctrl-C.
-    """
+    """Report after Ctrl-C, in one line, that finished results are stored in ``folder``."""
     try:
         yield
     except KeyboardInterrupt:
@@ -177,32 +173,33 @@ def print_titles(titles: Mapping[str, str], as_json: bool) -> None:
 def folded(text: str, indent: int = 0, first: int = 0) -> str:
     """Return ``text`` folded between words to the width of the terminal, or 80 columns; paths stay whole.
 
-    Args:
-        text: Text to fold.
-        indent: Spaces before each line.
-        first: Spaces before the first line.
+    The first line begins with ``first`` spaces, the others with ``indent``.
     """
     wrapper = TextWrapper(console.width, " " * first, " " * indent, break_long_words=False, break_on_hyphens=False)
     return wrapper.fill(text)
 
 
+def print_section(title: str, lines: Mapping[str, object]) -> None:
+    """Print named texts under a title, a line each, folded between words; paths stay whole, to be copied.
+
+    After a line break, a text continues on a line of its own.
+    """
+    console.print(Text(title, "bold"))
+    width = max(map(len, lines)) + 4
+    for name, text in lines.items():
+        first, *others = str(text).split("\n")
+        words = first if isinstance(text, Path) else folded(first, width, first=width)[width:]
+        say(f"  {name:{width - 2}}{words}", *(f"  {other}" for other in others))
+
+
 def new_table(*headings: str, title: str = "", right: Collection[str] = (), head: bool = True) -> Table:
     """Return an empty table without lines, folded between words to the terminal's width.
 
-    Args:
-        headings: Headings of the columns.
-        title: Above the table.
-        right: Headings of the columns of numbers, which are aligned at the right and not folded.
-        head: Whether the headings are shown.
+    ``right`` are the headings of the columns of numbers, which are aligned at the right and not folded; ``head`` shows
+    the headings.
     """
-    table = Table(
-        title=title or None,
-        title_justify="left",
-        box=None,
-        pad_edge=False,
-        show_header=head,
-        header_style="bold",
-    )
+    style: dict[str, Any] = {"title_justify": "left", "box": None, "pad_edge": False, "header_style": "bold"}
+    table = Table(title=title or None, show_header=head, **style)
     for heading in headings:
         number = heading in right
         table.add_column(heading, justify="right" if number else "left", no_wrap=number, overflow="fold")
@@ -232,14 +229,7 @@ def print_rows(rows: Sequence[Mapping[str, str | float | None]]) -> None:
 def print_matrix(
     title: str, rows: Sequence[str], columns: Sequence[str], cells: Sequence[Sequence[RenderableType]]
 ) -> None:
-    """Print a matrix with as many columns side by side as fit on the terminal; names fold at their underscores.
-
-    Args:
-        title: Above the matrix.
-        rows: Names of the rows.
-        columns: Names of the columns.
-        cells: Cells by row.
-    """
+    """Print a matrix of ``cells`` by row, as many columns side by side as fit; names fold at their underscores."""
     count = max(1, (console.width - max(map(len, rows))) // _COLUMN)
     for first in range(0, len(columns), count):
         headings = [column.replace("_", "\n") for column in columns[first : first + count]]
@@ -255,13 +245,9 @@ def print_matrix(
 def quantity_table(
     title: str, columns: Mapping[str, str], rows: Sequence[tuple[str, Sequence[float] | None]], units: UnitSystem
 ) -> Table:
-    """Return a table of quantities with one row per item and the unit of each column below its heading.
+    """Return a table of quantities with the unit of each column below its heading.
 
-    Args:
-        title: Above the table.
-        columns: The SI unit by heading.
-        rows: Name and values (SI) of each; ``None`` for a row without values.
-        units: Units in which to print.
+    ``columns`` are SI units by heading, ``rows`` name and values (SI) of each item, or None in place of the values.
     """
     named = {name: unit_in(units, unit) for name, unit in columns.items()}
     headings = [f"{name}\n{'' if unit == '1' else unit}" for name, unit in named.items()]
@@ -343,14 +329,9 @@ def flights(title: str, total: int) -> Iterator[Callable[[int], None]]:
 
 
 def check_target(path: Path, field: str, *suffixes: str) -> None:
-    """Refuse a file that could not be written, before any work is done for it.
-
-    Raises:
-        ParameterError: ``path`` ends in none of the ``suffixes``, is a folder, lies in none, or may not be written.
-    """
+    """Refuse a file that ends in none of the ``suffixes``, or that could not be written, before any work is done."""
     if suffixes and path.suffix not in suffixes:
-        *others, last = suffixes
-        ends = f"{', '.join(others)} or {last}" if others else last
+        ends = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
         raise ParameterError(f"{field} = {str(path)!r}: expected a file that ends in {ends}")
     usable = os.access(path, os.W_OK) and not path.is_dir() if path.exists() else _takes_files(path.parent)
     if not usable:
@@ -358,22 +339,14 @@ def check_target(path: Path, field: str, *suffixes: str) -> None:
 
 
 def check_new(path: Path, field: str, force: bool) -> None:
-    """Refuse a file that could not be written, or that exists unless ``force`` is given.
-
-    Raises:
-        ParameterError: See :func:`check_target`, or ``path`` exists.
-    """
+    """Refuse a file that could not be written, or that exists unless ``force`` is given."""
     check_target(path, field)
     if path.exists() and not force:
         raise ParameterError(f"{field} = {str(path)!r}: exists, expected a new file, or --force to overwrite it")
 
 
 def check_folder(path: Path, field: str) -> None:
-    """Refuse a folder that could not be written or made; it is not made yet.
-
-    Raises:
-        ParameterError: ``path`` is a file, lies below one, or may not be written or made.
-    """
+    """Refuse a folder that could not be written or made; it is not made yet."""
     there = path.absolute()
     while not os.path.lexists(there):
         there = there.parent
@@ -383,11 +356,7 @@ def check_folder(path: Path, field: str) -> None:
 
 @contextmanager
 def writing(path: Path, field: str) -> Iterator[None]:
-    """Convert system errors while ``path`` is written into one error; an incomplete file is removed.
-
-    Raises:
-        ParameterError: It could not be written.
-    """
+    """Convert system errors while ``path`` is written into a ``ParameterError``; an incomplete file is removed."""
     try:
         yield
     except OSError as error:

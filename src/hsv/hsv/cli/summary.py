@@ -12,7 +12,7 @@ from rich.text import Text
 
 from hsv.base.errors import RunError
 from hsv.base.units import UnitSystem, in_system, significant, unit_in
-from hsv.cli.output import console, folded, json_system, new_table, print_json, say, to_json
+from hsv.cli.output import console, folded, json_system, new_table, print_json, print_section, say, to_json
 from hsv.flight.fingerprint import as_published, published_in_words
 from hsv.flight.flight import step_times_in_words
 from hsv.flight.limits import Verdict, in_units, limits_kept, not_judged, verdict_sentence, verdicts
@@ -53,14 +53,7 @@ class FlightSummary:
 def report_flight(
     flight: FlightSummary, units: UnitSystem, json: bool, strict: bool = False, every: bool = False
 ) -> None:
-    """Print the summary of a flight.
-
-    Args:
-        flight: The flight.
-        units: Units in which to print.
-        json: Whether to print JSON.
-        strict: Whether a limit that is not kept is an error.
-        every: Whether to name the metrics that have no limit, too.
+    """Print the summary of a flight; with ``every`` it names the metrics that have no limit, too.
 
     Raises:
         RunError: The flight diverged or was broken off, and the message says when; or with ``strict`` broke a limit.
@@ -120,12 +113,7 @@ def print_metrics(
 ) -> None:
     """Print metrics (SI) in groups with their units and, where ``judged`` is given, with their verdicts.
 
-    Args:
-        title: Title of the table.
-        metrics: Metrics by name, in SI units.
-        units: Units in which to print.
-        judged: Verdicts by metric.
-        every: Whether to say of metrics without a limit that they are not judged.
+    ``every``: whether to say of metrics without a limit that they are not judged.
     """
     table = new_table("metric", "value", "unit", "verdict", title=title, right=["value"], head=False)
     table.columns[2].no_wrap = True
@@ -152,19 +140,6 @@ def _remark(name: str, verdict: Verdict, units: UnitSystem) -> Text:
     return Text(text, "green" if verdict.within else "red")
 
 
-def print_section(title: str, lines: Mapping[str, object]) -> None:
-    """Print named texts under a title, a line each, folded between words; paths stay whole, to be copied.
-
-    After a line break, a text continues on a line of its own.
-    """
-    console.print(Text(title, "bold"))
-    width = max(map(len, lines)) + 4
-    for name, text in lines.items():
-        first, *others = str(text).split("\n")
-        words = first if isinstance(text, Path) else folded(first, width, first=width)[width:]
-        say(f"  {name:{width - 2}}{words}", *(f"  {other}" for other in others))
-
-
 def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, flown: int | None = None) -> None:
     """Print the summary of a campaign and write its page; ``flown`` is the number of flights flown just now."""
     from hsv.flight.campaign.summary import CONFIDENCE, distributions, shares, worst_flights
@@ -182,13 +157,8 @@ def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, f
                 "flown_now": flown,
                 "confidence": CONFIDENCE,
                 "limits": [
-                    {
-                        "name": share.name,
-                        "limit_si": share.limit,
-                        "within": share.within,
-                        "fraction": share.fraction,
-                        "interval": share.interval,
-                    }
+                    {"limit_si": share.limit}
+                    | {name: getattr(share, name) for name in ("name", "within", "fraction", "interval")}
                     for share in shares(results)
                 ],
                 "distributions": {
@@ -247,16 +217,14 @@ def sample_words(sample: Mapping[str, float], units: UnitSystem) -> str:
     """Return a sample (SI; uncertain parameters are relative changes) on one line."""
     from hsv.model.dynamics import COEFFICIENT_UNITS
 
-    relative = COEFFICIENT_UNITS if units is UnitSystem.metric else ()
-    return ", ".join(
-        f"{name} {100.0 * value:+.3g} %" if name in relative else f"{name} {value:+.3g}"
-        for name, value in sample.items()
-    )
+    percent = COEFFICIENT_UNITS if units is UnitSystem.metric else ()
+    words = (f"{100.0 * value:+.3g} %" if name in percent else f"{value:+.3g}" for name, value in sample.items())
+    return ", ".join(map(" ".join, zip(sample, words, strict=True)))
 
 
 def _outcome(name: str, value: float, units: UnitSystem) -> tuple[str, str]:
     """Return an outcome of a flight (SI) as it is printed, and its unit."""
-    from hsv.flight.campaign.table import OUTCOMES
+    from hsv.flight.campaign.sample_runner import OUTCOMES
 
     number, unit = in_system(value, OUTCOMES.get(name, "1"), units, share=is_share(name))
     return significant(number), "" if unit == "1" else unit

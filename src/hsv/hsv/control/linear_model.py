@@ -19,8 +19,6 @@ from hsv.model.signals import (
     INPUT_UNITS,
     N_RIGID,
     N_STATES,
-    PUBLISHED_ALTITUDE,
-    PUBLISHED_VELOCITY,
     STATE_NAMES,
     STATE_UNITS,
 )
@@ -115,8 +113,8 @@ class LinearModel:
 
 
 def linearise(
-    altitude: float | str = PUBLISHED_ALTITUDE,
-    velocity: float | str = PUBLISHED_VELOCITY,
+    altitude: float | str = "",
+    velocity: float | str = "",
     *,
     vehicle: str = "",
     coupling: str = "",
@@ -128,8 +126,8 @@ def linearise(
     That of a rigid vehicle has no elastic states.
 
     Args:
-        altitude: m, or a text with its unit.
-        velocity: m/s, or a text with its unit.
+        altitude: m, or a text with its unit; empty: the published one, or the middle of the vehicle's envelope.
+        velocity: m/s, or a text with its unit; likewise.
         vehicle: Name or path; empty: the paper's.
         coupling: Set of inertial coupling, or a multiple of the derived one; empty: the vehicle's own.
         model: Coupled (CM), decoupled (DM), or extended by the notch filter (ECM).
@@ -150,7 +148,7 @@ def linearise(
     parameters = described.coupled(coupling)
     if model == "DM":
         parameters, coupling = parameters.decoupled(), "none"
-    point = trim_at(parameters, altitude, velocity)
+    point = trim_at(parameters, *described.condition(altitude, velocity))
     state, states = point.state, dict(zip(STATE_NAMES, STATE_UNITS, strict=True))
     if model == EXTENDED:
         notch = Filter(*series(continuous(default_sections())))

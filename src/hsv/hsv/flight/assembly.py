@@ -64,10 +64,7 @@ def flight_parameters(scenario: Scenario) -> dict[str, Any]:
 
 
 def assemble(values: Mapping[str, Any], design: ControlDesign | None = None) -> Components:
-    """Return the five components that these parameters describe; each checks its own parameters.
-
-    ``design``: the one in ``values``, if the caller has read it.
-    """
+    """Return the five components that these parameters describe; ``design`` is the one in them, if it is known."""
     design = design or design_of(values)
     return Components(**{block.name: block.build(values, design) for block in LOOP})
 
@@ -86,23 +83,19 @@ def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> 
             design = design.with_tau(own[TAU.name])
         components = assemble({**(design.to_parameters() if design else {}), **own}, design)
         plant = components.plant
+        given = f"duration = {scenario.duration:g} s"
         if plant.steps < 1:
-            raise ScenarioError(f"duration = {scenario.duration:g} s: expected at least a period, {plant.period:g} s")
+            raise ScenarioError(f"{given}: expected at least a period, {plant.period:g} s")
         if abs(plant.steps * plant.period - scenario.duration) > 1e-9 * scenario.duration:
-            raise ScenarioError(
-                f"duration = {scenario.duration:g} s: expected a whole number of periods, {plant.period:g} s each"
-            )
+            raise ScenarioError(f"{given}: expected a whole number of periods, {plant.period:g} s each")
     return components
 
 
 @contextmanager
 def blamed_on(scenario: Scenario, *, design_read: bool = True) -> Iterator[None]:
-    """Turn errors of components into errors of ``scenario``, with the scenario's names of the parameters.
+    """Turn errors of components into a ``ScenarioError``, with the scenario's names of the parameters.
 
     An error in a design file is reported with the file.
-
-    Raises:
-        ScenarioError: In place of any other error of the library.
     """
     try:
         yield
@@ -120,10 +113,7 @@ def uncovered_of(
 ) -> list[str]:
     """Return the parts of ``scenario`` that no certificate covers, one entry each; empty if all of it is covered.
 
-    Args:
-        scenario: The scenario; its faults are the scheduled ones.
-        design: The design that flies.
-        certificate: Certificate of the design; None: the file next to the scenario's design, if there is one.
+    The certificate is by default that next to the scenario's design, if there is one.
 
     Raises:
         DesignError: The scenario's design is not there, or its certificate cannot be read.
@@ -138,8 +128,7 @@ def uncovered_of(
 def require_trust(controller: str, source: object, trust: bool) -> None:
     """Refuse a ``controller`` whose code the bag or campaign ``source`` names, unless the user passed ``--trust``.
 
-    A scenario or class on the command line is the user's own; a bag or a campaign may be anybody's. A controller that
-    is registered here under a name is installed code; a file may select it but not supply it.
+    A controller that is registered here under a name is installed code; a file may select it but not supply it.
     """
     if names_code(controller) and not trust:
         raise ParameterError(f"{source}: controller = {controller!r}: code that this file names, run only with --trust")

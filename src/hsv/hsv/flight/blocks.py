@@ -64,12 +64,7 @@ class Block:
     """Whether the component is built from a control design."""
 
     def build(self, values: Mapping[str, Any], design: ControlDesign | None = None) -> Any:
-        """Build the component.
-
-        Args:
-            values: Flat parameters.
-            design: The design in ``values``, if it is known already.
-        """
+        """Return the component of flat parameters; ``design`` is the one in them, if it is known."""
         module, _, path = self.built_by.partition(":")
         build = attrgetter(path)(import_module(module))
         return build(values, design) if self.designed else build(values)

@@ -98,11 +98,7 @@ _ONE_AT_A_TIME = threading.Lock()
 
 
 def fly_into(history: History, components: Components) -> tuple[int, dict[str, Sequence[float]]]:
-    """Simulate ``components`` in this process for at most the rows of ``history``.
-
-    Returns:
-        The number of steps, and :attr:`hsv.flight.flight.Flight.law_times`.
-    """
+    """Simulate ``components`` in this process into ``history``; return the number of steps and ``Flight.law_times``."""
     law, controller = components.nominal_trajectory.law, components.controller
     callbacks = {}
     if not law.in_core:
@@ -135,13 +131,10 @@ NO_CALL = SimpleNamespace(function=None, state=None, par=None)
 
 
 def flight_struct(components: Components, history: History, **others: Any) -> Struct:
-    """Return the struct of a flight for the core, before its first step.
+    """Return the struct of a flight for the core, before its first step; ``history`` is its output.
 
-    Args:
-        components: Components of the loop; they are not changed.
-        history: Output of the flight.
-        others: Calls of an external nominal law or controller, the array of commands from outside, and the invariant
-            set whose level is computed.
+    ``others``: calls of an external nominal law or controller, the array of commands from outside, and the invariant
+    set whose level is computed.
     """
     plant, notch, injector = components.plant, components.notch_filter, components.fault_injector
     nominal, controller = components.nominal_trajectory, components.controller

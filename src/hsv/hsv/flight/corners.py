@@ -23,10 +23,7 @@ _NO_STOP = 1e3
 
 
 def corners(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, float]]:
-    """Return the nominal vehicle (no change) and all corners of ``share`` of the parameter bounds, in a fixed order.
-
-    ``bounds``: relative ones of the uncertain parameters, :attr:`hsv.model.vehicle.Vehicle.uncertainty`.
-    """
+    """Return the nominal vehicle (no change) and all corners of ``share`` of the relative bounds, in a fixed order."""
     signs = itertools.product((-1.0, 1.0), repeat=len(bounds))
     return [
         {},
@@ -60,12 +57,9 @@ def screening_corners(bounds: Mapping[str, float], share: float = 1.0) -> list[C
 
 
 def region_parameters(inputs: Mapping[str, Any], vehicle: Vehicle, share: float = 1.0) -> dict[str, Any]:
-    """Return the flat flight parameters of the region that the inputs of a design declare, the design's own left out.
+    """Return the flat flight parameters of the region that the ``inputs`` (SI) of a design declare, without its own.
 
-    Args:
-        inputs: The inputs as a certificate has them, SI.
-        vehicle: Vehicle of the design, nominal.
-        share: Share of the lost elevator effectiveness (paper eq. 47).
+    ``share`` is that of the lost elevator effectiveness (paper eq. 47).
     """
     declared, ramp = inputs["disturbance"], inputs["disturbance"].get("ramp")
     start, target = inputs["nominal"]["start"], inputs["nominal"]["target"]

@@ -98,13 +98,7 @@ class Distribution:
 
 
 def read_distribution(given: Mapping[str, Any], unit: str, field: str, *, whole: bool = False) -> Distribution:
-    """Return the distribution written in an inline table of a scenario.
-
-    Args:
-        given: The table, as read.
-        unit: Unit of the number whose place it takes.
-        field: Name used in the error message.
-        whole: Whether the number is a whole one: then a distribution is uniform.
+    """Return the distribution written in the inline table of a scenario's ``field``, in place of a number in ``unit``.
 
     Raises:
         QuantityError: Another kind, no pair of quantities in this unit, or one that is out of order or not whole.

@@ -52,8 +52,7 @@ def written(digest: bytes) -> str:
 def as_published(found: str | None, scenario: Scenario | None, design_hash: str) -> bool | None:
     """Return whether a flight has a published fingerprint, of whatever scenario.
 
-    ``None``: there is no fingerprint or, for an unpublished one, no scenario to compare, or scenario or design (by its
-    digest) differ from the shipped ones.
+    ``None``: there is none, or an unpublished one and no shipped scenario with its shipped design (by its digest).
     """
     if any(found == entry["fingerprint"] for entry in _table().values()):
         return True

@@ -79,7 +79,7 @@ class Flight:
         """The metrics that the flight defines, SI, by the names in :data:`hsv.flight.metrics.METRICS`."""
         return flight_metrics(self.curves)
 
-    @property
+    @cached_property
     def curves(self) -> FlightCurves:
         """The curves from which metrics are computed."""
         history = self.history

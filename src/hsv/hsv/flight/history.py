@@ -16,6 +16,11 @@ GAIN_INDEX, U_UNSATURATED, AUXILIARY_COLUMNS = accumulate((0, 1, N_INPUTS))
 """First columns of gain index and unsaturated input in :attr:`History.auxiliary`, and the total number."""
 
 
+def _signals(first: int, end: int, meaning: str) -> property:
+    """Return a property with some columns of :attr:`History.signals`."""
+    return property(lambda history: history.signals[:, first:end], doc=meaning)
+
+
 class History(NamedTuple):
     """All signals of a flight for the steps k = 0 ... n, SI."""
 
@@ -29,11 +34,8 @@ class History(NamedTuple):
     @classmethod
     def empty(cls, rows: int, *, estimated: bool = True) -> History:
         """Return an empty history of ``rows`` steps, with the measured or estimated state if ``estimated``."""
-        return cls.over(
-            np.empty(rows * (cls.numbers() if estimated else SIGNAL_COLUMNS + AUXILIARY_COLUMNS)),
-            rows,
-            estimated=estimated,
-        )
+        numbers = cls.numbers() if estimated else SIGNAL_COLUMNS + AUXILIARY_COLUMNS
+        return cls.over(np.empty(rows * numbers), rows, estimated=estimated)
 
     @classmethod
     def over(cls, memory: np.ndarray, rows: int, *, estimated: bool = True) -> History:
@@ -50,50 +52,19 @@ class History(NamedTuple):
         """Return the number of values of a step."""
         return SIGNAL_COLUMNS + AUXILIARY_COLUMNS + N_STATES
 
-    @property
-    def state(self) -> np.ndarray:
-        """State x (n + 1, 9)."""
-        return self.signals[:, X:Q_F]
+    state = _signals(X, Q_F, "State x (n + 1, 9)")
+    filtered_pitch_rate = property(lambda self: self.signals[:, Q_F], doc="q_f (n + 1), rad/s")
+    deviation = _signals(X_N, U_N, "x_n (n + 1, 9)")
+    nominal_input = _signals(U_N, U, "u_n (n + 1, 2)")
+    command = _signals(U, ACTUATOR, "Input u (n + 1, 2)")
+    actuator = _signals(ACTUATOR, SIGNAL_COLUMNS, "Input of the actuators (n + 1, 2)")
+    gain_index = property(lambda self: self.auxiliary[:, GAIN_INDEX], doc="Index in the nested family (n + 1)")
+    u_unsaturated = property(lambda self: self.auxiliary[:, U_UNSATURATED:], doc="Input before saturation (n + 1, 2)")
 
     @property
     def estimate(self) -> np.ndarray:
         """State that the controller receives (n + 1, 9): measured, or estimated if an estimator is enabled."""
-        return self.state if self.estimated is None else self.estimated
-
-    @property
-    def filtered_pitch_rate(self) -> np.ndarray:
-        """q_f (n + 1), rad/s."""
-        return self.signals[:, Q_F]
-
-    @property
-    def deviation(self) -> np.ndarray:
-        """x_n (n + 1, 9)."""
-        return self.signals[:, X_N:U_N]
-
-    @property
-    def nominal_input(self) -> np.ndarray:
-        """u_n (n + 1, 2)."""
-        return self.signals[:, U_N:U]
-
-    @property
-    def gain_index(self) -> np.ndarray:
-        """Index in the nested family (n + 1)."""
-        return self.auxiliary[:, GAIN_INDEX]
-
-    @property
-    def u_unsaturated(self) -> np.ndarray:
-        """Input before saturation (n + 1, 2)."""
-        return self.auxiliary[:, U_UNSATURATED:AUXILIARY_COLUMNS]
-
-    @property
-    def command(self) -> np.ndarray:
-        """Input u (n + 1, 2)."""
-        return self.signals[:, U:ACTUATOR]
-
-    @property
-    def actuator(self) -> np.ndarray:
-        """Input of the actuators (n + 1, 2)."""
-        return self.signals[:, ACTUATOR:SIGNAL_COLUMNS]
+        return self.state if self.estimated is None else self.estimated  # type: ignore[no-any-return]
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return all signals by name, in the order of the loop."""

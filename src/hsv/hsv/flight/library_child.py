@@ -59,12 +59,7 @@ class LoadedLibrary:
         return self._load(self._path, symbol)
 
     def fly(self, rows: int, **parts: Any) -> int:
-        """Simulate a flight into the shared memory and return its number of steps.
-
-        Args:
-            rows: Maximum number of steps.
-            parts: Fields of :class:`hsv.flight.closed_loop.Components`.
-        """
+        """Simulate a flight of at most ``rows`` steps into the shared memory and return its number of steps."""
         components = Components(**parts)
         assert isinstance(components.controller, LibraryController)
         components.controller = components.controller.loaded(self.describe(components.controller.symbol).address)

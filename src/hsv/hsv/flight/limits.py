@@ -53,13 +53,7 @@ def not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, float]) -> l
 
 
 def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float], system: UnitSystem) -> str:
-    """Return in one line whether a flight kept the limits of its scenario, which it broke, and what is not judged.
-
-    Args:
-        judged: Verdicts, from :func:`verdicts`.
-        metrics: Metrics of the flight by name, SI.
-        system: Units of the numbers in it.
-    """
+    """Return in one line whether a flight kept the limits of its scenario, which it broke, and what is not judged."""
     text = limits_kept(judged, system)
     words = criteria_not_judged(judged, metrics, system)
     if others := len(not_judged(judged, metrics)) - len(words):

@@ -163,13 +163,7 @@ class FlightData:
 
 
 def read_curves(signals: np.ndarray, auxiliary: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the curves (10, n) of a history and the mask (n, 2) of the limited commands.
-
-    Args:
-        signals: (n, 25) see :class:`hsv.flight.history.History`.
-        auxiliary: (n, 3) see there.
-        reference: (n, 9) x_r.
-    """
+    """Return the curves (10, n) of a history (see there) with reference x_r (n, 9), and the limited commands (n, 2)."""
     rows = len(signals)
     curves, saturated = np.empty((CURVES, rows)), np.empty((rows, N_INPUTS), np.uint8)
     inputs = map(doubles, (signals, auxiliary, np.ascontiguousarray(reference, float)))

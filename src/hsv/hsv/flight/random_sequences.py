@@ -33,9 +33,7 @@ def random_sequences(
         columns: (r, n, d) effect of disturbances of at most 1 on the error less ``centre``.
         centre: (n) centre of the ellipsoid.
         Q: (n, n) its matrix.
-        sequences: Number of sequences.
-        steps: Steps of each.
-        seed: Seed.
+        sequences, steps, seed: Their number, the steps of each, and the seed.
     """
     factor = np.linalg.cholesky(Q)
     A, G = np.linalg.solve(factor, A @ factor), np.linalg.solve(factor, columns)

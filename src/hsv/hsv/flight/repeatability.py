@@ -52,8 +52,7 @@ def findings(scenario: Scenario) -> Iterator[Finding]:
     """Fly ``scenario`` in every way that must give the same flight, and yield the findings.
 
     Raises:
-        ScenarioError: It cannot be flown.
-        RunError: The controller failed in the first flight; it is named, with the step.
+        ScenarioError, RunError: It cannot be flown, or the controller failed in the first flight.
     """
     parts = assemble_flight(scenario)
     first = fly(parts)
@@ -64,11 +63,7 @@ def findings(scenario: Scenario) -> Iterator[Finding]:
 
 
 def from_copied_state(parts: Components, flight: Flight) -> str:
-    """Step the controller along a recorded ``flight``; in the second half, alternate with a copy of it.
-
-    Returns:
-        Where an answer differs first from that of the flight, and whose it is; empty: nowhere.
-    """
+    """Step the controller along a flight, then in turn with a copy; return where an answer differs first, or ''."""
     steps = len(flight.time)
     steppers = {"the controller": parts.controller}
     try:

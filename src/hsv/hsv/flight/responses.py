@@ -28,13 +28,8 @@ def lag_response(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the effect of the plan's lag on e (k, n) and on the feedback (k, 2), in closed loop, from zero.
 
-    Args:
-        polytope: The design's model.
-        gain: (2, 5) F, with its factor.
-        notch: The discrete filter.
-        actuators: Actuators of the design.
-        scheduled: (k, 2) altitude and velocity of the flight.
-        lag: (k, 2) mean position of actuators driven by the plan, less the plan.
+    ``gain`` (2, 5): F, with its factor; ``scheduled`` (k, 2): altitude and velocity of the flight; ``lag`` (k, 2): mean
+    position of actuators driven by the plan, less the plan.
     """
     a, s, data = len(actuators.A), 2 * len(notch.D), polytope.data()
     errors, feedback = np.empty((len(lag), N_RIGID + s + a)), np.empty((len(lag), N_INPUTS))

@@ -39,18 +39,14 @@ from hsv.flight.tables import (
     VehicleTable,
     breakpoints,
     check_envelope,
+    renamed,
     tables_in,
 )
 from hsv.model.faults.injector import NEVER_TIME, written_parameters
 from hsv.model.faults.table import Fault
 from hsv.model.links import COMMAND_LINK_PARAMETERS
 from hsv.model.plant import EQUIPMENT_PARAMETERS, check_equipment
-from hsv.model.vehicle import (
-    DEFAULT_VEHICLE,
-    SHIPPED_VEHICLES,
-    vehicle_label,
-    vehicle_tables,
-)
+from hsv.model.vehicle import DEFAULT_VEHICLE, SHIPPED_VEHICLES, vehicle_label, vehicle_tables
 
 
 class Scenario(Table):
@@ -127,11 +123,7 @@ _LOOP_PARAMETERS = ("reference.trim", "reference.blend", "notch.enabled", "nomin
 """Parameters of reference, filter and laws that a file sets; a design or the scenario's commands set the others."""
 
 _PARAMETERS = (
-    *(
-        parameter
-        for parameter in (*NominalTrajectory.PARAMETERS, *NOTCH_PARAMETERS, *TUBE_PARAMETERS)
-        if parameter.name in _LOOP_PARAMETERS
-    ),
+    *(p for p in (*NominalTrajectory.PARAMETERS, *NOTCH_PARAMETERS, *TUBE_PARAMETERS) if p.name in _LOOP_PARAMETERS),
     *(replace(parameter, name=name) for name, parameter in zip(_FLOWN_NOTCH, FLOWN_NOTCH_PARAMETERS, strict=True)),
     *ROBUST_MPC_PARAMETERS,
     *EQUIPMENT_PARAMETERS,
@@ -164,9 +156,9 @@ def scenario_names() -> list[str]:
 
 
 def scenario_text(name: str) -> str:
-    """Return the complete text of a shipped scenario (by name) or of a file (by path).
+    """Return the text of a scenario by name or path, with what it extends, and a vehicle that is not shipped.
 
-    The scenarios that it extends are written out, and a vehicle that is not shipped; the path of a library is absolute.
+    The path of a library is absolute.
 
     Raises:
         ScenarioError: No such scenario, file or vehicle, it cannot be read, or a path leads out of its folder.
@@ -181,7 +173,7 @@ def scenario_text(name: str) -> str:
 
 
 def _located(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return the table of a file with the paths of library and vehicle relative to the working directory.
+    """Return the table of a file with paths relative to the working directory.
 
     A named vehicle replaces the definition of the vehicle that the scenario would inherit.
     """
@@ -253,15 +245,10 @@ def _with_named_vehicle(table: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Scenario:
-    """Return a shipped scenario (by name) or one from a file (by path), with fields changed.
-
-    Args:
-        name: Name or path.
-        changes: Values as written in a file, with units, by field, such as ``{"fault[0].effectiveness": 0.8}``.
+    """Return a scenario by name or path, with fields changed, such as ``{"fault[0].start": "90 s"}``.
 
     Raises:
-        ScenarioError: There is no such scenario, or a field is wrong; the message names it, its value and the
-            expectation.
+        ScenarioError: There is no such scenario, or a field is wrong, which is named with value and expectation.
     """
     text = scenario_text(name)
     if changes:
@@ -385,20 +372,14 @@ def _check(scenario: Scenario, tables: Collection[str]) -> None:
             raise ScenarioError(f"command[{index}]: changes nothing, expected altitude_change or velocity_change")
     for index, change in enumerate(scenario.tube.change):
         field = f"tube.change[{index}].tau"
-        try:
+        with renamed("parameter ", ""):
             rigid_factors(replace(TAU, name=field).check(change.tau), field)
-        except ParameterError as error:
-            raise ScenarioError(str(error).removeprefix("parameter ")) from error
     for index, fault in enumerate(scenario.fault):
-        try:
+        with renamed("fault.", f"fault[{index}]."):
             Fault.of(fault.channel, fault.type, fault.parameters)
-        except ParameterError as error:
-            raise ScenarioError(str(error).replace("fault.", f"fault[{index}].", 1)) from error
     if scenario.settings:
-        try:
+        with renamed("parameter ", ""):
             check_equipment(scenario.settings, scenario.vehicle.described.decoupled, PERIOD)
-        except ParameterError as error:
-            raise ScenarioError(str(error).removeprefix("parameter ")) from error
     check_envelope(scenario.commands, scenario.command, scenario.vehicle.described)
     _check_starts(scenario)
 
@@ -415,18 +396,15 @@ def _check_starts(scenario: Scenario) -> None:
     for field, times in starts.items():
         for index, start in enumerate(times):
             if start > 0.0 and start >= scenario.duration:
-                raise ScenarioError(
-                    f"{field.format(index)} = {start:g} s: "
-                    f"expected a time before the flight's end, {scenario.duration:g} s"
-                )
+                end = f"the flight's end, {scenario.duration:g} s"
+                raise ScenarioError(f"{field.format(index)} = {start:g} s: expected a time before {end}")
     for index, start in enumerate(changes):
         if start in changes[:index]:
             raise ScenarioError(f"tube.change[{index}].start = {start:g} s: expected one change at a time")
     for index, fault in enumerate(scenario.fault):
         if fault.stop is not None and fault.stop <= fault.start:
-            raise ScenarioError(
-                f"fault[{index}].stop = {fault.stop:g} s: expected a time after its start, {fault.start:g} s"
-            )
+            given = f"fault[{index}].stop = {fault.stop:g} s"
+            raise ScenarioError(f"{given}: expected a time after its start, {fault.start:g} s")
 
 
 _DUE = {

@@ -37,11 +37,11 @@ class FlightGroup:
     def takes(components: Sequence[Components], rows: int | None = None) -> bool:
         """Return whether flights can be flown side by side.
 
-        They can where all blocks are the core's own, and nothing differs but vehicle, seed, beginning, faults,
-        reference, gains, and the numbers of sensors, links and air, unless their histories, of ``rows`` steps each (by
-        default all), are too large.
+        All blocks must be the core's own; only vehicle, seed, beginning, faults, reference, gains, and the numbers of
+        sensors, links and air may differ; the histories, of ``rows`` steps each, must not be too large.
         """
-        if not 1 < len(components) <= lanes() or not all(map(_of_the_core, components)):
+        of_the_core = all(each.controller.in_core and each.nominal_trajectory.law.in_core for each in components)
+        if not 1 < len(components) <= lanes() or not of_the_core:
             return False
         if lanes() * (rows or components[0].plant.steps + 1) * History.numbers() * 8 > _MOST_HISTORY:
             return False
@@ -49,11 +49,9 @@ class FlightGroup:
         return all(_same(first, other) for other in others)
 
     def fly(self, components: Sequence[Components], tube_set: Struct | None = None) -> list[tuple[Flight, float]]:
-        """Return the flights of ``components``, which are valid until the next call, and their largest levels.
+        """Return the flights of ``components``, valid until the next call, and their largest levels in ``tube_set``.
 
-        Args:
-            components: Flights that :meth:`takes`; spare lanes repeat the last one.
-            tube_set: The invariant set whose level is computed; without one the levels are -inf.
+        Spare lanes repeat the last flight. Without a set the levels are -inf.
         """
         rows, estimated = components[0].plant.steps + 1, not is_ideal(components[0])
         if self._numbers.shape[1] != rows * History.numbers():
@@ -94,11 +92,8 @@ def fly_perturbed(
 ) -> list[Result]:
     """Return ``job`` of every flight in order; the flights are simulated in one thread per processor.
 
-    Args:
-        components: Of the flight of the nominal vehicle.
-        perturbations: Relative changes of the vehicle's parameters, of one flight each.
-        job: Takes a perturbation and its flight.
-        progress: Called with the number of flights done.
+    ``components`` are those of the nominal vehicle, ``perturbations`` relative changes of its parameters. ``progress``
+    is called with the number of flights done.
     """
     width = lanes()
 
@@ -111,10 +106,6 @@ def fly_perturbed(
     groups = [perturbations[start : start + width] for start in range(0, len(perturbations), width)]
     done = over_threads(of_some, groups, lambda groups: progress(min(groups * width, len(perturbations))))
     return [result for results in done for result in results]
-
-
-def _of_the_core(components: Components) -> bool:
-    return components.controller.in_core and components.nominal_trajectory.law.in_core
 
 
 def _shared(components: Components) -> tuple[Any, ...]:

@@ -7,18 +7,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationInfo,
-    field_validator,
-)
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator
 
 from hsv.base.errors import ParameterError, QuantityError, ScenarioError, one_of
 from hsv.base.parameters import Parameter, limits_in_words, read_number
@@ -26,6 +20,15 @@ from hsv.base.units import has_unit, parse_quantity, rounded, si_unit_of, to_pap
 from hsv.flight.distribution import Distribution, read_distribution
 from hsv.model.faults.table import fault_parameters
 from hsv.model.vehicle import DEFAULT_VEHICLE, Vehicle, load_vehicle, parse_vehicle
+
+
+@contextmanager
+def renamed(old: str, new: str) -> Iterator[None]:
+    """Turn the error of a parameter into that of a scenario, with another name of the field."""
+    try:
+        yield
+    except ParameterError as error:
+        raise ScenarioError(str(error).replace(old, new, 1)) from error
 
 
 @dataclass(frozen=True)
@@ -74,10 +77,8 @@ class Reading:
         channel, kind = (row.get(key) for key in ("channel", "type"))
         if not (isinstance(channel, str) and isinstance(kind, str)):
             return common  # the model refuses it
-        try:
+        with renamed("fault.", f"{name}."):
             known = {parameter.name: parameter.of(channel) for parameter in fault_parameters(channel, kind)}
-        except ParameterError as error:
-            raise ScenarioError(str(error).replace("fault.", f"{name}.", 1)) from error
         parameters = {}
         for key, value in row.items():
             if key in common:
@@ -97,14 +98,9 @@ def _reading(info: ValidationInfo) -> Reading:
 def quantity(
     unit: str, low: float | None = None, high: float | None = None, shown: str = "", *, bare: bool = True
 ) -> BeforeValidator:
-    """Return a validator of a quantity in ``unit`` from ``low`` to ``high`` (SI).
+    """Return a validator of a quantity in ``unit`` from ``low`` to ``high`` (SI), the range ``shown`` in words.
 
-    Args:
-        unit: SI unit.
-        low: Least admissible value; None: any.
-        high: Largest admissible value; None: any.
-        shown: The range in words.
-        bare: Whether a number without a unit is admissible; 5 might mean 5 %, and would be read as 500 %.
+    Unless ``bare``, the unit must be given: 5 might mean 5 %, and would be read as 500 %.
     """
 
     def parse(text: object, info: ValidationInfo) -> float:

@@ -15,9 +15,8 @@ from hsv.base.errors import CampaignError, ControllerError
 from hsv.control.design import find_design, read_parameters
 from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.flight.assembly import require_path_inside
-from hsv.flight.campaign.sample_runner import FlightReading, Outcome
+from hsv.flight.campaign.sample_runner import OUTCOMES, Outcome
 from hsv.flight.campaign.summary import Results
-from hsv.flight.campaign.table import OUTCOMES
 
 
 @dataclass(frozen=True)
@@ -45,8 +44,7 @@ def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
     row, runner = results.row(flight), results.sample_runner
     try:
         flown = runner.fly(flight, runner.sample(flight))
-        data = flown.data()
-        repeated = runner.outcome(FlightReading.of(data, runner.level(data), flown.fingerprint))
+        repeated = runner.outcome((flown, runner.level(flown.data())))
     except ControllerError as error:
         repeated = runner.outcome(error)
     return ReplayedFlight(flight, _outcome(row), repeated)
@@ -83,7 +81,8 @@ def replay_over_dds(
     data = flight_data(recorded)
     # Stamps are whole nanoseconds, the campaign's time is not: the last bit of an integral over time would differ.
     data = replace(data, time=np.arange(len(data.time)) * runner.period)
-    repeated = runner.outcome(FlightReading.of(data, runner.level(data), flight_fingerprint(recorded)))
+    fingerprint = flight_fingerprint(recorded)
+    repeated = runner.measured(data.flight_curves, data.state[-1], runner.level(data), fingerprint)
     exact = not (
         measurement_errors(joined(recorded, equipment_topics(recorded)))
         or prepared.scenario.settings.get(ESTIMATOR_ENABLED.name)

@@ -30,7 +30,7 @@ from hsv.base.files import EXTENDS, Tables, follow_extends, is_path, parse_toml,
 from hsv.base.parameters import Parameter, validate
 from hsv.base.units import UnitSystem, parse_quantity, readable
 from hsv.model.dynamics import AT_REST, COEFFICIENT_UNITS, POSITIVE, STRUCTURES, VehicleParameters
-from hsv.model.signals import INPUT_NAMES, INPUT_UNITS
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, PUBLISHED_ALTITUDE, PUBLISHED_VELOCITY
 
 GROUP = "hsv.vehicles"
 """The entry points of vehicles, ``package:file.toml`` each."""
@@ -156,6 +156,13 @@ class Vehicle:
         """Altitude (m) and velocity (m/s) at the middle of the envelope."""
         low, high = zip(self.altitude_range, self.velocity_range, strict=True)
         return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
+
+    def condition(self, altitude: float | str, velocity: float | str) -> tuple[float | str, float | str]:
+        """Return a flight condition; empty texts become the published one, or the middle of an envelope without it."""
+        low, high = self.altitude_range
+        known = low <= parse_quantity(PUBLISHED_ALTITUDE, "m", "altitude") <= high
+        at = (PUBLISHED_ALTITUDE, PUBLISHED_VELOCITY) if known else self.centre
+        return at[0] if altitude == "" else altitude, at[1] if velocity == "" else velocity
 
     def coupling_name(self, coupling: object = "") -> str:
         """Return the canonical name of a choice of inertial coupling: a set, or a multiple of the derived set as text.

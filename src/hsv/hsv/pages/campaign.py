@@ -14,6 +14,7 @@ from hsv.base.errors import CampaignError, ControllerError
 from hsv.base.units import UnitSystem
 from hsv.flight.campaign.campaign import Factor
 from hsv.flight.campaign.envelope import SIGNALS, signals, window_starts
+from hsv.flight.campaign.sample_runner import OUTCOMES
 from hsv.flight.campaign.summary import (
     ENDED,
     Distribution,
@@ -25,7 +26,6 @@ from hsv.flight.campaign.summary import (
     within_all,
     worst_flights,
 )
-from hsv.flight.campaign.table import OUTCOMES
 from hsv.flight.flight import Flight
 from hsv.flight.metrics import METRICS, Group, in_words, is_share
 from hsv.model.plant import Plant

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -178,11 +177,6 @@ class Campaign:
         """The campaign as JSON, the same text for the same campaign."""
         return json.dumps(asdict(self), sort_keys=True)
 
-    @property
-    def digest(self) -> str:
-        """A name for this campaign and no other."""
-        return hashlib.sha256(self.text.encode()).hexdigest()
-
     @classmethod
     def from_text(cls, text: str) -> Self:
         """Return the campaign written by :attr:`text`.
@@ -212,9 +206,7 @@ class Campaign:
             if factor.name not in known:
                 raise CampaignError(f"factor {factor.name!r}: expected {one_of(known, factor.name)}")
             if factor.kind not in KINDS:
-                raise CampaignError(
-                    f"factor {factor.name!r}: kind {factor.kind!r}, expected {one_of(KINDS, factor.kind)}"
-                )
+                raise CampaignError(f"factor {factor.name!r}: kind {factor.kind!r}, expected {' or '.join(KINDS)}")
 
     def difference(self, other: Campaign) -> str:
         """Return the first setting in which ``other`` differs, in words; empty if in none."""
@@ -279,13 +271,7 @@ def plan(
 
 
 def _factors(scenario: Scenario, drawn: Mapping[str, Distribution], scale: float) -> tuple[Factor, ...]:
-    """Return the factors of a campaign: the vehicle's uncertain parameters, and the distributions in the scenario.
-
-    Args:
-        scenario: The scenario without any change.
-        drawn: Its distributions by field, which replace the bounds of a parameter.
-        scale: As for :func:`plan`.
-    """
+    """Return the vehicle's uncertain parameters and the ``drawn`` distributions, which replace a parameter's bounds."""
     if not 0.0 <= scale <= 10.0:
         raise CampaignError(f"scale = {scale}: expected 0 to 10")
     uncertainty = scenario.vehicle.described.uncertainty
@@ -309,10 +295,7 @@ def _check_ends(campaign: Campaign) -> None:
 
 
 def _commands_to_same_goals(table: dict[str, Any], name: str, starts: Mapping[str, float]) -> list[dict[str, Any]]:
-    """Return the commands that lead from other ``starts`` (SI, by axis) to the goals that ``table`` commands.
-
-    Only the step at t = 0 changes: a commanded target does not move with the start.
-    """
+    """Return the commands from other ``starts`` (SI, by axis) to the same targets: the step at t = 0 changes."""
     scenario, _ = scenario_at_means(table, name)
     steps = [command for command in scenario.command if command.end == 0.0]
     goals = {"altitude": scenario.commands.altitudes[0], "velocity": scenario.commands.velocities[0]}

@@ -65,16 +65,10 @@ class Executor:
     def fly(
         self, job: Job, text: str, batches: Iterable[int], label: Callable[[int], str] = "batch {}".format
     ) -> Iterator[tuple[int, bytes]]:
-        """Yield the number and the result of each batch, in any order.
-
-        Args:
-            job: Flies a batch.
-            text: The campaign, as ``job`` reads it.
-            batches: Numbers of the batches.
-            label: Returns the name of a batch in messages.
+        """Yield the number and the result of each batch, in any order; ``label`` names a batch in messages.
 
         Raises:
-            RunError: A batch ends every process that flies it, or the scheduler is lost.
+            RunError: A batch ends the process that flies it, or the scheduler is lost.
         """
         for batch in batches:
             yield batch, job(text, batch)
@@ -137,15 +131,16 @@ class _PoolExecutor(Executor, ABC):
     def _submit(self, job: Job, text: str, batch: int) -> Future[bytes]:
         """Start the flight of a batch."""
 
+    @abstractmethod
     def _result(self, future: Future[bytes]) -> bytes:
-        return future.result()
+        """Return the result of a flown batch."""
 
     def _renew(self) -> None:
         """Replace a pool that is broken."""
 
+    @abstractmethod
     def _obstacle(self) -> str:
         """Return why no result can come, as the end of a message; empty if the batches just take long."""
-        return ""
 
 
 class ProcessExecutor(_PoolExecutor):
@@ -159,7 +154,6 @@ class ProcessExecutor(_PoolExecutor):
         """Start the processes."""
         super().__init__(notice)
         self.cores = workers
-        self._folder = TemporaryDirectory(prefix="hsv_results_")
         self._start()
 
     def pids(self) -> list[int | None]:
@@ -175,6 +169,7 @@ class ProcessExecutor(_PoolExecutor):
         self._folder.cleanup()
 
     def _start(self) -> None:
+        self._folder = TemporaryDirectory(prefix="hsv_results_")
         self._others = set(multiprocessing.active_children())
         context = multiprocessing.get_context("spawn")
         self._pool = ProcessPoolExecutor(self.cores, context, end_with_parent, (os.getpid(),))
@@ -194,7 +189,6 @@ class ProcessExecutor(_PoolExecutor):
 
     def _renew(self) -> None:
         self.close(kill=True)
-        self._folder = TemporaryDirectory(prefix="hsv_results_")
         self._start()
 
     def _submit(self, job: Job, text: str, batch: int) -> Future[bytes]:
@@ -271,12 +265,10 @@ class DaskExecutor(_PoolExecutor):
 
 @contextmanager
 def make_executor(workers: int, scheduler: str = "", notice: Notice = lambda words: None) -> Iterator[Executor]:
-    """Yield the executor for the ``scheduler`` at an address, or for a number of processes of this machine.
+    """Yield the executor for the Dask ``scheduler`` at an address, or for a number of processes of this machine.
 
-    Args:
-        workers: Number of processes; 0: one per processor; 1 flies in this process.
-        scheduler: Address of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``; empty: this machine.
-        notice: Called with the reason when the campaign has to wait.
+    Of the workers, 0 means one per processor, and 1 flies in this process. ``notice`` is called with the reason when
+    the campaign has to wait.
 
     Raises:
         CampaignError: The number or the address is not admissible, no scheduler answers there, it has no workers, or
@@ -340,10 +332,7 @@ def _connected(address: str, notice: Notice) -> Iterator[Any]:
 
 
 async def _answers(address: str, waiting: Callable[[], None]) -> bool:
-    """Return whether a scheduler answers within :data:`ANSWER`; call ``waiting`` if it takes more than :data:`NOTICE`.
-
-    A client of Dask that waits for its scheduler cannot be interrupted.
-    """
+    """Return whether a scheduler answers within :data:`ANSWER`; Dask's own client cannot be interrupted meanwhile."""
     from distributed.core import rpc
     from distributed.security import Security
 

@@ -43,10 +43,7 @@ class Store(ABC):
 
     @contextmanager
     def opened(self, *, restart: bool = False) -> Iterator[set[int]]:
-        """Yield the numbers of the finished batches; only one process at a time may hold a campaign.
-
-        Args:
-            restart: Whether to discard existing results.
+        """Yield the numbers of the finished batches; with ``restart``, existing results are discarded before.
 
         Raises:
             CampaignError: The place belongs to another campaign, cannot be made, or is in use.
@@ -84,14 +81,9 @@ def run_campaign(
     restart: bool = False,
     progress: Callable[[int], None] = lambda flights: None,
 ) -> Flown:
-    """Fly the missing flights of a campaign.
+    """Fly those batches of a campaign whose results are not in the store, or with ``restart`` all of them.
 
-    Args:
-        plan: The campaign.
-        store: Keeps the results; batches that are there already are not flown again.
-        executor: Flies the batches.
-        restart: Whether to discard existing results first.
-        progress: Called with the number of finished flights, those found at the start included.
+    ``progress`` is called with the number of finished flights, those found at the start included.
 
     Raises:
         CampaignError: The store holds another campaign, is in use, or cannot be written.

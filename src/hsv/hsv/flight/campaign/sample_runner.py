@@ -1,13 +1,16 @@
-"""The flights of a campaign: shared components are built once, and metrics are computed while the flights run."""
+"""The flights of a campaign: shared components are built once, and each flight becomes a row of a table."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from functools import lru_cache
-from typing import NamedTuple, Self
+from io import BytesIO
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from hsv.base.errors import ControllerError, ScenarioError
 from hsv.control.controller import Controller
@@ -15,31 +18,38 @@ from hsv.control.library import LibraryController
 from hsv.core import lanes
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
-from hsv.flight.campaign.table import encode
 from hsv.flight.campaign.variants import FlightVariants
 from hsv.flight.closed_loop import Components, fly, watched
 from hsv.flight.flight import Flight
-from hsv.flight.metrics import FlightCurves, FlightData, flight_metrics
+from hsv.flight.metrics import METRICS, FlightCurves, FlightData, flight_metrics
 from hsv.flight.side_by_side import FlightGroup, TubeLevels
 from hsv.model.dynamics import in_model_range
+
+CAMPAIGN, ENVELOPE, DIGEST = b"hsv.campaign", b"hsv.envelope", b"hsv.digest"
+"""Keys of the file's metadata."""
+
+OUTCOMES = {"end_time": "s", "tube_level": "1", **{name: metric.unit for name, metric in METRICS.items()}}
+"""The recorded numbers of a flight, with their SI units; null if a flight does not define one."""
+
+WRITTEN: dict[str, Any] = {"compression": "zstd", "write_page_checksum": True}
+"""Options of the result file; the checksums detect damage that decompresses without an error."""
+
+_BATCH_WRITTEN: dict[str, Any] = {
+    "compression": "none",
+    "use_dictionary": False,
+    "write_statistics": False,
+    "write_page_checksum": True,
+}
+"""Options of a batch, which is read once and removed: compressing it takes longer than writing it."""
+
 
 Outcome = dict[str, float | bool | str | None]
 
 
-class FlightReading(NamedTuple):
-    """The results of a flight that a campaign needs; the history itself is not kept."""
+Flown = tuple[Flight, float | None] | ControllerError
+"""A flight and its largest level in the tube's invariant set (None if no set holds for it), or the controller's error.
 
-    curves: FlightCurves
-    last: np.ndarray
-    """Last state x (9)"""
-    level: float | None
-    """Largest level in the tube's invariant set; None if no set holds for the flight"""
-    fingerprint: str | None
-
-    @classmethod
-    def of(cls, data: FlightData, level: float | None, fingerprint: str | None) -> Self:
-        """Return the reading of a flight whose whole history is in memory."""
-        return cls(data.flight_curves, data.state[-1], level, fingerprint)
+A campaign does not keep the flight itself."""
 
 
 class SampleRunner:
@@ -71,15 +81,14 @@ class SampleRunner:
         """Fly a flight with its sample (one value a factor).
 
         Raises:
-            ControllerError: A custom controller failed.
-            ScenarioError: The scenario does not admit the values of the flight together; the flight is named.
+            ControllerError, ScenarioError: A custom controller failed, or the sample as a whole is not admitted.
         """
         return fly(self._components(flight, sample))
 
-    def fly_all(self, flights: Sequence[int], samples: np.ndarray) -> Iterator[FlightReading | ControllerError]:
+    def fly_all(self, flights: Sequence[int], samples: np.ndarray) -> Iterator[Flown]:
         """Fly ``flights`` with their ``samples`` (flights, factors), side by side if possible.
 
-        Each reading is valid until the next one. A controller that fails yields its error in place of the reading.
+        Each flight is valid until the next one.
         """
         width = lanes()
         for start in range(0, len(flights), width):
@@ -87,10 +96,9 @@ class SampleRunner:
             components = [self._components(flight, sample) for flight, sample in drawn]
             if FlightGroup.takes(components):
                 for flight, level in self._group.fly(components, self._levels.set):
-                    known = level if self._levels.set else None
-                    yield FlightReading(flight.curves, flight.history.state[-1], known, flight.fingerprint)
+                    yield flight, level if self._levels.set else None
             else:
-                yield from map(self._read_alone, components)
+                yield from map(self._fly_alone, components)
 
     def fly_unchanged(self) -> Flight:
         """Fly the scenario itself."""
@@ -100,17 +108,22 @@ class SampleRunner:
         """Return the largest level of a flight in the tube, None if no set holds for it."""
         return self._levels.worst(flight)
 
-    def outcome(self, flown: FlightReading | ControllerError) -> Outcome:
+    def outcome(self, flown: Flown) -> Outcome:
         """Return the row of a flight: its end, tube level, metrics (SI) and fingerprint, or the controller's error."""
         if isinstance(flown, ControllerError):
             return {"diverged": False, "crashed": str(flown)}
+        flight, level = flown
+        return self.measured(flight.curves, flight.history.state[-1], level, flight.fingerprint)
+
+    def measured(self, curves: FlightCurves, last: np.ndarray, level: float | None, fingerprint: str | None) -> Outcome:
+        """Return the row of a flight from its curves, its last state x (9), its largest level and its fingerprint."""
         return {
-            "diverged": not in_model_range(flown.last, self._variants.unchanged.plant.vehicle.angle_limit),
-            "end_time": float(flown.curves.time[-1]),
-            "tube_level": flown.level,
-            **flight_metrics(flown.curves),
+            "diverged": not in_model_range(last, self._variants.unchanged.plant.vehicle.angle_limit),
+            "end_time": float(curves.time[-1]),
+            "tube_level": level,
+            **flight_metrics(curves),
             "crashed": None,
-            "fingerprint": flown.fingerprint,
+            "fingerprint": fingerprint,
         }
 
     def fly_batch(self, batch: int) -> bytes:
@@ -118,19 +131,18 @@ class SampleRunner:
         flights, envelope, rows = self.campaign.flights(batch), Envelope.empty(), []
         samples, seeds = self.campaign.draw(flights)
         for flight, sample, seed, flown in zip(flights, samples, seeds, self.fly_all(flights, samples), strict=True):
-            if isinstance(flown, FlightReading):
-                envelope.add(flown.curves, self.steps)
+            if not isinstance(flown, ControllerError):
+                envelope.add(flown[0].curves, self.steps)
             drawn = {f"sample_{f.name}": float(x) for f, x in zip(self.campaign.factors, sample, strict=True)}
             rows.append({"flight": flight, "seed": int(seed), **drawn, **self.outcome(flown)})
         return encode(self.campaign, rows, envelope)
 
-    def _read_alone(self, components: Components) -> FlightReading | ControllerError:
+    def _fly_alone(self, components: Components) -> Flown:
         try:
             flight = fly(components)
         except ControllerError as error:
             return error
-        data = flight.data()
-        return FlightReading.of(data, self.level(data), flight.fingerprint)
+        return flight, self.level(flight.data())
 
     def _components(self, flight: int, sample: Sequence[float]) -> Components:
         if names := self.campaign.perturbed:
@@ -142,6 +154,27 @@ class SampleRunner:
             return self._variants.components(self.campaign.flown(flight, sample))
         except ScenarioError as error:
             raise ScenarioError(f"flight {flight}: {error}") from error
+
+
+def schema(campaign: Campaign) -> pa.Schema:
+    """Return the columns: flight, seed, sample, end, metrics, fingerprint."""
+    samples = [_number(f"sample_{factor.name}", factor.unit) for factor in campaign.factors]
+    outcomes = [_number(name, unit) for name, unit in OUTCOMES.items()]
+    fixed = [pa.field("flight", pa.int64(), False), pa.field("seed", pa.uint64(), False)]
+    ended = [pa.field("diverged", pa.bool_(), False), pa.field("crashed", pa.string())]
+    return pa.schema([*fixed, *samples, *ended, *outcomes, pa.field("fingerprint", pa.string())])
+
+
+def _number(name: str, unit: str) -> pa.Field:
+    return pa.field(name, pa.float64(), metadata={"unit": unit})
+
+
+def encode(campaign: Campaign, rows: list[dict[str, Any]], envelope: Envelope) -> bytes:
+    """Return rows and envelope of a batch as a Parquet file."""
+    table = pa.Table.from_pylist(rows, schema=schema(campaign).with_metadata({ENVELOPE: envelope.encode()}))
+    stream = BytesIO()
+    pq.write_table(table, stream, **_BATCH_WRITTEN)
+    return stream.getvalue()
 
 
 @lru_cache(maxsize=1)

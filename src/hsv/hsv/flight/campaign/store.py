@@ -15,8 +15,7 @@ from hsv.base.files import open_regular, read_text
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
 from hsv.flight.campaign.run import Store, replace_file, write_whole, writing
-from hsv.flight.campaign.sample_runner import fly_batch
-from hsv.flight.campaign.table import CAMPAIGN, DIGEST, ENVELOPE, WRITTEN, schema
+from hsv.flight.campaign.sample_runner import CAMPAIGN, DIGEST, ENVELOPE, WRITTEN, fly_batch, schema
 
 _CAMPAIGN_FILE = "campaign.json"
 
@@ -112,8 +111,7 @@ class ResultStore(Store):
         return self.folder / f"{batch:08}.parquet"
 
     def _check(self, found: Campaign, where: Path) -> None:
-        difference = found.difference(self._campaign)
-        if difference:
+        if difference := found.difference(self._campaign):
             raise CampaignError(
                 f"{where}: holds another campaign ({difference}), expected the same one, another --out, or --restart"
             )
@@ -139,23 +137,17 @@ def read_result(path: Path) -> tuple[Campaign, Envelope]:
         campaign = Campaign.from_text(metadata[CAMPAIGN].decode())
     except (CampaignError, UnicodeDecodeError) as error:
         raise CampaignError(f"{path}: {error}") from error
-    for column in schema(campaign):
-        if not _has(columns, column):
-            raise _foreign(path, f"column {column.name!r}", campaign)
     try:
+        for column in schema(campaign):
+            lack = f"column {column.name!r}"
+            if not columns.field(column.name).equals(column, check_metadata=True):
+                raise KeyError
+        lack = "envelope of this version's curves"
         return campaign, Envelope.decode(metadata[ENVELOPE].decode())
     except (KeyError, ValueError) as error:
-        raise _foreign(path, "envelope of this version's curves", campaign) from error
-
-
-def _foreign(path: Path, lack: str, campaign: Campaign) -> CampaignError:
-    return CampaignError(
-        f"{path}: has no {lack}, written by commit {campaign.commit}; expected a result of this version"
-    )
-
-
-def _has(columns: pa.Schema, column: pa.Field) -> bool:
-    return columns.get_field_index(column.name) >= 0 and columns.field(column.name).equals(column, check_metadata=True)
+        raise CampaignError(
+            f"{path}: has no {lack}, written by commit {campaign.commit}; expected a result of this version"
+        ) from error
 
 
 def result_digest(kept: Mapping[bytes, bytes]) -> bytes:

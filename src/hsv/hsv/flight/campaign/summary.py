@@ -17,9 +17,8 @@ from hsv.control.controllers import names_code
 from hsv.flight.assembly import require_trust
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
-from hsv.flight.campaign.sample_runner import SampleRunner
+from hsv.flight.campaign.sample_runner import OUTCOMES, SampleRunner
 from hsv.flight.campaign.store import read_result
-from hsv.flight.campaign.table import OUTCOMES
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -32,12 +32,9 @@ class FlightVariants:
     """A scenario's flight, and variants of it."""
 
     def __init__(self, scenario: Scenario, design: Mapping[str, Any], library: str | None = None) -> None:
-        """Assemble the flight.
+        """Assemble the flight of a scenario with the flat parameters of a design.
 
-        Args:
-            scenario: Scenario of the flight that is varied.
-            design: Flat parameters of the controller's design.
-            library: SHA-256 of the controller's library, empty if it is in none; None: not checked.
+        ``library`` is the SHA-256 of the controller's library, empty if it is in none; None: not checked.
         """
         if library is not None and library_digest(scenario.controller) != library:
             raise CampaignError(
@@ -74,13 +71,9 @@ class FlightVariants:
         )
 
     def perturbed(self, perturbation: Mapping[str, float], seed: int) -> Components | None:
-        """Return the components of a flight that differs only in perturbation and seed, as in most campaigns.
+        """Return the components of a flight that differs only in perturbation (relative, by parameter) and seed.
 
         ``None`` if a change is not admissible; reading the scenario or building the plant then gives the error.
-
-        Args:
-            perturbation: Relative changes of the nominal vehicle's parameters, by name.
-            seed: Seed of the flight.
         """
         if not all(_CHANGES[name].admits(change) for name, change in perturbation.items()):
             return None

@@ -52,13 +52,10 @@ class Subject:
         return rounded(moment.share * self.scenario.duration)
 
     def file(self, moment: Moment, vehicle: int, fault: TriedFault | None = None, value: float = 0.0) -> str:
-        """Return the scenario of a flight as a file.
+        """Return the scenario of a flight as a file: it ends :data:`OBSERVED` after the start of its only fault.
 
-        Args:
-            moment: Start of the fault; the flight ends :data:`OBSERVED` after it.
-            vehicle: Number of the vehicle, whose changes replace those of the scenario.
-            fault: The only fault; None for the flight with which the others are compared.
-            value: Value of the parameter that is its severity.
+        The changes of the numbered ``vehicle`` replace those of the scenario. Without a fault, it is the flight with
+        which the others are compared.
         """
         table = scenario_table(self.text, self.name)
         start = self.start(moment)
@@ -138,11 +135,7 @@ class ResilienceCampaign:
 
 
 def plan(controllers: Sequence[str], faults: Sequence[str]) -> ResilienceCampaign:
-    """Return the campaign of some controllers and faults.
-
-    Args:
-        controllers: Scenarios, by name or path.
-        faults: Names in :data:`hsv.flight.resilience.faults.TRIED`.
+    """Return the campaign of controllers (scenarios, by name or path) and faults (names in :data:`TRIED`).
 
     Raises:
         CampaignError, ScenarioError: Names what is wrong.

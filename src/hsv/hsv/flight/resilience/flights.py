@@ -109,10 +109,7 @@ class SubjectRunner:
 def distances(flight: FlightData, without: FlightData, start: float) -> tuple[float, float, float | None]:
     """Return largest distances of attitude (rad) and altitude (m), and recovery time (s), after ``start`` (s).
 
-    Args:
-        flight: Flight with the fault.
-        without: The same flight without it; if either ends early, the common steps are compared.
-        start: Start of the fault, s.
+    If the flight or that without the fault ends early, the common steps are compared.
     """
     rows = min(len(flight.time), len(without.time))
     after = np.flatnonzero(flight.time[:rows] >= start - 1e-9)
@@ -130,13 +127,10 @@ def distances(flight: FlightData, without: FlightData, start: float) -> tuple[fl
 def boundary(
     survives: Callable[[float], bool], known: dict[float, bool], resolution: float, at: Callable[[float], float]
 ) -> Boundary:
-    """Return the severities between which a controller is lost, found by bisection.
+    """Return the severities, at most ``resolution`` apart, between which a controller is lost, found by bisection.
 
-    Args:
-        survives: Flies a severity, and returns whether the controller survives it.
-        known: Known results by severity.
-        resolution: Largest distance of the two severities.
-        at: Returns the nearest severity that can be flown; some parameters are integers.
+    ``survives`` flies a severity; ``known`` are results by severity; ``at`` returns the nearest severity that can be
+    flown, as some parameters are integers.
     """
     known = dict(known)
     if all(known.values()):
