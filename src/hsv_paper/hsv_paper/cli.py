@@ -10,7 +10,8 @@ import typer
 from hsv.base.errors import QuantityError, one_of
 from hsv.cli.entry import Command
 from hsv.cli.main import run
-from hsv.cli.output import JsonOption, check_folder, check_target, console, print_estimate, print_json, stages
+from hsv.cli.options import JsonOption, check_folder, check_target
+from hsv.cli.output import console, print_estimate, print_json, stages
 
 if TYPE_CHECKING:
     from hsv_paper.claims.page import Ranks

@@ -12,21 +12,8 @@ from typer import Option
 
 from hsv.base.errors import ParameterError, RecordingError, RunError, one_of
 from hsv.base.units import significant
-from hsv.cli.output import (
-    BagArgument,
-    JsonOption,
-    SuppliedDesignOption,
-    SuppliedScenarioOption,
-    TrustOption,
-    console,
-    folded,
-    new_table,
-    print_bag_warnings,
-    print_json,
-    print_written,
-    say,
-    stages,
-)
+from hsv.cli import output
+from hsv.cli.options import BagArgument, JsonOption, SuppliedDesignOption, SuppliedScenarioOption, TrustOption
 
 if TYPE_CHECKING:
     from hsv.bags.compare import Comparison, Difference
@@ -78,7 +65,7 @@ def replay(
         require_trust(controller, bag, trust)
     names = [node] if node else list(processes)
     results = []
-    with stages() as progress:
+    with output.stages() as progress:
         if over_dds:
             from hsv.graph import replay_over_dds as real
 
@@ -94,8 +81,10 @@ def replay(
                 _print_replay(result)
     failed = [result.process.node.name for result in results if not result.passed]
     if json:
-        print_json({"bag": str(bag), "passed": not failed, "processes": [_replay_json(result) for result in results]})
-    print_bag_warnings(opened)
+        output.print_json(
+            {"bag": str(bag), "passed": not failed, "processes": [_replay_json(result) for result in results]}
+        )
+    output.print_bag_warnings(opened)
     if failed:
         raise RunError(f"{', '.join(failed)}: differs from the recording in {bag}")
 
@@ -108,16 +97,16 @@ def _print_replay(result: ProcessComparison) -> None:
     largest = [(value, t.topic, name) for t in result.topics for name, value in t.largest.items()]
     if result.identical:
         remark = f" except the padding of {padding}" if padding else ""
-        say(Text.assemble(line, (f"identical in every byte{remark}", "green")))
+        output.say(Text.assemble(line, (f"identical in every byte{remark}", "green")))
     elif not result.passed:
         first = min((t.first for t in result.topics if t.first), key=lambda d: d.step)
-        say(Text.assemble(line, ("differ", "bold red"), f" {first}"))
+        output.say(Text.assemble(line, ("differ", "bold red"), f" {first}"))
     elif largest:
         value, topic, name = max(largest)
         within = f"equal within {result.process.tolerance:g}, {different} differ in bytes"
-        say(f"{line}{within}: largest {value:.3g} in {topic} {name}")
+        output.say(f"{line}{within}: largest {value:.3g} in {topic} {name}")
     else:
-        say(f"{line}equal in every number, but {different} differ in bytes (sign of zero or NaN)")
+        output.say(f"{line}equal in every number, but {different} differ in bytes (sign of zero or NaN)")
 
 
 def _replay_json(result: ProcessComparison) -> dict[str, Any]:
@@ -191,7 +180,7 @@ def diff(
     }
     if json:
         found = _difference(earliest, "first", "second")
-        print_json(
+        output.print_json(
             {
                 "equal": earliest is None and not alone,
                 "identical": all(c.identical for c in compared) and not alone,
@@ -204,9 +193,9 @@ def diff(
             }
         )
     else:
-        say(*(f"{bag.name_of(topic)} is in {bag.path} only" for topic, bag in alone.items()))
+        output.say(*(f"{bag.name_of(topic)} is in {bag.path} only" for topic, bag in alone.items()))
         _print_comparison(compared, earliest, units)
-    print_bag_warnings(*bags)
+    output.print_bag_warnings(*bags)
     raise typer.Exit(1 if earliest or alone else 0)
 
 
@@ -218,20 +207,22 @@ def _print_comparison(
     if earliest is None:
         padding = sum(c.different_padding for c in compared)
         identical = f"identical{f' in every byte except the padding of {padding}' if padding else ''}"
-        say(f"{count} messages: {identical if all(c.identical for c in compared) else 'equal within the tolerance'}")
+        output.say(
+            f"{count} messages: {identical if all(c.identical for c in compared) else 'equal within the tolerance'}"
+        )
     else:
-        say(folded(f"first difference at t = {earliest.time_ns * 1e-9:.2f} s: {earliest}"))
+        output.say(output.folded(f"first difference at t = {earliest.time_ns * 1e-9:.2f} s: {earliest}"))
         if common < max(sum(c.expected_count for c in compared), count):
             equal = "" if any(c.largest for c in compared) else ", and they are equal"
-            say(f"{common} messages of the same steps are compared{equal}")
-    table = new_table("topic", "field", "largest difference")
+            output.say(f"{common} messages of the same steps are compared{equal}")
+    table = output.new_table("topic", "field", "largest difference")
     for comparison in compared:
         for name, value in comparison.largest.items():
             unit = units[comparison.topic][name]
             number = f"{significant(value)} {'(mixed units)' if ',' in unit else unit}".rstrip()
             table.add_row(comparison.topic, name, "no number" if math.isnan(value) else number)
     if table.row_count:
-        console.print(table)
+        output.console.print(table)
 
 
 def export(
@@ -285,8 +276,8 @@ def export(
         home = opened.folder.absolute()
         out = out or home / (f"{home.name}.{chosen[0]}" if chosen[0].single else chosen[0])
         written = tables.export(opened, topic or [name for name in TOPICS if name in opened.roles], chosen[0], out)
-    print_written(written, json)
-    print_bag_warnings(opened)
+    output.print_written(written, json)
+    output.print_bag_warnings(opened)
 
 
 def recover(
@@ -318,7 +309,7 @@ def recover(
         lost, missing = None, [str(error).removeprefix(f"{kept.path}: ")]
     loss = recovery.bag.loss
     if json:
-        print_json(
+        output.print_json(
             {
                 "path": str(recovery.path),
                 "changed": recovery.changed,
@@ -333,11 +324,11 @@ def recover(
         )
         return
     complete = "" if recovery.changed else "already complete: "
-    say(f"{recovery.path}: {complete}{recovery.messages} messages, {seconds:.2f} s")
+    output.say(f"{recovery.path}: {complete}{recovery.messages} messages, {seconds:.2f} s")
     if recovery.changed:
-        say(*loss_in_words(loss))
+        output.say(*loss_in_words(loss))
         if lost != 0.0:
-            say(f"{'an unknown time' if lost is None else f'{lost:.2f} s'} lost: {'; '.join(missing)}")
+            output.say(f"{'an unknown time' if lost is None else f'{lost:.2f} s'} lost: {'; '.join(missing)}")
 
 
 def play(
@@ -357,6 +348,6 @@ def play(
     from hsv.bags.reader import Bag
     from hsv.graph.launcher import become
 
-    print_bag_warnings(Bag(bag))
+    output.print_bag_warnings(Bag(bag))
     words = [str(bag), "--rate", str(rate), "--delay", str(delay), *(["--topics", *topic] if topic else [])]
     become(PLAYER, [*words, *([] if clock else ["--no-clock"]), *(["--paused"] if paused else [])], namespace)

@@ -12,7 +12,8 @@ from typer import Argument, Option
 from hsv.base.errors import DesignError, ParameterError, QuantityError
 from hsv.base.files import json_text
 from hsv.base.units import UnitSystem, in_words, significant
-from hsv.cli.output import (
+from hsv.cli import output
+from hsv.cli.options import (
     DesignArgument,
     ForceOption,
     JsonOption,
@@ -21,22 +22,6 @@ from hsv.cli.output import (
     check_folder,
     check_new,
     check_target,
-    console,
-    folded,
-    json_system,
-    new_table,
-    print_estimate,
-    print_json,
-    print_matrix,
-    print_section,
-    print_table,
-    print_written,
-    quantity_table,
-    report_error,
-    say,
-    stages,
-    to_json,
-    unit_key,
     writing,
 )
 
@@ -46,12 +31,10 @@ if TYPE_CHECKING:
     import numpy as np
     from rich.table import Table
 
-    from hsv.control.checks import Check, Subject
+    from hsv.control.checks import Subject
     from hsv.control.design import ControlDesign
     from hsv.control.fmu_export import ExportedBlock
     from hsv.control.linear_model import LinearModel
-    from hsv.design.compare import Row
-    from hsv.design.inputs import DesignInputs
     from hsv.model.lpv.linearisation import Mode
 
 _DESIGN_SECONDS = {"baseline": 175.0, "adjustable": 294.0}
@@ -108,9 +91,9 @@ def trim(
     acting = zip(units_of_forces.items(), forces(found.state, found.input, parameters), strict=True)
     quantities = found.quantities | {name: (value, unit) for (name, unit), value in acting}
     if json:
-        print_json(to_json(quantities, units) | {"largest_residual_si": found.residual})
+        output.print_json(output.to_json(quantities, units) | {"largest_residual_si": found.residual})
     else:
-        print_table("Trim", quantities, units, digits=5)
+        output.print_table("Trim", quantities, units, digits=5)
 
 
 def linearise(
@@ -143,7 +126,7 @@ def linearise(
     poles, other_poles = found.poles, linearised(other).poles if other else []
     shown = found.in_units(units)
     if json or out:
-        units = json_system(units)
+        units = output.json_system(units)
         shown = found.in_units(units)
         described = _described(shown, units) | {"poles": list(map(_pole, poles))}
         if other:
@@ -155,16 +138,16 @@ def linearise(
             else:
                 shown.save(out)
     if json:
-        print_json(described)
+        output.print_json(described)
         return
     for name, matrix, columns in (("A", shown.A, shown.states), ("B", shown.B, shown.inputs)):
         cells = [[significant(entry) for entry in row] for row in matrix.tolist()]
-        print_matrix(f"{name} ({UNIT_SYSTEMS[units]})", list(shown.states), list(columns), cells)
-    console.print(_pole_table("Poles", poles))
+        output.print_matrix(f"{name} ({UNIT_SYSTEMS[units]})", list(shown.states), list(columns), cells)
+    output.console.print(_pole_table("Poles", poles))
     if other:
-        console.print(_pole_table("Poles for the other reading of eq. 40", other_poles))
+        output.console.print(_pole_table("Poles for the other reading of eq. 40", other_poles))
     if out:
-        say(f"written {out}")
+        output.say(f"written {out}")
 
 
 def _described(model: LinearModel, units: UnitSystem) -> dict[str, Any]:
@@ -173,7 +156,7 @@ def _described(model: LinearModel, units: UnitSystem) -> dict[str, Any]:
     matrices = {f"{name}_{units}": values.pop(name) for name in "ABCD"}
     points = (("state", model.states), ("input", model.inputs))
     at = {
-        f"{name}{'_' * bool(unit_key(unit))}{unit_key(unit)}": value
+        f"{name}{'_' * bool(output.unit_key(unit))}{output.unit_key(unit)}": value
         for kind, signals in points
         for (name, unit), value in zip(signals.items(), values.pop(f"operating_{kind}"), strict=True)
     }
@@ -196,7 +179,7 @@ def _pole(mode: Mode) -> dict[str, float | None]:
 
 def _pole_table(title: str, poles: list[Mode]) -> Table:
     headings = ("real rad/s", "imaginary rad/s", "frequency rad/s", "damping ratio")
-    table = new_table(*headings, title=title, right=headings)
+    table = output.new_table(*headings, title=title, right=headings)
     for mode in poles:
         damping = _damping(mode)
         table.add_row(
@@ -252,8 +235,8 @@ def design(
     import cvxpy  # noqa: F401  where it is missing, the command ends before the estimate
 
     size = "adjustable" if inputs.adjustable else "baseline"
-    print_estimate(_DESIGN_SECONDS[size], json, f" for a design of the size of {size}")
-    with stages() as progress:
+    output.print_estimate(_DESIGN_SECONDS[size], json, f" for a design of the size of {size}")
+    with output.stages() as progress:
         result = (design_adjustable if inputs.adjustable else design_baseline)(inputs, progress)
     if shipped:
         _check(shipped, result.design, json)
@@ -263,18 +246,24 @@ def design(
         write_design(target, result.design, f"Written by: {command}. SI units; see offline_design/README.md.")
     with writing(certificate_path(target), "certificate"):
         write_certificate(certificate_path(target), result.report)
-    rows = _compared(result.design, result.report, inputs) if compare_sets else []
+    rows = []
+    if compare_sets:
+        from hsv.design import compare, disturbance, tube_problem
+
+        W = disturbance.DisturbanceSet.from_report(result.report["tube"]["disturbance"]["channels"])
+        problem = tube_problem.tube_problem(result.design, inputs.flown_vehicle, W)
+        rows = compare.compare_sets(result.design, problem, inputs.invariant_set)
     if json:
         compared = {"compared_sets": [row.as_dict() for row in rows]} if rows else {}
-        print_json(result.report | compared | {"file": str(target)})
+        output.print_json(result.report | compared | {"file": str(target)})
         return
     _summary(result.report)
-    say(f"written {target}, {certificate_path(target).name}")
+    output.say(f"written {target}, {certificate_path(target).name}")
     if rows:
         title = "Invariant sets: half-widths about the centre"
         sets = [(row.name, _half_widths(row.half_width, row.feedback, row.size)) for row in rows]
-        console.print(quantity_table(title, {**HALF_WIDTHS, "size": "1"}, sets, units))
-        say(*(folded(f"{row.name}: {row.note}") for row in rows if row.note))
+        output.console.print(output.quantity_table(title, {**HALF_WIDTHS, "size": "1"}, sets, units))
+        output.say(*(output.folded(f"{row.name}: {row.note}") for row in rows if row.note))
 
 
 def _half_widths(half_width: np.ndarray | None, feedback: np.ndarray | None, *size: float | None) -> list[float] | None:
@@ -284,29 +273,20 @@ def _half_widths(half_width: np.ndarray | None, feedback: np.ndarray | None, *si
     return [*half_width[:5], *feedback, *(value for value in size if value is not None)]
 
 
-def _compared(design: ControlDesign, report: dict[str, Any], inputs: DesignInputs) -> list[Row]:
-    from hsv.design.compare import compare_sets
-    from hsv.design.disturbance import DisturbanceSet
-    from hsv.design.tube_problem import tube_problem
-
-    disturbance = DisturbanceSet.from_report(report["tube"]["disturbance"]["channels"])
-    return compare_sets(design, tube_problem(design, inputs.flown_vehicle, disturbance), inputs.invariant_set)
-
-
 def _check(shipped: Subject, found: ControlDesign, json: bool) -> None:
     from hsv.design.agreement import deviations
 
     deviating = deviations(found, shipped)
     worst = max(deviating, key=lambda deviation: deviation.scaled)
     if json:
-        print_json({"deviations": [vars(deviation) for deviation in deviating], "ok": worst.ok})
+        output.print_json({"deviations": [vars(deviation) for deviation in deviating], "ok": worst.ok})
     else:
-        table = new_table("parameter", "largest deviation, scaled", "entry")
+        table = output.new_table("parameter", "largest deviation, scaled", "entry")
         for d in deviating:
             table.add_row(d.parameter, significant(d.scaled), ", ".join(map(str, d.index)) if d.scaled else "")
-        console.print(table)
+        output.console.print(table)
     if not worst.ok:
-        report_error(str(worst))
+        output.report_error(str(worst))
         raise typer.Exit(1)
 
 
@@ -324,7 +304,7 @@ def _summary(report: dict[str, Any]) -> None:
     if adjustable := report.get("adjustable"):
         whole, tau = adjustable["complete_fault"], ", ".join(f"{value:g}" for value in adjustable["tau"])
         lines["factor tau"] = f"from {tau}; worst level {whole['worst_level']:.3f} of 1 with the whole fault"
-    print_section("design", lines)
+    output.print_section("design", lines)
 
 
 def verify(
@@ -350,7 +330,7 @@ def verify(
     if corners and not scenario:
         raise QuantityError("corners: expected with --scenario only")
     subject = load_subject(find_design(file))
-    with stages() as progress:
+    with output.stages() as progress:
         checks = recompute(subject, quick or bool(scenario), progress)
         if scenario:
             over = bounding_corners(subject) if corners else [{}]
@@ -360,29 +340,26 @@ def verify(
     stated = unchecked(subject, [check for _, check in rows])
     if json:
         claims = [{"part": part, **vars(check)} for part, check in rows]
-        print_json({"claims": claims, "stated": stated, "ok": not failing})
+        output.print_json({"claims": claims, "stated": stated, "ok": not failing})
     else:
         for part, made in checks.items():
             if made:
-                say(Text(part, "bold"))
+                output.say(Text(part, "bold"))
             for check in made:
                 expected = f", expected {check.expected}" if check.expected else ""
-                line = folded(f"{'ok' if check.ok else 'FAIL':4}  {check.name}: {_found(check)}{expected}", 8)
-                say(line if check.ok else Text(line, "bold red"))
+                # In full, if three digits hide on which side of a bound the number is.
+                value = check.value
+                hides = isinstance(value, str) or not check.ok or (short := significant(value)) in ("1", "-1")
+                found = check.shown if hides else short
+                line = output.folded(f"{'ok' if check.ok else 'FAIL':4}  {check.name}: {found}{expected}", 8)
+                output.say(line if check.ok else Text(line, "bold red"))
         if stated:
-            say(folded(f"stated, not checked: {', '.join(stated)}"))
-        say(Text(f"{len(rows) - len(failing)} of {len(rows)} checks pass", "bold"))
+            output.say(output.folded(f"stated, not checked: {', '.join(stated)}"))
+        output.say(Text(f"{len(rows) - len(failing)} of {len(rows)} checks pass", "bold"))
     if failing:
         part, check = failing[0]
-        report_error(f"{part}: check fails: {check}")
+        output.report_error(f"{part}: check fails: {check}")
         raise typer.Exit(1)
-
-
-def _found(check: Check) -> str:
-    """Return the value found to three digits, or in full if they hide on which side of a bound it is."""
-    if isinstance(check.value, str) or not check.ok or significant(check.value) in ("1", "-1"):
-        return check.shown
-    return significant(check.value)
 
 
 def certify(
@@ -427,21 +404,21 @@ def certify(
         own, further = declared(subject, loaded, reach)
         models, unbounded = models | own, unbounded + further
         actuators = actuators or declared_actuators(loaded)
-    with stages() as progress:
+    with output.stages() as progress:
         verdicts = certified_with(subject, models, actuators, progress, unbounded)
     if json:
         found = {"verdicts": [verdict.as_dict() for verdict in verdicts], "not_covered": list(uncovered)}
-        print_json({"design": subject.design.name, **found})
+        output.print_json({"design": subject.design.name, **found})
     else:
-        say(*(folded(f"not covered by the certificate: {item}") for item in uncovered))
+        output.say(*(output.folded(f"not covered by the certificate: {item}") for item in uncovered))
         rows = [(verdict.name, _half_widths(verdict.half_width, verdict.feedback)) for verdict in verdicts]
-        console.print(quantity_table("Half-widths of the invariant set", HALF_WIDTHS, rows, units))
+        output.console.print(output.quantity_table("Half-widths of the invariant set", HALF_WIDTHS, rows, units))
         for verdict in verdicts:
             state = "certified" if verdict.certified else "not certified"
-            say(folded(f"{verdict.name}: {state}, {verdict.said(units)}"))
+            output.say(output.folded(f"{verdict.name}: {state}, {verdict.said(units)}"))
     last = next((verdict for verdict in reversed(verdicts) if not verdict.certified), None)
     if last:
-        report_error(f"{subject.design.name}: not certified with {last.name}: {last.said(units)}")
+        output.report_error(f"{subject.design.name}: not certified with {last.name}: {last.said(units)}")
         raise typer.Exit(1)
 
 
@@ -478,7 +455,7 @@ def govern(
     ]
     if json:
         keys = ("least", "largest", "lower_bound", "upper_bound", "largest_step")
-        print_json(
+        output.print_json(
             {
                 "corners": [{"time_s": t, "altitude_m": h, "velocity_m_s": v} for t, h, v, _ in reference.corners],
                 "blend_s": reference.blend,
@@ -490,18 +467,20 @@ def govern(
             }
         )
         return
-    corners = new_table("corner", "altitude", "velocity", right=("altitude", "velocity"))
+    corners = output.new_table("corner", "altitude", "velocity", right=("altitude", "velocity"))
     for t, h, v, _ in reference.corners:
         corners.add_row(f"{t:g} s", in_words(h, "m", units), in_words(v, "m/s", units))
-    console.print(corners)
-    console.print(f"corners blended over {reference.blend:g} s on either side; at rest from {reference.end:g} s on")
+    output.console.print(corners)
+    output.console.print(
+        f"corners blended over {reference.blend:g} s on either side; at rest from {reference.end:g} s on"
+    )
     heads = ("least", "largest", "lower bound", "upper bound", "largest step in a period")
-    table = new_table("nominal input", *heads, right=heads)
+    table = output.new_table("nominal input", *heads, right=heads)
     for name, unit, values in inputs:
         table.add_row(name.replace("_", " "), *(in_words(float(value), unit, units) for value in values))
-    console.print(table)
+    output.console.print(table)
     if out:
-        say(f"written {out}")
+        output.say(f"written {out}")
 
 
 FMU_HELP = "FMU for co-simulation, FMI 3.0, to write; needs a C compiler."
@@ -542,13 +521,13 @@ def export_controller(
     bounds = step_bounds(loaded)
     if not json:
         counts = ("multiplications", "additions", "comparisons", "numbers of state")
-        table = new_table("most in a step", *counts, right=counts)
+        table = output.new_table("most in a step", *counts, right=counts)
         for name, bound in bounds.items():
             table.add_row(name, *map(str, vars(bound).values()))
-        console.print(table)
+        output.console.print(table)
     costs = {name: vars(bound) for name, bound in bounds.items()}
     written = [*([out / name for name in texts] if out else ()), *([fmu] if fmu else ())]
-    print_written(written, json, most_in_a_step=costs)
+    output.print_written(written, json, most_in_a_step=costs)
 
 
 def export_vehicle(
@@ -565,7 +544,7 @@ def export_vehicle(
     from hsv.flight.scenario import load_scenario
 
     _write_fmu(fmu, exported_vehicle(load_scenario(scenario)), force)
-    print_written([fmu], json)
+    output.print_written([fmu], json)
 
 
 def _write_fmu(path: Path, block: ExportedBlock, force: bool) -> None:

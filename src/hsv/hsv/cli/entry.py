@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from hsv.base.processes import take_interrupts
 
@@ -56,15 +56,6 @@ def main() -> None:
     except KeyboardInterrupt:
         print("hsv: error: interrupted", file=sys.stderr, flush=True)
         os._exit(130)
-
-
-def __getattr__(name: str) -> Any:
-    """Return the whole command line as ``app`` to tools that document it; building it takes a moment."""
-    if name != "app":
-        raise AttributeError(name)
-    from hsv.cli.main import application
-
-    return application(COMMANDS)
 
 
 if __name__ == "__main__":

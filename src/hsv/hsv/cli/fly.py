@@ -15,28 +15,15 @@ from typer.core import TyperGroup
 
 from hsv.base.errors import CampaignError, ParameterError, RecordingError, RunError
 from hsv.base.units import UnitSystem, significant
-from hsv.cli.output import (
+from hsv.cli import output
+from hsv.cli.options import (
     BagArgument,
-    Interrupted,
     JsonOption,
     ScenarioArgument,
     TrustOption,
     UnitsOption,
     check_folder,
     check_target,
-    console,
-    errors,
-    flight_line,
-    flights,
-    print_json,
-    print_matrix,
-    print_table,
-    print_titles,
-    report_line,
-    resumable,
-    say,
-    stages,
-    to_json,
     writing,
 )
 
@@ -111,10 +98,10 @@ def run(
     def line(node: str, text: str) -> None:
         # The addresses of the live view are for the user.
         if verbose or WARNING in text or (node == LIVE.label and text.startswith("live ")):
-            report_line(node, text)
+            output.report_line(node, text)
 
     try:
-        with flight_line(prepared.scenario.name, prepared.steps, units) as (show_step, show_snapshot):
+        with output.flight_line(prepared.scenario.name, prepared.steps, units) as (show_step, show_snapshot):
 
             def step(number: int) -> None:
                 clock["end"] = time.monotonic()
@@ -125,7 +112,7 @@ def run(
     except KeyboardInterrupt:
         if not prepared.bag.is_dir():
             raise
-        raise Interrupted(f"interrupted; the steps flown so far are in {prepared.bag}") from None
+        raise output.Interrupted(f"interrupted; the steps flown so far are in {prepared.bag}") from None
     wall_time = clock["end"] - clock["start"]
     _conclude(prepared.bag, report, units, json, strict=strict, every=every, wall_time=wall_time)
 
@@ -228,7 +215,7 @@ def prepare(
         raise
     nodes = prepared.nodes
     if json:
-        print_json(
+        output.print_json(
             {
                 "scenario": prepared.scenario.name,
                 "bag": str(prepared.bag),
@@ -247,7 +234,9 @@ def prepare(
         return
     words = " ".join(f"--params-file {path}" for path in prepared.parameter_files)
     words += f" -r __ns:={namespace}" if namespace != ROOT else ""
-    say(*(f"ros2 run {node.package} {node.executable} --ros-args {words}" for node in nodes), f"bag {prepared.bag}")
+    output.say(
+        *(f"ros2 run {node.package} {node.executable} --ros-args {words}" for node in nodes), f"bag {prepared.bag}"
+    )
 
 
 def conclude(
@@ -414,16 +403,16 @@ def fly(
     check_target(out, "out", ".parquet")
     store = ResultStore(out, campaign)
     with (
-        resumable(store.folder),
-        make_executor(workers, scheduler, errors.print) as flying,
-        flights(campaign.scenario_name, campaign.samples) as progress,
+        output.resumable(store.folder),
+        make_executor(workers, scheduler, output.errors.print) as flying,
+        output.flights(campaign.scenario_name, campaign.samples) as progress,
     ):
         flown = run_campaign(campaign, store, flying, restart=restart, progress=progress)
     # The results are trusted: their code is that of the user's own scenario.
     results = Results(out, trust=True)
     show_campaign(results, units, json, page, flown.flights)
     if flown.flights and not json:
-        say(f"flown in {significant(flown.wall_time)} s")
+        output.say(f"flown in {significant(flown.wall_time)} s")
     if results.crashed.all():
         raise RunError(f"all {campaign.samples} flights crashed, the first: {results.row(0)['crashed']}")
 
@@ -470,14 +459,14 @@ def replay(
     results = Results(result, trust=trust)
     if over_dds:
         target = bag or Path("bags", f"{result.stem}_flight_{flight}")
-        with stages() as bar:
+        with output.stages() as bar:
             replayed = replay_over_dds(results, flight, target, lambda step, steps: bar("over DDS", step, steps))
     else:
         replayed = replay_in_process(results, flight)
     outcome, differing, sample = replayed.repeated, replayed.differing, results.sample(flight)
     quantities = {name: (float(v), unit) for name, unit in OUTCOMES.items() if (v := outcome.get(name)) is not None}
     if json:
-        print_json(
+        output.print_json(
             {
                 "flight": flight,
                 "identical": not differing,
@@ -485,21 +474,21 @@ def replay(
                 "diverged": outcome["diverged"],
                 "crashed": outcome["crashed"],
                 "sample_si": sample,
-                "outcome": to_json(quantities, units),
+                "outcome": output.to_json(quantities, units),
                 "fingerprint": outcome.get("fingerprint"),
                 "bag": str(replayed.bag) if replayed.bag else None,
             }
         )
     else:
-        print_table(f"flight {flight} of {result.name}", quantities, units)
+        output.print_table(f"flight {flight} of {result.name}", quantities, units)
         crashed = outcome["crashed"]
-        say(
+        output.say(
             f"sample  {sample_words(sample, units)}",
             f"crashed {crashed}" if crashed else f"fingerprint {outcome['fingerprint']}",
             *([f"bag     {replayed.bag}"] if replayed.bag else []),
         )
         if not differing:
-            console.print("identical to the campaign's flight in every bit", style="green")
+            output.console.print("identical to the campaign's flight in every bit", style="green")
     if differing:
         name = differing[0]
         raise RunError(
@@ -561,7 +550,7 @@ def resilience(
     from hsv.pages.resilience import write_results
 
     if listed:
-        print_titles({name: parameter_words(name) for name in TRIED}, json)
+        output.print_titles({name: parameter_words(name) for name in TRIED}, json)
         return
     scenarios, kinds = ([name.strip() for name in text.split(",") if text] for text in (controllers, faults))
     # A type of hsv list faults stands for all faults of this type.
@@ -570,9 +559,9 @@ def resilience(
     check_folder(out, "out")
     store = CaseStore(out, campaign)
     with (
-        resumable(store.folder),
-        make_executor(workers, scheduler, errors.print) as flying,
-        flights("resilience", sum(case.flights for case in campaign.batches)) as progress,
+        output.resumable(store.folder),
+        make_executor(workers, scheduler, output.errors.print) as flying,
+        output.flights("resilience", sum(case.flights for case in campaign.batches)) as progress,
     ):
         flown = run_campaign(campaign, store, flying, progress=progress)
     results = ResilienceResults.read(campaign, store)
@@ -580,15 +569,15 @@ def resilience(
     written = write_results(results, out, shlex.join(["hsv", "resilience", *options]))
     if json:
         values = {"cases_flown_now": flown.batches, "flown_in_s": flown.wall_time}
-        print_json({"written": list(map(str, written)), **values, "cells": _cells(results)})
+        output.print_json({"written": list(map(str, written)), **values, "cells": _cells(results)})
     else:
         names = [subject.name for subject in results.campaign.subjects]
         rows = results.campaign.faults
         cells = [["{} of {}".format(*results.squares[fault, name].survived) for name in names] for fault in rows]
-        print_matrix("flights survived", [fault.replace("_", " ") for fault in rows], names, cells)
+        output.print_matrix("flights survived", [fault.replace("_", " ") for fault in rows], names, cells)
         if flown.batches:
-            say(f"flown in {flown.wall_time:.0f} s")
-        say(f"written {', '.join(map(str, written))}")
+            output.say(f"flown in {flown.wall_time:.0f} s")
+        output.say(f"written {', '.join(map(str, written))}")
     crashes = [flight.crashed for flight in results.flights]
     if all(crashes):
         raise RunError(f"all {len(crashes)} flights crashed, the first: {crashes[0]}")

@@ -9,7 +9,7 @@ import typer
 from typer import Argument, Option
 
 from hsv.base.units import UnitSystem
-from hsv.cli.output import GraphNamespaceOption, JsonOption, UnitsOption
+from hsv.cli.options import GraphNamespaceOption, JsonOption, UnitsOption
 
 if TYPE_CHECKING:
     from hsv.bags.description import NodeDescription

@@ -14,22 +14,8 @@ from typer import Argument, Option
 
 from hsv.base.errors import HsvError, ParameterError, QuantityError, RunError, one_of
 from hsv.base.units import UnitSystem, in_system
-from hsv.cli.output import (
-    JsonOption,
-    ListJsonOption,
-    UnitsOption,
-    console,
-    errors,
-    folded,
-    json_system,
-    new_table,
-    print_json,
-    print_rows,
-    print_titles,
-    report_error,
-    say,
-    stages,
-)
+from hsv.cli import output
+from hsv.cli.options import JsonOption, ListJsonOption, UnitsOption
 
 if TYPE_CHECKING:
     from hsv.cli.bench import Figure
@@ -58,7 +44,7 @@ def list_(
 
     Example: hsv list scenarios case2_derived
     """
-    system = json_system(units) if json else units
+    system = output.json_system(units) if json else units
     if kind is Kind.scenarios:
         _list_scenarios(name, json)
     elif kind is Kind.vehicles:
@@ -80,22 +66,22 @@ def _list_scenarios(name: str, json: bool) -> None:
     from hsv.flight.scenario import load_scenario, scenario_at_means, scenario_names, scenario_table, scenario_text
 
     if not name:
-        print_titles({name: load_scenario(name).title for name in scenario_names()}, json)
+        output.print_titles({name: load_scenario(name).title for name in scenario_names()}, json)
         return
     text, stem = scenario_text(name), Path(name).stem
     table = scenario_table(text, stem)
     scenario_at_means(table, stem)
-    print_json(table) if json else print(text, end="")
+    output.print_json(table) if json else print(text, end="")
 
 
 def _list_vehicles(name: str, json: bool) -> None:
     from hsv.model.vehicle import load_vehicle, vehicle_names, vehicle_tables, vehicle_text
 
     if not name:
-        print_titles({name: load_vehicle(name).title for name in vehicle_names()}, json)
+        output.print_titles({name: load_vehicle(name).title for name in vehicle_names()}, json)
     elif json:
         vehicle_text(name)
-        print_json(vehicle_tables(name))
+        output.print_json(vehicle_tables(name))
     else:
         print(vehicle_text(name), end="")
 
@@ -111,7 +97,7 @@ def _list_controllers(name: str, json: bool) -> None:
             description = str(error)  # of an installed package that cannot be loaded
         titles[known] = description
     _known(Kind.controllers, name, titles)
-    print_titles({name: titles[name]} if name else titles, json)
+    output.print_titles({name: titles[name]} if name else titles, json)
 
 
 def _list_faults(name: str, units: UnitSystem, json: bool) -> None:
@@ -130,19 +116,19 @@ def _list_faults(name: str, units: UnitSystem, json: bool) -> None:
     if name:
         parameters = list(_fault_parameters(name, units))
         if json:
-            print_json({"type": name, **kinds[name], "parameters": parameters})
+            output.print_json({"type": name, **kinds[name], "parameters": parameters})
             return
-        say(folded(f"{name}: {kinds[name]['meaning']}"))
-        say(folded(f"side: {kinds[name]['side']}; channels: {channels[name]}"))
+        output.say(output.folded(f"{name}: {kinds[name]['meaning']}"))
+        output.say(output.folded(f"side: {kinds[name]['side']}; channels: {channels[name]}"))
         for row in parameters:
             # One column holds a parameter and its channel.
             channel = row.pop("channel")
             row["parameter"] += f" of {channel}" if channel else ""
-        print_rows(parameters)
+        output.print_rows(parameters)
     elif json:
-        print_json(kinds)
+        output.print_json(kinds)
     else:
-        print_rows([{"type": name, **kind, "channels": channels[name]} for name, kind in kinds.items()])
+        output.print_rows([{"type": name, **kind, "channels": channels[name]} for name, kind in kinds.items()])
 
 
 def _fault_parameters(type: str, units: UnitSystem) -> Iterator[dict[str, Any]]:
@@ -175,13 +161,17 @@ def _list_equipment(name: str, units: UnitSystem, json: bool) -> None:
     sets = _equipment_sets(units)
     _known(Kind.equipment, name, sets)
     if json:
-        print_json({"name": name, **sets[name]} if name else sets)
+        output.print_json({"name": name, **sets[name]} if name else sets)
     elif name:
-        say(folded(f"{name}: {sets[name]['source']}"), f'in a scenario: [{sets[name]["table"]}] set = "{name}"')
+        output.say(
+            output.folded(f"{name}: {sets[name]['source']}"), f'in a scenario: [{sets[name]["table"]}] set = "{name}"'
+        )
         if sets[name]["numbers"]:
-            print_rows(sets[name]["numbers"])
+            output.print_rows(sets[name]["numbers"])
     else:
-        print_rows([{"set": key, "table": entry["table"], "source": entry["source"]} for key, entry in sets.items()])
+        output.print_rows(
+            [{"set": key, "table": entry["table"], "source": entry["source"]} for key, entry in sets.items()]
+        )
 
 
 def _equipment_sets(units: UnitSystem) -> dict[str, dict[str, Any]]:
@@ -231,23 +221,25 @@ def check(
 
     scenario = scenario_of(flown)
     found = []
-    with stages() as progress:
+    with output.stages() as progress:
         for finding in findings(scenario):
             found.append(finding)
             progress(scenario.controller, len(found), 4)
     failing = [finding for finding in found if finding.difference]
     if json:
         checks = [vars(finding) | {"same": not finding.difference} for finding in found]
-        print_json({"controller": scenario.controller, "scenario": scenario.name, "ok": not failing, "checks": checks})
+        output.print_json(
+            {"controller": scenario.controller, "scenario": scenario.name, "ok": not failing, "checks": checks}
+        )
     else:
         title = f"{scenario.controller} in {scenario.name}"
-        table = new_table("check", "flights", "bytes", title=title, right=["flights"])
+        table = output.new_table("check", "flights", "bytes", title=title, right=["flights"])
         for finding in found:
             style = "bold red" if finding.difference else None
             table.add_row(finding.check, str(finding.flights), finding.difference or "the same", style=style)
-        console.print(table)
+        output.console.print(table)
     if failing:
-        report_error(f"{scenario.controller}, {failing[0].check}: {failing[0].difference}")
+        output.report_error(f"{scenario.controller}, {failing[0].check}: {failing[0].difference}")
         raise typer.Exit(1)
 
 
@@ -263,7 +255,7 @@ def bench(
 
     Example: hsv bench --only in_process --only startup
     """
-    from hsv.cli.bench import groups, machine, read_run
+    from hsv.cli.bench import groups, machine, read_run, readable
     from hsv.graph.preparation import commit
 
     if not 0.0 < scale <= 100.0:
@@ -276,7 +268,7 @@ def bench(
     chosen = [name for name in available if not only or name in only]
     measured: dict[str, list[Figure]] = {}
     skipped: dict[str, str] = {}
-    with stages() as progress:
+    with output.stages() as progress:
         for number, name in enumerate(chosen):
             progress("measuring", number, len(chosen))
             try:
@@ -291,35 +283,28 @@ def bench(
         described = [figure.as_dict(group) for group, found in measured.items() for figure in found]
         run = {"commit": commit(), "machine": machine(), "figures": described, "skipped": skipped}
         compared = {"slower_than_recorded": slower, "recorded_but_not_measured": absent} if compare else {}
-        print_json(run | compared)
+        output.print_json(run | compared)
     else:
-        _print_figures(list(figures.values()))
+        for figure in figures.values():
+            ours, theirs = (readable(sorted(times)[len(times) // 2]) for times in (figure.ours, figure.theirs))
+            low, high = figure.spread
+            output.say(Text(output.folded(figure.what), "bold"))
+            ratio = f"ratio {figure.ratio:.3g} ({low:.3g} to {high:.3g})"
+            output.say(output.folded(f"{ours} against {theirs} of {figure.against}: {ratio}", 4, first=4))
+            promise = "; ".join(filter(None, (figure.verdict, figure.note)))
+            output.say(Text(output.folded(promise, 4, first=4), "bold red" if "WORSE" in promise else ""))
         if not only:
             for name, reason in skipped.items():
-                errors.print(f"{name}: not measured: {reason}", soft_wrap=True)
+                output.errors.print(f"{name}: not measured: {reason}", soft_wrap=True)
         if compare:
-            say(Text(f"since {since}", "bold"))
+            output.say(Text(f"since {since}", "bold"))
             for name, change in slower.items():
                 word, style = ("SLOWER", "bold red") if change > 0.0 else ("faster" if change else "as before", "")
-                say(
+                output.say(
                     Text(f"    {name}: {word}, {recorded[name].ratio:.3g} before, {figures[name].ratio:.3g} now", style)
                 )
-            say(*(f"    {name}: recorded there, not measured here" for name in absent))
+            output.say(*(f"    {name}: recorded there, not measured here" for name in absent))
     if only and skipped:
         raise RunError("; ".join(f"only = {name!r}: not measured: {reason}" for name, reason in skipped.items()))
     if any(change > 0.0 for change in slower.values()):
         raise typer.Exit(1)
-
-
-def _print_figures(figures: list[Figure]) -> None:
-    """Print one paragraph per figure: a table of all figures is wider than a terminal."""
-    from hsv.cli.bench import readable
-
-    for figure in figures:
-        ours, theirs = (readable(sorted(times)[len(times) // 2]) for times in (figure.ours, figure.theirs))
-        low, high = figure.spread
-        say(Text(folded(figure.what), "bold"))
-        text = f"{ours} against {theirs} of {figure.against}: ratio {figure.ratio:.3g} ({low:.3g} to {high:.3g})"
-        say(folded(text, 4, first=4))
-        promise = "; ".join(filter(None, (figure.verdict, figure.note)))
-        say(Text(folded(promise, 4, first=4), "bold red" if "WORSE" in promise else ""))

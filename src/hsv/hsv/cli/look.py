@@ -11,21 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument, Option
 
 from hsv.base.units import UnitSystem, in_words, significant
-from hsv.cli.output import (
+from hsv.cli import output
+from hsv.cli.options import (
     BagArgument,
     JsonOption,
     SuppliedDesignOption,
     SuppliedScenarioOption,
     UnitsOption,
     check_target,
-    console,
-    new_table,
-    print_bag_warnings,
-    print_json,
-    print_section,
-    print_written,
-    say,
-    to_json,
     writing,
 )
 
@@ -71,8 +64,8 @@ def report(
         for bag in opened:
             supply(bag, design, scenario)
     write_report(opened, out, units=units)
-    print_written([out], json)
-    print_bag_warnings(*opened)
+    output.print_written([out], json)
+    output.print_bag_warnings(*opened)
 
 
 def plot(
@@ -97,8 +90,8 @@ def plot(
     remarks = [f"{name}: {'; '.join(words)}" for name, bag in named.items() if (words := bag_warnings(bag))]
     with writing(out, "out"):
         save_figure(flight_figure(flights, units, remarks), out)
-    print_written([out], json)
-    print_bag_warnings(*opened)
+    output.print_written([out], json)
+    output.print_bag_warnings(*opened)
 
 
 def view(
@@ -141,10 +134,10 @@ def view(
     subprocess.Popen(command, start_new_session=True, stdin=subprocess.DEVNULL)
     layout = str(made) if viewer.imports else None
     if json:
-        print_json({"path": str(mcap), "viewer": viewer.name, "command": command, "layout_to_import": layout})
+        output.print_json({"path": str(mcap), "viewer": viewer.name, "command": command, "layout_to_import": layout})
     else:
-        say(f"opening {mcap} with {viewer.name}", *([f"layout to import there: {layout}"] if layout else []))
-    print_bag_warnings(opened)
+        output.say(f"opening {mcap} with {viewer.name}", *([f"layout to import there: {layout}"] if layout else []))
+    output.print_bag_warnings(opened)
 
 
 def info(
@@ -163,13 +156,13 @@ def info(
     described = []
     for number, opened in enumerate([Bag(bag) for bag in bags]):
         if number and not json:
-            console.print()
+            output.console.print()
         description, problem = _described(opened, units, json)
         described.append(description)
         if problem:
             break
     if json:
-        print_json(described[0] if len(bags) == 1 else {"bags": described})
+        output.print_json(described[0] if len(bags) == 1 else {"bags": described})
     if problem:
         raise problem
 
@@ -197,12 +190,12 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
     if not json:
         _print_description(description, units)
         if lacking:
-            say(f"no metrics: they need {', '.join(lacking)}")
+            output.say(f"no metrics: they need {', '.join(lacking)}")
         elif not problem:
             print_metrics(f"Metrics of an incomplete bag: {remark}" if remark else "Metrics", metrics, units)
     if not problem:
-        print_bag_warnings(opened)
-    measured = {"metrics_complete": not remark, "metrics": to_json(quantities, units)}
+        output.print_bag_warnings(opened)
+    measured = {"metrics_complete": not remark, "metrics": output.to_json(quantities, units)}
     return description | ({"metrics": None} if problem or lacking else measured), problem
 
 
@@ -229,11 +222,11 @@ def _print_description(description: dict[str, Any], units: UnitSystem) -> None:
     }
     if description["not_covered"]:
         heading["not covered"] = "; ".join(map(str, description["not_covered"]))
-    print_section("bag", heading)
-    table = new_table("topic", "type", "messages", "rate Hz", right=("messages", "rate Hz"))
+    output.print_section("bag", heading)
+    table = output.new_table("topic", "type", "messages", "rate Hz", right=("messages", "rate Hz"))
     for topic in description["topics"]:
         table.add_row(topic["name"], topic["type"], str(topic["messages"]), significant(topic["rate_hz"] or 0.0))
-    console.print(table)
+    output.console.print(table)
 
 
 def _intervals(intervals: list[dict[str, Any]] | None, name: Callable[[dict[str, Any]], str]) -> str:

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import mkdtemp
 from textwrap import TextWrapper
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 from unicodedata import category
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
-from typer import Argument, Option
 
-from hsv.base.errors import ParameterError, reason
 from hsv.base.files import json_text
 from hsv.base.units import UnitSystem, duration_in_words, in_system, significant, unit_in
 
@@ -32,23 +28,6 @@ if TYPE_CHECKING:
 
 Quantity = tuple[float, str]
 """A number and its SI unit."""
-
-BagArgument = Annotated[Path, Argument(help="Bag directory, or its .mcap file.")]
-DesignArgument = Annotated[
-    str, Argument(help="Design: a parameter file with its certificate next to it, or a shipped name.")
-]
-ScenarioArgument = Annotated[str, Argument(help="Name of a shipped scenario, or path of a TOML file.")]
-
-ForceOption = Annotated[bool, Option("--force", help="Overwrite existing files.")]
-GraphNamespaceOption = Annotated[str, Option("--namespace", help="Namespace of the graph, such as /veh1.")]
-JsonOption = Annotated[bool, Option("--json", help="Print JSON, with the unit in every key.")]
-ListJsonOption = Annotated[bool, Option("--json", help="Print JSON, with a unit for every number.")]
-SuppliedDesignOption = Annotated[Path | None, Option("--design", help="Design of a bag without attachments.")]
-SuppliedScenarioOption = Annotated[str | None, Option("--scenario", help="Scenario of a bag without attachments.")]
-TrustOption = Annotated[bool, Option("--trust", help="Run code that the file names, such as controllers.")]
-UnitsOption = Annotated[
-    UnitSystem, Option(help="SI with degrees and percent, strict SI, or the paper's ft, ft/s, deg.")
-]
 
 _COLUMN = 12
 """Width (characters) of a column of a matrix, including the gap."""
@@ -326,49 +305,3 @@ def flights(title: str, total: int) -> Iterator[Callable[[int], None]]:
             bar.update(task, completed=finished, note=f"{finished} of {total} flights, {rate:.1f} / s{left}")
 
         yield report
-
-
-def check_target(path: Path, field: str, *suffixes: str) -> None:
-    """Refuse a file that ends in none of the ``suffixes``, or that could not be written, before any work is done."""
-    if suffixes and path.suffix not in suffixes:
-        ends = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
-        raise ParameterError(f"{field} = {str(path)!r}: expected a file that ends in {ends}")
-    usable = os.access(path, os.W_OK) and not path.is_dir() if path.exists() else _takes_files(path.parent)
-    if not usable:
-        raise ParameterError(f"{field} = {str(path)!r}: cannot be written, expected a file in an existing folder")
-
-
-def check_new(path: Path, field: str, force: bool) -> None:
-    """Refuse a file that could not be written, or that exists unless ``force`` is given."""
-    check_target(path, field)
-    if path.exists() and not force:
-        raise ParameterError(f"{field} = {str(path)!r}: exists, expected a new file, or --force to overwrite it")
-
-
-def check_folder(path: Path, field: str) -> None:
-    """Refuse a folder that could not be written or made; it is not made yet."""
-    there = path.absolute()
-    while not os.path.lexists(there):
-        there = there.parent
-    if not _takes_files(there):
-        raise ParameterError(f"{field} = {str(path)!r}: cannot be written, expected a folder or the name of a new one")
-
-
-@contextmanager
-def writing(path: Path, field: str) -> Iterator[None]:
-    """Convert system errors while ``path`` is written into a ``ParameterError``; an incomplete file is removed."""
-    try:
-        yield
-    except OSError as error:
-        if path.is_file():
-            path.unlink()
-        raise ParameterError(f"{field} = {str(path)!r}: cannot be written ({reason(error)})") from error
-
-
-def _takes_files(folder: Path) -> bool:
-    # Permissions do not tell: a file system may be read-only, or hold no files.
-    try:
-        Path(mkdtemp(dir=folder)).rmdir()
-    except OSError:
-        return False
-    return True

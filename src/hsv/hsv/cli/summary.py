@@ -12,7 +12,7 @@ from rich.text import Text
 
 from hsv.base.errors import RunError
 from hsv.base.units import UnitSystem, in_system, significant, unit_in
-from hsv.cli.output import console, folded, json_system, new_table, print_json, print_section, say, to_json
+from hsv.cli import output
 from hsv.flight.fingerprint import as_published, published_in_words
 from hsv.flight.flight import step_times_in_words
 from hsv.flight.limits import Verdict, in_units, limits_kept, not_judged, verdict_sentence, verdicts
@@ -65,13 +65,13 @@ def report_flight(
     factor = time / wall_time if wall_time else None
     same = as_published(flight.fingerprint, scenario, flight.design_hash)
     if json:
-        print_json(
+        output.print_json(
             {
                 "scenario": scenario.name,
                 "diverged_at_s": time if flight.ending == "diverged" else None,
                 "within_limits": kept,
                 "not_judged": not_judged(judged, flight.metrics),
-                "metrics": to_json({name: (v, METRICS[name].unit) for name, v in flight.metrics.items()}, units),
+                "metrics": output.to_json({name: (v, METRICS[name].unit) for name, v in flight.metrics.items()}, units),
                 "fingerprint": flight.fingerprint,
                 "as_published": same,
                 "wall_time_s": wall_time,
@@ -92,10 +92,10 @@ def report_flight(
             "fingerprint": f"{published_in_words(flight.fingerprint, same)}\n{flight.fingerprint or ''}".rstrip(),
         }
         print_metrics(scenario.title, flight.metrics, units, judged, every)
-        print_section("run", run)
+        output.print_section("run", run)
         words = verdict_sentence(judged, flight.metrics, units) if every else limits_kept(judged, units)
         style = "bold red" if not kept else "bold green" if judged else "bold"
-        console.print(Text.assemble(("verdict ", "bold"), (words, style)))
+        output.console.print(Text.assemble(("verdict ", "bold"), (words, style)))
     if flight.ending == "diverged":
         raise RunError(f"flight diverged at t = {time:.2f} s: the state left the range of the model")
     if not finished:
@@ -115,7 +115,7 @@ def print_metrics(
 
     ``every``: whether to say of metrics without a limit that they are not judged.
     """
-    table = new_table("metric", "value", "unit", "verdict", title=title, right=["value"], head=False)
+    table = output.new_table("metric", "value", "unit", "verdict", title=title, right=["value"], head=False)
     table.columns[2].no_wrap = True
     known = [*metrics, *(name for name in judged or () if name not in metrics)]
     for group in Group:
@@ -126,18 +126,15 @@ def print_metrics(
             metric, verdict = METRICS[name], (judged or {}).get(name)
             number, unit = in_system(metrics.get(name, nan), metric.unit, units, share=metric.share)
             value = significant(number) if name in metrics else "-"
-            unjudged = Text("not judged" if every and judged is not None else "", "dim")
-            remark = _remark(name, verdict, units) if verdict else unjudged
+            remark = Text("not judged" if every and judged is not None else "", "dim")
+            if verdict and verdict.words == "not flown to the end":
+                remark = Text(verdict.words, "red")
+            elif verdict:
+                limit = in_units(name, verdict.limit, units)
+                text = f"{verdict.words} (limit {limit})" if verdict.value is None else f"{verdict.words} {limit}"
+                remark = Text(text, "green" if verdict.within else "red")
             table.add_row("  " + in_words(name), value, "" if unit == "1" else unit, remark)
-    console.print(table)
-
-
-def _remark(name: str, verdict: Verdict, units: UnitSystem) -> Text:
-    if verdict.words == "not flown to the end":
-        return Text(verdict.words, "red")
-    limit = in_units(name, verdict.limit, units)
-    text = f"{verdict.words} (limit {limit})" if verdict.value is None else f"{verdict.words} {limit}"
-    return Text(text, "green" if verdict.within else "red")
+    output.console.print(table)
 
 
 def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, flown: int | None = None) -> None:
@@ -147,7 +144,7 @@ def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, f
 
     written = results.path.with_suffix(".html") if page else None
     if json:
-        print_json(
+        output.print_json(
             {
                 "result": str(results.path),
                 "page": str(written) if written else None,
@@ -163,10 +160,10 @@ def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, f
                 ],
                 "distributions": {
                     d.name: {
-                        statistic: in_system(getattr(d, statistic), d.unit, json_system(units))[0]
+                        statistic: in_system(getattr(d, statistic), d.unit, output.json_system(units))[0]
                         for statistic in ("minimum", "median", "percentile_95", "maximum", "mean")
                     }
-                    | {"unit": unit_in(json_system(units), d.unit), "flights": d.flights}
+                    | {"unit": unit_in(output.json_system(units), d.unit), "flights": d.flights}
                     for d in distributions(results)
                 },
                 "worst_flights": [
@@ -177,11 +174,11 @@ def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, f
         )
     else:
         _print_campaign(results, units)
-        say(f"results {results.path}")
+        output.say(f"results {results.path}")
     if written:
         write_campaign_page(results, written)
         if not json:
-            say(f"page    {written}")
+            output.say(f"page    {written}")
 
 
 def _print_campaign(results: Results, units: UnitSystem) -> None:
@@ -189,7 +186,7 @@ def _print_campaign(results: Results, units: UnitSystem) -> None:
 
     headings = ("limit", "", "within", "share", "95 % interval")
     title = f"{results.campaign.scenario.title}: {results.campaign.samples} flights"
-    table = new_table(*headings, title=title, right=headings[1:])
+    table = output.new_table(*headings, title=title, right=headings[1:])
     for share in shares(results):
         limit = "" if share.limit is None else " ".join(_outcome(share.name, share.limit, units)).strip()
         interval = (
@@ -197,20 +194,20 @@ def _print_campaign(results: Results, units: UnitSystem) -> None:
         )
         within = f"{share.within} of {share.flights}", f"{100.0 * share.fraction:.3g} %"
         table.add_row(in_words(share.name), limit, *within, interval)
-    console.print(table)
+    output.console.print(table)
     numbers = ("least", "median", "95 %", "largest")
-    table = new_table("metric", *numbers, "unit", right=numbers)
+    table = output.new_table("metric", *numbers, "unit", right=numbers)
     for d in distributions(results):
         cells = [_outcome(d.name, v, units) for v in (d.minimum, d.median, d.percentile_95, d.maximum)]
         table.add_row(in_words(d.name), *(number for number, _ in cells), cells[0][1])
-    console.print(table)
+    output.console.print(table)
     # Without limits, the worst flights are those that ended early.
     worst = [w for w in worst_flights(results, _LISTED) if w.limit]
     if worst:
-        console.print("worst flights, by the fraction of their limits that they use:")
+        output.console.print("worst flights, by the fraction of their limits that they use:")
     for w in worst:
         used = w.limit if w.limit in ENDED else f"{100 * w.ratio:.0f} % of {in_words(w.limit)}"
-        say(folded(f"{w.flight}: {used}; {sample_words(w.sample, units)}", 4, first=2))
+        output.say(output.folded(f"{w.flight}: {used}; {sample_words(w.sample, units)}", 4, first=2))
 
 
 def sample_words(sample: Mapping[str, float], units: UnitSystem) -> str:

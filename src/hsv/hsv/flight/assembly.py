@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import PurePath
 from typing import Any
 
-from hsv.base.errors import DesignError, HsvError, ParameterError, ScenarioError, TrimError
+from hsv.base.errors import HsvError, ParameterError, ScenarioError, TrimError
 from hsv.base.parameters import table_values
 from hsv.control.controllers import NODE, SHIPPED_CONTROLLERS, controller_class, names_code
 from hsv.control.coverage import uncovered
@@ -54,8 +54,12 @@ def own_parameters(scenario: Scenario) -> dict[str, Any]:
 
 
 def design_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the parameters in the file of the scenario's design; empty if it has none."""
-    return read_parameters(find_design(scenario.design)) if scenario.design else {}
+    """Return the parameters in the file of the scenario's design, which is checked; empty if it has none."""
+    if not scenario.design:
+        return {}
+    path = find_design(scenario.design)
+    read_design(path)
+    return read_parameters(path)
 
 
 def flight_parameters(scenario: Scenario) -> dict[str, Any]:
@@ -75,7 +79,7 @@ def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> 
     Raises:
         ScenarioError: Names the field that is wrong, or what is wrong with the design.
     """
-    with blamed_on(scenario, design_read=design is None):
+    with blamed_on(scenario):
         if design is None and scenario.design:
             design = read_design(find_design(scenario.design))
         own = scenario_parameters(scenario)
@@ -92,15 +96,12 @@ def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> 
 
 
 @contextmanager
-def blamed_on(scenario: Scenario, *, design_read: bool = True) -> Iterator[None]:
-    """Turn errors of components into a ``ScenarioError``, with the scenario's names of the parameters.
-
-    An error in a design file is reported with the file.
-    """
+def blamed_on(scenario: Scenario) -> Iterator[None]:
+    """Turn errors of components into a ``ScenarioError``, with the scenario's names of the parameters."""
     try:
         yield
     except HsvError as error:
-        text = (design_read and isinstance(error, DesignError) and _wrong_in_file(scenario.design)) or str(error)
+        text = str(error)
         for parameter, field in _FIELDS.items():
             text = re.sub(parameter, field, text)
         if isinstance(error, TrimError):
@@ -138,12 +139,3 @@ def require_path_inside(path: str, field: str, source: object, trust: bool) -> N
     """Refuse a path in the bag or campaign ``source`` that leads out of its folder, unless the user trusts it."""
     if (PurePath(path).is_absolute() or ".." in PurePath(path).parts) and not trust:
         raise ParameterError(f"{source}: {field} = {path!r}: a path out of the folder, followed only with --trust")
-
-
-def _wrong_in_file(design: str) -> str:
-    """Return the error of a design file itself; empty if the file is correct."""
-    try:
-        read_design(find_design(design))
-    except DesignError as error:
-        return str(error)
-    return ""

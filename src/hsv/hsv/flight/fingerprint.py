@@ -34,19 +34,11 @@ def fingerprint(flown: np.ndarray) -> str:
     digest = hashlib.sha256()
     # As many at a time as the processor's cache holds.
     for start in range(0, len(flown), _ROWS):
-        digest.update(digested(flown[start : start + _ROWS]).data)
-    return written(digest.digest())
-
-
-def digested(flown: np.ndarray) -> np.ndarray:
-    """Return rows of a history in the form used for the fingerprint."""
-    rows = np.ascontiguousarray(flown, "<f8")
-    return np.where(unknown, np.nan, rows) if (unknown := np.isnan(rows)).any() else rows
-
-
-def written(digest: bytes) -> str:
-    """Return the text of a fingerprint from its digest."""
-    return f"v{FORMAT}:{digest.hex()}"
+        rows = np.ascontiguousarray(flown[start : start + _ROWS], "<f8")
+        if (unknown := np.isnan(rows)).any():
+            rows = np.where(unknown, np.nan, rows)
+        digest.update(rows.data)
+    return f"v{FORMAT}:{digest.hexdigest()}"
 
 
 def as_published(found: str | None, scenario: Scenario | None, design_hash: str) -> bool | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,14 +23,6 @@ if TYPE_CHECKING:
     from hsv.flight.closed_loop import Components
 
 
-@lru_cache(maxsize=8)
-def times(rows: int, period: float) -> np.ndarray:
-    """Return the simulated time (s) of ``rows`` steps; flights of the same length share the array."""
-    found = np.arange(rows) * period
-    found.setflags(write=False)
-    return found
-
-
 @dataclass(frozen=True, repr=False)
 class Flight:
     """A flight: control period (s), history, reference, time of the first fault (s) and final status."""
@@ -44,10 +36,10 @@ class Flight:
     """Wall times (s) of the steps of the nominal law and the controller, if they are in Python; those in the core are
     not measured one by one."""
 
-    @property
+    @cached_property
     def time(self) -> np.ndarray:
-        """Simulated time (n + 1), s; flights of the same length share the array."""
-        return times(len(self.history.state), self.period)
+        """Simulated time (n + 1), s."""
+        return np.arange(len(self.history.signals)) * self.period
 
     @property
     def reference(self) -> np.ndarray:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import tomli_w
 
@@ -49,10 +48,6 @@ def governed(name: str, blend: float) -> GovernedScenario:
     governor = Governor(law.data, scenario.vehicle.described.decoupled, design.period, bounds)
     start = rounded(scenario.initial.altitude), rounded(scenario.initial.velocity)
     reference = governor.govern(start, legs_of(start, *scenario.commands), blend)
-    return GovernedScenario(tomli_w.dumps(_table(name, reference)), reference, bounds)
-
-
-def _table(name: str, reference: GovernedReference) -> dict[str, Any]:
     table = scenario_table(scenario_text(name), name)
     commands = []
     for (start, *before, _), (end, *after, _) in pairwise(reference.corners):
@@ -60,8 +55,5 @@ def _table(name: str, reference: GovernedReference) -> dict[str, Any]:
         if climbed or gained:
             changes = {"altitude_change": written(climbed, "m"), "velocity_change": written(gained, "m/s")}
             commands.append({**changes, "start": written(start, "s"), "end": written(end, "s")})
-    return {
-        **table,
-        "command": commands,
-        "reference": {**table.get("reference", {}), "blend": written(reference.blend, "s")},
-    }
+    blended = {**table.get("reference", {}), "blend": written(reference.blend, "s")}
+    return GovernedScenario(tomli_w.dumps({**table, "command": commands, "reference": blended}), reference, bounds)

@@ -75,12 +75,13 @@ def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem) -> str:
     if all(verdict.within for verdict in judged.values()):
         return f"within {'its limit' if len(judged) == 1 else f'all {len(judged)} limits'}"
     over = [(name, v) for name, v in judged.items() if not v.within and (v.ended or v.words == "over")]
-    said = ", ".join(f"{in_words(name)} {_broken(name, verdict, system)}" for name, verdict in over)
+
+    def broken(name: str, verdict: Verdict) -> str:
+        if verdict.value is None:
+            return f"{in_words(name)} {verdict.words}"
+        number, limit = (in_units(name, value, system) for value in (verdict.value, verdict.limit))
+        return f"{in_words(name)} {number} (limit {limit})"
+
+    said = ", ".join(broken(*each) for each in over)
     head = [] if all(verdict.ended for verdict in judged.values()) else ["not flown to the end"]
     return "; ".join([*head, *([f"{len(over)} of {len(judged)} limits not kept: {said}"] if over else [])])
-
-
-def _broken(name: str, verdict: Verdict, system: UnitSystem) -> str:
-    if verdict.value is None:
-        return verdict.words
-    return f"{in_units(name, verdict.value, system)} (limit {in_units(name, verdict.limit, system)})"

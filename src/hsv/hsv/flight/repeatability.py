@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.base.errors import HsvError, ParameterError, RunError
+from hsv.base.errors import HsvError, RunError
 from hsv.base.processes import ctrl_c_held_back
-from hsv.control.controller import Controller, ControllerInput
+from hsv.control.controller import ControllerInput
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import Components, fly
 from hsv.flight.flight import Flight
@@ -64,40 +64,30 @@ def findings(scenario: Scenario) -> Iterator[Finding]:
 
 def from_copied_state(parts: Components, flight: Flight) -> str:
     """Step the controller along a flight, then in turn with a copy; return where an answer differs first, or ''."""
-    steps = len(flight.time)
+    h, steps = flight.history, len(flight.time)
     steppers = {"the controller": parts.controller}
     try:
         parts.controller.reset()
         parts.notch_filter.reset()
         for k in range(steps):
             if k == steps // 2:
-                steppers["its copy"] = _copy(parts.controller)
-            filtered = parts.notch_filter.step(flight.history.estimate[k, PITCH_RATE])
+                try:
+                    steppers["its copy"] = parts.controller.copied()
+                # Foreign objects may refuse in any way.
+                except Exception as error:
+                    return f"the controller cannot be copied: {type(error).__name__}: {' '.join(str(error).split())}"
+            filtered = parts.notch_filter.step(h.estimate[k, PITCH_RATE])
             for name, stepper in steppers.items():
-                inputs = _inputs(k, flight, filtered.filtered_pitch_rate, filtered.filter_state)
-                answered, expected = stepper.step(inputs).u_unsaturated, flight.history.u_unsaturated[k]
+                rows = h.estimate, flight.reference, flight.reference_input, h.deviation, h.nominal_input
+                # Copies: a controller may keep or change what it was given.
+                x, *others = (row[k].copy() for row in rows)
+                inputs = ControllerInput(k, x, filtered.filtered_pitch_rate, *others, filtered.filter_state.copy())
+                answered, expected = stepper.step(inputs).u_unsaturated, h.u_unsaturated[k]
                 if answered.tobytes() != expected.tobytes():
                     return f"{name}: u_unsaturated from step {k} on: {answered.tolist()}, not {expected.tolist()}"
     except HsvError as error:
         return str(error)
     return ""
-
-
-def _copy(controller: Controller) -> Controller:
-    try:
-        return controller.copied()
-    # Foreign objects may refuse in any way.
-    except Exception as error:
-        words = " ".join(str(error).split())
-        raise ParameterError(f"the controller cannot be copied: {type(error).__name__}: {words}") from error
-
-
-def _inputs(k: int, flight: Flight, filtered_pitch_rate: float, filter_state: np.ndarray) -> ControllerInput:
-    history = flight.history
-    rows = history.estimate, flight.reference, flight.reference_input, history.deviation, history.nominal_input
-    # Copies: a controller may keep or change what it was given.
-    x, x_r, u_r, x_n, u_n = (row[k].copy() for row in rows)
-    return ControllerInput(k, x, filtered_pitch_rate, x_r, u_r, x_n, u_n, filter_state.copy())
 
 
 def under_load(scenario: Scenario, first: Flight) -> Finding:

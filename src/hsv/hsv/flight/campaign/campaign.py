@@ -126,28 +126,25 @@ class Campaign:
 
         Uniform samples have a seed each, so that any can be drawn alone; the other methods draw from the campaign's.
         """
-        shares, seeds = self._shares(flights)
-        return np.column_stack([f.quantiles(column) for f, column in zip(self.factors, shares.T, strict=True)]), seeds
-
-    def _shares(self, flights: range) -> tuple[np.ndarray, np.ndarray]:
-        """Return the shares of the distributions (flights, factors) below the samples, 0 to 1, and the seeds."""
-        d = len(self.factors)
+        d, seeds = len(self.factors), np.full(len(flights), self.seed, np.uint64)
         if self.method == "uniform":
             keys = (np.random.SeedSequence(self.seed, spawn_key=(flight,)) for flight in flights)
             seeds = np.array([key.generate_state(1, np.uint64)[0] for key in keys], np.uint64)
-            return np.stack([np.random.default_rng(own).random(d) for own in seeds.tolist()]), seeds
-        seeds = np.full(len(flights), self.seed, np.uint64)
-        if self.method == "latin_hypercube":
-            return self._hypercube[flights.start : flights.stop], seeds
-        if self.method == "sobol":
+            shares = np.stack([np.random.default_rng(own).random(d) for own in seeds.tolist()])
+        elif self.method == "latin_hypercube":
+            shares = self._hypercube[flights.start : flights.stop]
+        elif self.method == "sobol":
             from scipy.stats import qmc
 
             engine = qmc.Sobol(d, seed=self.seed)
             if flights.start:
                 engine.fast_forward(flights.start)
-            return np.asarray(engine.random(len(flights))), seeds
-        # Corners: the binary digits of the flight's number, the first factor's first.
-        return (np.array(flights)[:, None] >> np.arange(d)[::-1] & 1).astype(float), seeds
+            shares = np.asarray(engine.random(len(flights)))
+        else:
+            # Corners: the binary digits of the flight's number, the first factor's first.
+            shares = (np.array(flights)[:, None] >> np.arange(d)[::-1] & 1).astype(float)
+        # Each column has the shares of a factor's distribution below the samples, 0 to 1.
+        return np.column_stack([f.quantiles(column) for f, column in zip(self.factors, shares.T, strict=True)]), seeds
 
     @cached_property
     def _hypercube(self) -> np.ndarray:
@@ -191,22 +188,18 @@ class Campaign:
             found = cls(**values | {"factors": tuple(Factor(**factor) for factor in values["factors"])})
             if found.method not in METHODS:
                 raise ValueError(f"method {found.method!r}")
-            found._check_factors()
+            scenario, drawn = scenario_at_means(found.table, found.scenario_name)
+            known = (*scenario.vehicle.described.uncertainty, *drawn)
+            for factor in found.factors:
+                if factor.name not in known:
+                    raise CampaignError(f"factor {factor.name!r}: expected {one_of(known, factor.name)}")
+                if factor.kind not in KINDS:
+                    raise CampaignError(f"factor {factor.name!r}: kind {factor.kind!r}, expected {' or '.join(KINDS)}")
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise CampaignError(
                 f"campaign written by commit {commit}, which this version does not read: {error}"
             ) from error
         return found
-
-    def _check_factors(self) -> None:
-        """Refuse a factor that this version does not know, or that the scenario does not have."""
-        scenario, drawn = scenario_at_means(self.table, self.scenario_name)
-        known = (*scenario.vehicle.described.uncertainty, *drawn)
-        for factor in self.factors:
-            if factor.name not in known:
-                raise CampaignError(f"factor {factor.name!r}: expected {one_of(known, factor.name)}")
-            if factor.kind not in KINDS:
-                raise CampaignError(f"factor {factor.name!r}: kind {factor.kind!r}, expected {' or '.join(KINDS)}")
 
     def difference(self, other: Campaign) -> str:
         """Return the first setting in which ``other`` differs, in words; empty if in none."""

@@ -19,7 +19,7 @@ from concurrent.futures import (
 )
 from concurrent.futures import Executor as Pool
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from importlib.metadata import version
 from itertools import islice
@@ -205,7 +205,11 @@ class ProcessExecutor(_PoolExecutor):
         return result
 
     def _obstacle(self) -> str:
-        stopped = [str(pid) for pid in self.pids() if _is_stopped(pid)]
+        stopped = []
+        for pid in self.pids():
+            with suppress(OSError):
+                if Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(") ")[2].startswith("T"):
+                    stopped.append(str(pid))
         return f": stopped worker process {', '.join(stopped)}" if stopped else ""
 
 
@@ -214,13 +218,6 @@ def _to_file(folder: str, job: Job, text: str, batch: int) -> bytes:
     path = Path(folder, str(batch))
     path.write_bytes(job(text, batch))
     return bytes(path)
-
-
-def _is_stopped(pid: int | None) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(") ")[2].startswith("T")
-    except OSError:
-        return False
 
 
 class DaskExecutor(_PoolExecutor):

@@ -42,7 +42,17 @@ class ResultStore(Store):
             self._check(read_result(self.out)[0], self.out)
             shutil.rmtree(self.folder, ignore_errors=True)
             return set(batches)
-        self._describe()
+        described = self.folder / _CAMPAIGN_FILE
+        if described.exists():
+            try:
+                found = Campaign.from_text(read_text(described))
+            except (CampaignError, DocumentError) as error:
+                raise CampaignError(f"{described}: {error}; --restart begins anew") from error
+            self._check(found, self.folder)
+        else:
+            with writing(self.folder):
+                self.folder.mkdir(exist_ok=True)
+            write_whole(described, self._campaign.text.encode())
         return {batch for batch in batches if self._is_whole(batch)}
 
     def keep(self, batch: int, content: bytes) -> None:
@@ -74,19 +84,6 @@ class ResultStore(Store):
                 writer.add_key_value_metadata(kept | {DIGEST: result_digest(kept)})
             replace_file(temporary, self.out)
         shutil.rmtree(self.folder)
-
-    def _describe(self) -> None:
-        described = self.folder / _CAMPAIGN_FILE
-        if described.exists():
-            try:
-                found = Campaign.from_text(read_text(described))
-            except (CampaignError, DocumentError) as error:
-                raise CampaignError(f"{described}: {error}; --restart begins anew") from error
-            self._check(found, self.folder)
-            return
-        with writing(self.folder):
-            self.folder.mkdir(exist_ok=True)
-        write_whole(described, self._campaign.text.encode())
 
     def _is_whole(self, batch: int) -> bool:
         try:

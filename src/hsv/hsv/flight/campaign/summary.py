@@ -63,11 +63,7 @@ class Results:
     """The results of a campaign from its file; only :attr:`sample_runner` loads a controller."""
 
     def __init__(self, path: Path, *, trust: bool = False) -> None:
-        """Read the result file ``path``; ``trust``: whether code named in it may run.
-
-        Raises:
-            CampaignError: The file is missing, is not the result of a campaign, or has another version.
-        """
+        """Read the result file ``path``; ``trust``: whether code named in it may run. Errors as :func:`read_result`."""
         self.path = path
         self.trust = trust
         self.campaign: Campaign
@@ -82,11 +78,7 @@ class Results:
 
     @cached_property
     def sample_runner(self) -> SampleRunner:
-        """The sample runner that repeats flights of the campaign; its first use loads the controller.
-
-        Raises:
-            ParameterError: The file names the code of a controller and is not trusted.
-        """
+        """The sample runner that repeats flights; its first use loads the controller, if the file may name it."""
         require_trust(self.campaign.scenario.controller, self.path, self.trust)
         return SampleRunner(self.campaign)
 
@@ -173,12 +165,12 @@ def within_all(results: Results) -> int:
 
 def shares(results: Results) -> list[Share]:
     """Return the share of flights that finish, and that finish within each limit."""
-    return [_share(results.campaign, name, limit, mask) for name, (limit, mask) in _within(results).items()]
-
-
-def _share(campaign: Campaign, name: str, limit: float | None, within: np.ndarray) -> Share:
-    count, n = int(np.count_nonzero(within)), len(within)
-    return Share(name, limit, count, n, None if campaign.method == "corners" else clopper_pearson(count, n))
+    every = results.campaign.method == "corners"
+    found = []
+    for name, (limit, mask) in _within(results).items():
+        count, n = int(np.count_nonzero(mask)), len(mask)
+        found.append(Share(name, limit, count, n, None if every else clopper_pearson(count, n)))
+    return found
 
 
 def clopper_pearson(count: int, n: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
@@ -201,19 +193,13 @@ def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
     ended = np.where(crashed, -1.0, np.where(diverged, end, math.inf))
     order = np.lexsort((np.arange(len(end)), ended, -largest))[:number]
     samples, names = results.samples, list(stated) or [""]
-    return [
-        WorstFlight(
-            flight=int(flight),
-            limit=CRASHED
-            if crashed[flight]
-            else DIVERGED
-            if diverged[flight]
-            else names[int(np.argmax(ratios[flight]))],
-            ratio=float(largest[flight]),
-            sample={f.name: float(v) for f, v in zip(results.campaign.factors, samples[flight], strict=True)},
-        )
-        for flight in order
-    ]
+    found = []
+    for flight in order.tolist():
+        limit = names[int(np.argmax(ratios[flight]))]
+        limit = CRASHED if crashed[flight] else DIVERGED if diverged[flight] else limit
+        sample = zip((factor.name for factor in results.campaign.factors), samples[flight].tolist(), strict=True)
+        found.append(WorstFlight(flight, limit, float(largest[flight]), dict(sample)))
+    return found
 
 
 @dataclass(frozen=True)
@@ -237,8 +223,6 @@ def distributions(results: Results) -> list[Distribution]:
         values = results.column(name)
         values = values[np.isfinite(values)]
         if len(values):
-            middle, high = np.percentile(values, (50.0, 95.0))
-            found.append(
-                Distribution(name, unit, len(values), values.min(), middle, high, values.max(), float(values.mean()))
-            )
+            ordered = np.percentile(values, (0.0, 50.0, 95.0, 100.0)).tolist()
+            found.append(Distribution(name, unit, len(values), *ordered, float(values.mean())))
     return found
