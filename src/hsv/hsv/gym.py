@@ -233,11 +233,7 @@ class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._episodes.observation[0], self._info
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, Info]:
-        """Fly a control period with ``action`` (2).
-
-        Raises:
-            ControllerError: The action is not finite.
-        """
+        """Fly a control period with a finite ``action`` (2)."""
         [reward], [terminated], [truncated] = self._episodes.step(np.asarray(action, float)[None])
         return self._episodes.observation[0], float(reward), bool(terminated), bool(truncated), self._info
 
@@ -289,11 +285,7 @@ class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         return self._episodes.observation, self._infos
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, Info]:
-        """Fly a control period with ``actions`` (n, 2); episodes that are over begin anew instead.
-
-        Raises:
-            ControllerError: An action is not finite.
-        """
+        """Fly a control period with finite ``actions`` (n, 2); episodes that are over begin anew instead."""
         found = self._episodes.step(np.asarray(actions, float))
         return self._episodes.observation, *found, self._infos
 

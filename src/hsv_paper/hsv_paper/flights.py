@@ -17,11 +17,11 @@ from hsv.base.processes import Progress
 from hsv.flight.assembly import assemble, flight_parameters
 from hsv.flight.closed_loop import fly
 from hsv.flight.corners import Corner
+from hsv.flight.fingerprint import DIGITS, code_digest, digest_of, drop_older
 from hsv.flight.flight import Flight
 from hsv.flight.metrics import FlightData, flight_metrics
 from hsv.flight.scenario import load_scenario
 from hsv.flight.side_by_side import TubeLevels, fly_perturbed
-from hsv.flight.sources import DIGITS, code_digest, digest_of, drop_older
 from hsv.model.plant import FlightStatus
 from hsv_paper.designs import tube_of
 

@@ -6,12 +6,12 @@ from node_processes import short_scenario
 
 from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
+from hsv.flight.fingerprint import drop_older
 from hsv.flight.metrics import FlightData
 from hsv.flight.resilience.campaign import plan
 from hsv.flight.resilience.faults import TRIED, Moment
 from hsv.flight.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND, Boundary, SubjectRunner, boundary, distances
 from hsv.flight.resilience.summary import CaseStore
-from hsv.flight.sources import drop_older
 
 FAULTS = ("elevator_loss", "pitch_rate_drop_out")
 

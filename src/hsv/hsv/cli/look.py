@@ -279,8 +279,10 @@ def _numbers(values: dict[str, Any] | None) -> str:
 
 
 def _tube(tube: dict[str, Any] | None) -> str:
-    if tube is None or not tube["checked_steps"]:
-        return _numbers(tube) if tube is None else "no invariant set in this design"
+    if tube and not tube["checked_steps"]:
+        return "no invariant set in this design"
+    if not tube or not tube["excursions"]:
+        return _numbers(tube)
     excursions = tube["excursions"]
     more = f" and {len(excursions) - SHOWN_EXCURSIONS} more" if len(excursions) > SHOWN_EXCURSIONS else ""
     return f"{_numbers(tube)}; outside: {_intervals(excursions[:SHOWN_EXCURSIONS], lambda _: '')}{more}"

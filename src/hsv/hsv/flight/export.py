@@ -19,11 +19,7 @@ NUMBERS = "scenario.h"
 
 
 def exported_vehicle(scenario: Scenario) -> ExportedBlock:
-    """Return the vehicle of ``scenario``, for an FMU.
-
-    Raises:
-        ScenarioError: The scenario cannot be flown.
-    """
+    """Return the vehicle of ``scenario``, for an FMU."""
     components = assemble_flight(scenario)
     plant = components.plant
     source = files("hsv.flight").joinpath("export.c").read_text(encoding="utf-8")

@@ -1,5 +1,7 @@
 """The fingerprint of a flight: a digest of every bit that its loop computed, the same on every machine.
 
+Other digests identify stored results: they are of everything on which the outcome of a flight depends.
+
 A table of published fingerprints is part of the library: whoever flies a shipped scenario with a shipped design can
 tell whether it is the same flight. It holds no scenario whose nominal law calls a solver in flight: what a solver
 returns depends on the machine, within a tolerance.
@@ -8,9 +10,12 @@ returns depends on the machine, within a tolerance.
 from __future__ import annotations
 
 import hashlib
+import shutil
 import tomllib
+from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +28,12 @@ FORMAT = 1
 TABLE = "fingerprints.toml"
 
 _ROWS = 2000
+
+_FLOWN = ("base", "core", "model", "control", "flight")
+"""Packages with the code and the vehicle tables that a flight uses."""
+
+DIGITS = 12
+"""Digits of a digest in the name of a folder, enough to avoid collisions."""
 
 
 def fingerprint(flown: np.ndarray) -> str:
@@ -66,3 +77,26 @@ def published_in_words(found: str | None, same: bool | None) -> str:
 @cache
 def _table() -> dict[str, Any]:
     return tomllib.loads(files("hsv.flight").joinpath(TABLE).read_text(encoding="utf-8"))
+
+
+@cache
+def code_digest() -> str:
+    """Return the digest of the code and the vehicle tables that a flight uses."""
+    found = [path for name in _FLOWN for path in Path(str(files("hsv")), name).rglob("*")]
+    return digest_of(path.read_bytes() for path in sorted(found) if path.suffix in (".py", ".toml", ".c", ".h"))
+
+
+def drop_older(path: Path) -> None:
+    """Remove outdated files, which have the name of ``path`` with another digest."""
+    name, _, rest = path.name.rpartition("_")
+    for other in path.parent.glob(f"{name}_{'[0-9a-f]' * DIGITS}{rest[DIGITS:]}"):
+        if other != path:
+            shutil.rmtree(other) if other.is_dir() else other.unlink()
+
+
+def digest_of(parts: Iterable[bytes]) -> str:
+    """Return one digest (SHA-256) for several contents."""
+    total = hashlib.sha256()
+    for part in parts:
+        total.update(hashlib.sha256(part).digest())
+    return total.hexdigest()

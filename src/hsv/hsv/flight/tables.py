@@ -6,6 +6,7 @@ A distribution may stand in place of a number. It is read as its mean, and recor
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -96,33 +97,28 @@ def _reading(info: ValidationInfo) -> Reading:
 
 
 def quantity(
-    unit: str, low: float | None = None, high: float | None = None, shown: str = "", *, bare: bool = True
+    unit: str,
+    limits: tuple[float, float] = (-math.inf, math.inf),
+    shown: str = "",
+    *,
+    axis: str = "",
+    bare: bool = True,
 ) -> BeforeValidator:
-    """Return a validator of a quantity in ``unit`` from ``low`` to ``high`` (SI), the range ``shown`` in words.
+    """Return a validator of a quantity within ``limits`` (SI), which are ``shown`` in words.
 
-    Unless ``bare``, the unit must be given: 5 might mean 5 %, and would be read as 500 %.
+    With an ``axis``, altitude or velocity, the limits are the envelope of the scenario's vehicle. Unless ``bare``, the
+    unit must be given: 5 might mean 5 %, and would be read as 500 %.
     """
 
     def parse(text: object, info: ValidationInfo) -> float:
-        ends, value = _ends_and_mean(text, unit, info)
+        (least, largest), value = _ends_and_mean(text, unit, info)
         for given in next(iter(text.values())) if isinstance(text, dict) else (text,):
             if not bare and not has_unit(given):
                 raise QuantityError(f"{info.field_name} = {given!r}: the unit is missing, expected one such as '+5 %'")
-        if (low is not None and ends[0] < low) or (high is not None and ends[1] > high):
-            raise QuantityError(f"{info.field_name} = {text!r}: expected {shown}")
-        return value
-
-    return BeforeValidator(parse)
-
-
-def enveloped(axis: str, unit: str) -> BeforeValidator:
-    """Return a validator of an altitude or a velocity inside the envelope of the scenario's vehicle."""
-
-    def parse(text: object, info: ValidationInfo) -> float:
-        ends, value = _ends_and_mean(text, unit, info)
-        low, high = getattr(_reading(info).vehicle, f"{axis}_range")
-        if not low <= ends[0] <= ends[1] <= high:
-            raise QuantityError(f"{axis} = {text!r}: expected {envelope((low, high), unit)}")
+        low, high = getattr(_reading(info).vehicle, f"{axis}_range") if axis else limits
+        if not low <= least <= largest <= high:
+            expected = envelope((low, high), unit) if axis else shown
+            raise QuantityError(f"{info.field_name} = {text!r}: expected {expected}")
         return value
 
     return BeforeValidator(parse)
@@ -162,8 +158,8 @@ def _coupling(given: object, info: ValidationInfo) -> str:
 
 
 Coupling = Annotated[str, BeforeValidator(_coupling)]
-Change = Annotated[float, quantity("1", -0.9, 10.0, shown="-90 % to +1000 %", bare=False)]
-Time = Annotated[float, quantity("s", 0.0, 1e5, shown="a time from 0 s to 100000 s")]
+Change = Annotated[float, quantity("1", (-0.9, 10.0), "-90 % to +1000 %", bare=False)]
+Time = Annotated[float, quantity("s", (0.0, 1e5), "a time from 0 s to 100000 s")]
 Numbers = Annotated[tuple[float, ...], BeforeValidator(_numbers)]
 
 
@@ -199,8 +195,8 @@ def _defined(name: str, text: str) -> Vehicle:
 class InitialTable(Table):
     """Start of the flight, in trim."""
 
-    altitude: Annotated[float, enveloped("altitude", "m")]
-    velocity: Annotated[float, enveloped("velocity", "m/s")]
+    altitude: Annotated[float, quantity("m", axis="altitude")]
+    velocity: Annotated[float, quantity("m/s", axis="velocity")]
 
 
 class CommandTable(Table):

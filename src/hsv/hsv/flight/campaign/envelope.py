@@ -92,11 +92,7 @@ class Envelope:
 
     @classmethod
     def decode(cls, text: str) -> Self:
-        """Return the envelope from the text of :meth:`encode`.
-
-        Raises:
-            ValueError: The number of signals or windows differs.
-        """
+        """Return the envelope from the text of :meth:`encode`; a ``ValueError`` if its size is another one."""
         s = len(SIGNALS)
         table = np.frombuffer(base64.b64decode(text)).reshape(WINDOWS, 3 * s + 1).copy()
         return cls(table[:, :s], table[:, s : 2 * s], table[:, 2 * s : -1], table[:, -1])

@@ -30,7 +30,7 @@ from typing import Any
 
 from hsv.base.errors import CampaignError, RunError, reason
 from hsv.base.processes import ctrl_c_held_back, end_with_parent
-from hsv.flight.sources import DIGITS, code_digest
+from hsv.flight.fingerprint import DIGITS, code_digest
 
 Job = Callable[[str, int], bytes]
 """A function that flies a batch, by its number, of the campaign written in a text, and returns the result."""

@@ -24,13 +24,15 @@ class Batch(NamedTuple):
 
 
 class Plan(Protocol):
-    """The definition of a campaign: the text from which workers read it, and its batches."""
+    """The definition of a campaign."""
 
     @property
-    def text(self) -> str: ...  # noqa: D102
+    def text(self) -> str:
+        """The campaign as a text, from which workers read it."""
 
     @property
-    def batches(self) -> Sequence[Batch]: ...  # noqa: D102
+    def batches(self) -> Sequence[Batch]:
+        """All batches."""
 
 
 class Store(ABC):
@@ -107,8 +109,7 @@ def run_campaign(
 def locked(path: Path, complaint: str) -> Iterator[None]:
     """Hold the lock file ``path``, which exists only while it is held, or if its holder was killed.
 
-    Raises:
-        CampaignError: Another process holds it, and the message is ``complaint``; or it cannot be made.
+    If another process holds it, the ``CampaignError`` is the ``complaint``.
     """
     while True:
         try:

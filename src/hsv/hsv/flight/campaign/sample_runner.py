@@ -46,7 +46,7 @@ _BATCH_WRITTEN: dict[str, Any] = {
 Outcome = dict[str, float | bool | str | None]
 
 
-Flown = tuple[Flight, float | None] | ControllerError
+FlownSample = tuple[Flight, float | None] | ControllerError
 """A flight and its largest level in the tube's invariant set (None if no set holds for it), or the controller's error.
 
 A campaign does not keep the flight itself."""
@@ -78,14 +78,10 @@ class SampleRunner:
         return list(sample.tolist())
 
     def fly(self, flight: int, sample: Sequence[float]) -> Flight:
-        """Fly a flight with its sample (one value a factor).
-
-        Raises:
-            ControllerError, ScenarioError: A custom controller failed, or the sample as a whole is not admitted.
-        """
+        """Fly a flight with its sample (one value a factor)."""
         return fly(self._components(flight, sample))
 
-    def fly_all(self, flights: Sequence[int], samples: np.ndarray) -> Iterator[Flown]:
+    def fly_all(self, flights: Sequence[int], samples: np.ndarray) -> Iterator[FlownSample]:
         """Fly ``flights`` with their ``samples`` (flights, factors), side by side if possible.
 
         Each flight is valid until the next one.
@@ -108,7 +104,7 @@ class SampleRunner:
         """Return the largest level of a flight in the tube, None if no set holds for it."""
         return self._levels.worst(flight)
 
-    def outcome(self, flown: Flown) -> Outcome:
+    def outcome(self, flown: FlownSample) -> Outcome:
         """Return the row of a flight: its end, tube level, metrics (SI) and fingerprint, or the controller's error."""
         if isinstance(flown, ControllerError):
             return {"diverged": False, "crashed": str(flown)}
@@ -137,7 +133,7 @@ class SampleRunner:
             rows.append({"flight": flight, "seed": int(seed), **drawn, **self.outcome(flown)})
         return encode(self.campaign, rows, envelope)
 
-    def _fly_alone(self, components: Components) -> Flown:
+    def _fly_alone(self, components: Components) -> FlownSample:
         try:
             flight = fly(components)
         except ControllerError as error:

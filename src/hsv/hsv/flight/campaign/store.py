@@ -60,11 +60,7 @@ class ResultStore(Store):
         write_whole(self._part(batch), content)
 
     def finish(self) -> None:
-        """Make the result file of all batches, if it is not there, and remove the batches.
-
-        Raises:
-            CampaignError: The file cannot be written, or a batch is damaged, which is then removed.
-        """
+        """Make the result file of all batches, if it is not there, and remove the batches."""
         if self.out.exists():
             return
         temporary = self.out.with_name(self.out.name + ".unfinished")

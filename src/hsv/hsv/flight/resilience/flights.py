@@ -153,19 +153,14 @@ def boundary(
     return Boundary(survived, lost)
 
 
-@lru_cache(maxsize=2)
-def _campaign(text: str) -> ResilienceCampaign:
-    return ResilienceCampaign.from_text(text)
-
-
 @lru_cache(maxsize=_RUNNERS)
 def _runner(text: str, subject: int, moment: Moment) -> SubjectRunner:
-    return SubjectRunner(_campaign(text).subjects[subject], moment)
+    return SubjectRunner(ResilienceCampaign.from_text(text).subjects[subject], moment)
 
 
 def fly_case(text: str, number: int) -> bytes:
     """Fly a case, by its number, of the campaign written in ``text``; return its flights and boundary as JSON."""
-    case = _campaign(text).cases[number]
+    case = ResilienceCampaign.from_text(text).cases[number]
     runner, fault = _runner(text, case.kind, case.moment), TRIED[case.fault]
     flown = [
         runner.outcome(severity, vehicle, fault, value)

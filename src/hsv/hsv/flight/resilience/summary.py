@@ -9,10 +9,10 @@ from pathlib import Path
 from hsv.base.errors import CampaignError
 from hsv.base.files import parse_json, read_text
 from hsv.flight.campaign.run import Store, write_whole
+from hsv.flight.fingerprint import DIGITS, code_digest, digest_of, drop_older
 from hsv.flight.resilience.campaign import Case, ResilienceCampaign, Subject
 from hsv.flight.resilience.faults import SEVERITIES, TRIED, Moment, TriedFault
 from hsv.flight.resilience.flights import Boundary, FlownFault, fly_case
-from hsv.flight.sources import DIGITS, code_digest, digest_of, drop_older
 
 Outcome = tuple[tuple[FlownFault, ...], Boundary]
 """Flights of a case, and the severities between which the controller is lost."""
@@ -134,11 +134,7 @@ class ResilienceResults:
 
     @classmethod
     def read(cls, campaign: ResilienceCampaign, store: CaseStore) -> ResilienceResults:
-        """Return the results in ``store``.
-
-        Raises:
-            CampaignError: A case is missing.
-        """
+        """Return the results in ``store``, which must have every case."""
         squares = {
             (fault, subject.name): Square(fault, subject, {}, {})
             for fault in campaign.faults
