@@ -113,24 +113,15 @@ def linearise(
 
     Example: hsv linearise --coupling derived --model ECM --out model.mat
     """
-    from hsv.control.linear_model import READINGS, linearise
+    from hsv.control.linear_model import linearise
 
     if out:
         check_target(out, "out", ".mat", ".npz", ".json")
-
-    def linearised(reading: str) -> LinearModel:
-        return linearise(altitude, velocity, vehicle=vehicle, coupling=coupling, model=model, reading=reading)
-
-    found = linearised(reading)
-    other = next((name for name in READINGS if found.reading not in ("", name)), None)
-    poles, other_poles = found.poles, linearised(other).poles if other else []
-    shown = found.in_units(units)
+    found = linearise(altitude, velocity, vehicle=vehicle, coupling=coupling, model=model, reading=reading)
     if json or out:
         units = output.json_system(units)
-        shown = found.in_units(units)
-        described = _described(shown, units) | {"poles": list(map(_pole, poles))}
-        if other:
-            described["poles_of_the_other_reading"] = list(map(_pole, other_poles))
+    shown = found.in_units(units)
+    described = _described(shown, units) | {"poles": list(map(_pole, found.poles))}
     if out:
         with writing(out, "out"):
             if out.suffix == ".json":
@@ -143,9 +134,7 @@ def linearise(
     for name, matrix, columns in (("A", shown.A, shown.states), ("B", shown.B, shown.inputs)):
         cells = [[significant(entry) for entry in row] for row in matrix.tolist()]
         output.print_matrix(f"{name} ({UNIT_SYSTEMS[units]})", list(shown.states), list(columns), cells)
-    output.console.print(_pole_table("Poles", poles))
-    if other:
-        output.console.print(_pole_table("Poles for the other reading of eq. 40", other_poles))
+    output.console.print(_pole_table(found.poles))
     if out:
         output.say(f"written {out}")
 
@@ -177,9 +166,9 @@ def _pole(mode: Mode) -> dict[str, float | None]:
     }
 
 
-def _pole_table(title: str, poles: list[Mode]) -> Table:
+def _pole_table(poles: list[Mode]) -> Table:
     headings = ("real rad/s", "imaginary rad/s", "frequency rad/s", "damping ratio")
-    table = output.new_table(*headings, title=title, right=headings)
+    table = output.new_table(*headings, title="Poles", right=headings)
     for mode in poles:
         damping = _damping(mode)
         table.add_row(
@@ -246,7 +235,7 @@ def design(
         write_design(target, result.design, f"Written by: {command}. SI units; see offline_design/README.md.")
     with writing(certificate_path(target), "certificate"):
         write_certificate(certificate_path(target), result.report)
-    rows = []
+    rows: list[Any] = []
     if compare_sets:
         from hsv.design import compare, disturbance, tube_problem
 

@@ -50,10 +50,10 @@ def governed(name: str, blend: float) -> GovernedScenario:
     reference = governor.govern(start, legs_of(start, *scenario.commands), blend)
     table = scenario_table(scenario_text(name), name)
     commands = []
-    for (start, *before, _), (end, *after, _) in pairwise(reference.corners):
+    for (begin, *before, _), (end, *after, _) in pairwise(reference.corners):
         climbed, gained = (round(b - a, 9) for a, b in zip(before, after, strict=True))
         if climbed or gained:
             changes = {"altitude_change": written(climbed, "m"), "velocity_change": written(gained, "m/s")}
-            commands.append({**changes, "start": written(start, "s"), "end": written(end, "s")})
+            commands.append({**changes, "start": written(begin, "s"), "end": written(end, "s")})
     blended = {**table.get("reference", {}), "blend": written(reference.blend, "s")}
     return GovernedScenario(tomli_w.dumps({**table, "command": commands, "reference": blended}), reference, bounds)

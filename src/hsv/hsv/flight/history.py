@@ -21,15 +21,17 @@ def _signals(first: int, end: int, meaning: str) -> property:
     return property(lambda history: history.signals[:, first:end], doc=meaning)
 
 
-class History(NamedTuple):
-    """All signals of a flight for the steps k = 0 ... n, SI."""
-
+class _Matrices(NamedTuple):
     signals: np.ndarray
     """(n + 1, 25): the signals of the fingerprint"""
     auxiliary: np.ndarray
     """(n + 1, 3): auxiliary signals"""
     estimated: np.ndarray | None
     """(n + 1, 9): measured or estimated state, None if that is the state itself"""
+
+
+class History(_Matrices):
+    """All signals of a flight for the steps k = 0 ... n, SI."""
 
     @classmethod
     def empty(cls, rows: int, *, estimated: bool = True) -> History:
@@ -64,7 +66,7 @@ class History(NamedTuple):
     @property
     def estimate(self) -> np.ndarray:
         """State that the controller receives (n + 1, 9): measured, or estimated if an estimator is enabled."""
-        return self.state if self.estimated is None else self.estimated  # type: ignore[no-any-return]
+        return self.state if self.estimated is None else self.estimated
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return all signals by name, in the order of the loop."""

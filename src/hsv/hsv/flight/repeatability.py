@@ -80,8 +80,9 @@ def from_copied_state(parts: Components, flight: Flight) -> str:
             for name, stepper in steppers.items():
                 rows = h.estimate, flight.reference, flight.reference_input, h.deviation, h.nominal_input
                 # Copies: a controller may keep or change what it was given.
-                x, *others = (row[k].copy() for row in rows)
-                inputs = ControllerInput(k, x, filtered.filtered_pitch_rate, *others, filtered.filter_state.copy())
+                x, x_r, u_r, x_n, u_n = (row[k].copy() for row in rows)
+                states = filtered.filter_state.copy()
+                inputs = ControllerInput(k, x, filtered.filtered_pitch_rate, x_r, u_r, x_n, u_n, states)
                 answered, expected = stepper.step(inputs).u_unsaturated, h.u_unsaturated[k]
                 if answered.tobytes() != expected.tobytes():
                     return f"{name}: u_unsaturated from step {k} on: {answered.tolist()}, not {expected.tolist()}"

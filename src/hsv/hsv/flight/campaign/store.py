@@ -19,9 +19,6 @@ from hsv.flight.campaign.sample_runner import CAMPAIGN, DIGEST, ENVELOPE, WRITTE
 
 _CAMPAIGN_FILE = "campaign.json"
 
-_ROWS = 1024
-"""Rows that are written at a time, as far as whole batches have them: a group of rows takes as long as its rows."""
-
 
 class ResultStore(Store):
     """The store of the batches of one campaign; a stored batch is complete even if the process is killed."""
@@ -68,14 +65,10 @@ class ResultStore(Store):
         columns = schema(self._campaign)
         with writing(self.out, temporary):
             with pq.ParquetWriter(temporary, columns, **WRITTEN) as writer:
-                together, batches = max(1, _ROWS // self._campaign.batch), len(self._campaign.batches)
-                for first in range(0, batches, together):
-                    parts = []
-                    for batch in range(first, min(first + together, batches)):
-                        part, its_envelope = self._read(batch)
-                        envelope.merge(its_envelope)
-                        parts.append(part.cast(columns))
-                    writer.write_table(pa.concat_tables(parts))
+                for batch in range(len(self._campaign.batches)):
+                    part, its_envelope = self._read(batch)
+                    envelope.merge(its_envelope)
+                    writer.write_table(part.cast(columns))
                 kept = {CAMPAIGN: self._campaign.text.encode(), ENVELOPE: envelope.encode().encode()}
                 writer.add_key_value_metadata(kept | {DIGEST: result_digest(kept)})
             replace_file(temporary, self.out)

@@ -195,10 +195,10 @@ def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
     samples, names = results.samples, list(stated) or [""]
     found = []
     for flight in order.tolist():
-        limit = names[int(np.argmax(ratios[flight]))]
-        limit = CRASHED if crashed[flight] else DIVERGED if diverged[flight] else limit
+        within = names[int(np.argmax(ratios[flight]))]
+        used = CRASHED if crashed[flight] else DIVERGED if diverged[flight] else within
         sample = zip((factor.name for factor in results.campaign.factors), samples[flight].tolist(), strict=True)
-        found.append(WorstFlight(flight, limit, float(largest[flight]), dict(sample)))
+        found.append(WorstFlight(flight, used, float(largest[flight]), dict(sample)))
     return found
 
 
@@ -223,6 +223,6 @@ def distributions(results: Results) -> list[Distribution]:
         values = results.column(name)
         values = values[np.isfinite(values)]
         if len(values):
-            ordered = np.percentile(values, (0.0, 50.0, 95.0, 100.0)).tolist()
-            found.append(Distribution(name, unit, len(values), *ordered, float(values.mean())))
+            least, middle, high, most = np.percentile(values, (0.0, 50.0, 95.0, 100.0)).tolist()
+            found.append(Distribution(name, unit, len(values), least, middle, high, most, float(values.mean())))
     return found
