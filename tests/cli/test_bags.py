@@ -94,7 +94,7 @@ def test_diff_takes_padding_for_no_difference(hsv, bag, tmp_path):
 def test_info_tells_what_happened(hsv, bag):
     out = hsv("info", str(bag)).out
     assert "loss_of_effectiveness 0.9 of elevator_deflection, from 6 s to the end" in " ".join(out.split())
-    assert "saturation   steps 0, " in out and "largest level" in out
+    assert "saturation   steps 0\n" in out and "largest level" in out
     assert "design.yaml (" in out and "scenario     case1" in out
 
 

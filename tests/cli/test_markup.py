@@ -12,7 +12,7 @@ NAME = "run[old] [/x] :bug:"
 def test_lines_of_nodes_and_titles_are_printed_as_they_are(capsys):
     output.report_line("plant", f"[WARN] {NAME}")
     output.report_error(NAME)
-    output.warn(NAME)
+    output.report_line("hsv: warning", NAME)
     lines = capsys.readouterr().err.splitlines()
     assert lines == [f"plant: [WARN] {NAME}", f"hsv: error: {NAME}", f"hsv: warning: {NAME}"]
     output.print_table(NAME, {"altitude": (1.0, "m")}, UnitSystem.si)

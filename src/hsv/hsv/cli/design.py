@@ -291,7 +291,7 @@ def _summary(report: dict[str, Any]) -> None:
         "worst level": f"{flights['worst_level']:.3f} of 1, in {flights['flights']} flights",
     }
     if adjustable := report.get("adjustable"):
-        whole, tau = adjustable["complete_fault"], ", ".join(f"{value:g}" for value in adjustable["tau"])
+        whole, tau = adjustable["complete_fault"], ", ".join(map(significant, dict.fromkeys(adjustable["tau"])))
         lines["factor tau"] = f"from {tau}; worst level {whole['worst_level']:.3f} of 1 with the whole fault"
     output.print_section("design", lines)
 

@@ -268,14 +268,12 @@ def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str,
 
 
 def _numbers(values: dict[str, Any] | None) -> str:
-    """Return the numbers of a part of a description by their keys."""
+    """Return the numbers of a part of a description by their keys; of those after the first, zeros are left out."""
     if values is None:
         return "not recorded"
-    return ", ".join(
-        f"{key.replace('_', ' ')} {value:.3g}" if isinstance(value, float) else f"{key.replace('_', ' ')} {value}"
-        for key, value in values.items()
-        if isinstance(value, int | float)
-    )
+    numbers = [(key.replace("_", " "), v) for key, v in values.items() if isinstance(v, int | float)]
+    shown = [numbers[0], *(pair for pair in numbers[1:] if pair[1])]
+    return ", ".join(f"{key} {value:.3g}" if isinstance(value, float) else f"{key} {value}" for key, value in shown)
 
 
 def _tube(tube: dict[str, Any] | None) -> str:

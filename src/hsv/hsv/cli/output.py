@@ -100,18 +100,13 @@ def say(*lines: object) -> None:
         console.print(line if isinstance(line, Text) else str(line), soft_wrap=True)
 
 
-def warn(text: str) -> None:
-    """Print a warning on one line of standard error."""
-    errors.print(Text.assemble(("hsv: warning:", "bold yellow"), f" {text}"), soft_wrap=True)
-
-
 def print_bag_warnings(*bags: Bag) -> None:
     """Print one line per incomplete bag: damage, missing files, topics and steps, or that the bag is truncated."""
     from hsv.bags.steps import bag_warnings
 
     for bag in {bag.path: bag for bag in bags}.values():
         if words := bag_warnings(bag):
-            warn(f"{bag.path}: {'; '.join(words)}")
+            report_line("hsv: warning", f"{bag.path}: {'; '.join(words)}", "bold yellow")
 
 
 def print_estimate(seconds: float, as_json: bool, remark: str = "") -> None:
@@ -122,12 +117,12 @@ def print_estimate(seconds: float, as_json: bool, remark: str = "") -> None:
 
 def report_error(problem: object) -> None:
     """Print an error on standard error, on one line if ``problem`` is one line."""
-    errors.print(Text.assemble(("hsv: error:", "bold red"), f" {problem}"), soft_wrap=True)
+    report_line("hsv: error", problem, "bold red")
 
 
-def report_line(node: str, text: str) -> None:
-    """Print a log line of a node on standard error."""
-    errors.print(Text.assemble((f"{node}:", "dim"), f" {text}"), soft_wrap=True)
+def report_line(source: str, text: object, style: str = "dim") -> None:
+    """Print a line of a node, or of the command itself, on standard error."""
+    errors.print(Text.assemble((f"{source}:", style), f" {text}"), soft_wrap=True)
 
 
 def print_written(paths: Sequence[Path], as_json: bool, **others: Any) -> None:

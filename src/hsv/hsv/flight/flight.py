@@ -23,6 +23,11 @@ if TYPE_CHECKING:
     from hsv.flight.closed_loop import Components
 
 
+def _along(name: str, meaning: str) -> property:
+    """Return a property with a part of the reference over the steps of a flight."""
+    return property(lambda flight: getattr(flight.trajectory.along(len(flight.history.signals)), name), doc=meaning)
+
+
 @dataclass(frozen=True, repr=False)
 class Flight:
     """A flight: control period (s), history, reference, time of the first fault (s) and final status."""
@@ -41,20 +46,9 @@ class Flight:
         """Simulated time (n + 1), s."""
         return np.arange(len(self.history.signals)) * self.period
 
-    @property
-    def reference(self) -> np.ndarray:
-        """x_r (n + 1, 9)."""
-        return self.trajectory.along(len(self.history.signals)).state
-
-    @property
-    def reference_input(self) -> np.ndarray:
-        """u_r (n + 1, 2)."""
-        return self.trajectory.along(len(self.history.signals)).input
-
-    @property
-    def defect(self) -> np.ndarray:
-        """d_r (n + 1, 9), see :mod:`hsv.control.reference_trajectory`."""
-        return self.trajectory.along(len(self.history.signals)).defect
+    reference = _along("state", "x_r (n + 1, 9)")
+    reference_input = _along("input", "u_r (n + 1, 2)")
+    defect = _along("defect", "d_r (n + 1, 9), see :mod:`hsv.control.reference_trajectory`")
 
     @property
     def plan(self) -> np.ndarray:
@@ -108,16 +102,8 @@ class Flight:
     def data(self) -> FlightData:
         """Return the data from which metrics are computed."""
         h = self.history
-        return FlightData(
-            time=self.time,
-            state=h.state,
-            reference=self.reference,
-            deviation=h.deviation,
-            command=h.command,
-            unlimited=h.u_unsaturated,
-            gain_index=h.gain_index,
-            fault_start=self.fault_start,
-        )
+        inputs = {"command": h.command, "unlimited": h.u_unsaturated, "gain_index": h.gain_index}
+        return FlightData(self.time, h.state, self.reference, h.deviation, **inputs, fault_start=self.fault_start)
 
 
 def step_statistics(seconds: Sequence[float]) -> dict[str, float]:

@@ -60,8 +60,12 @@ class Store(ABC):
         """Return the numbers of the finished batches; errors as for :meth:`opened`."""
 
     @abstractmethod
+    def path(self, batch: int) -> Path:
+        """Return the file of a batch."""
+
     def keep(self, batch: int, content: bytes) -> None:
         """Store the result of a batch atomically."""
+        write_whole(self.path(batch), content)
 
     def finish(self) -> None:  # noqa: B027
         """Complete the results once all batches are there."""

@@ -52,10 +52,6 @@ class ResultStore(Store):
             write_whole(described, self._campaign.text.encode())
         return {batch for batch in batches if self._is_whole(batch)}
 
-    def keep(self, batch: int, content: bytes) -> None:
-        """Store a finished batch atomically."""
-        write_whole(self._part(batch), content)
-
     def finish(self) -> None:
         """Make the result file of all batches, if it is not there, and remove the batches."""
         if self.out.exists():
@@ -76,7 +72,7 @@ class ResultStore(Store):
 
     def _is_whole(self, batch: int) -> bool:
         try:
-            with pq.ParquetFile(self._part(batch)) as file:
+            with pq.ParquetFile(self.path(batch)) as file:
                 found, rows = file.schema_arrow, file.metadata.num_rows
         except (OSError, ValueError):
             return False
@@ -84,7 +80,7 @@ class ResultStore(Store):
         return complete and bool(found.equals(schema(self._campaign)))
 
     def _read(self, batch: int) -> tuple[pa.Table, Envelope]:
-        path = self._part(batch)
+        path = self.path(batch)
         try:
             with pq.ParquetFile(path, page_checksum_verification=True) as file:
                 part = file.read(use_threads=False)
@@ -93,7 +89,8 @@ class ResultStore(Store):
             path.unlink(missing_ok=True)
             raise CampaignError(f"{path}: damaged, removed; the same command flies these flights again") from error
 
-    def _part(self, batch: int) -> Path:
+    def path(self, batch: int) -> Path:
+        """Return the file of a batch."""
         return self.folder / f"{batch:08}.parquet"
 
     def _check(self, found: Campaign, where: Path) -> None:

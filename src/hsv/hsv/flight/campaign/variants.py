@@ -11,7 +11,6 @@ from hsv.control.controllers import HIDDEN_PARAMETERS, SHIPPED_CONTROLLERS
 from hsv.control.design import design_of
 from hsv.control.library import library_digest
 from hsv.control.nominal_trajectory import NominalTrajectory
-from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.assembly import assemble, assemble_flight, scenario_parameters
 from hsv.flight.closed_loop import Components
 from hsv.flight.scenario import Scenario
@@ -56,10 +55,6 @@ class FlightVariants:
         changed = [name for name in names if values.get(name) != self._nominal.get(name)]
         if not all(name.startswith(self._kept_for) for name in changed):
             return assemble(values)
-        if all(name.startswith(_PERTURBATION) or name == SEED_PARAMETER.name for name in changed):
-            found = self.perturbed(scenario.vehicle.perturbation, scenario.seed)
-            if found is not None:
-                return found
         trajectory = self.unchanged.nominal_trajectory
         if any(name.startswith("reference.") for name in changed):
             trajectory = NominalTrajectory.from_parameters(values, self._design)

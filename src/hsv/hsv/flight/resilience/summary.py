@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hsv.base.errors import CampaignError
 from hsv.base.files import parse_json, read_text
-from hsv.flight.campaign.run import Store, write_whole
+from hsv.flight.campaign.run import Store
 from hsv.flight.fingerprint import DIGITS, code_digest, digest_of, drop_older
 from hsv.flight.resilience.campaign import Case, ResilienceCampaign, Subject
 from hsv.flight.resilience.faults import SEVERITIES, TRIED, Moment, TriedFault
@@ -30,25 +30,26 @@ class CaseStore(Store):
 
     def finished(self, restart: bool) -> set[int]:
         """Return the numbers of the finished cases."""
-        return {n for n, case in enumerate(self._cases) if not restart and self.read(case) is not None}
+        return {number for number in range(len(self._cases)) if not restart and self.read(number) is not None}
+
+    def path(self, batch: int) -> Path:
+        """Return the file of a case."""
+        case = self._cases[batch]
+        digest = digest_of([case.text.encode(), self._code])
+        return self.folder / f"{case.label}_{digest[:DIGITS]}.json"
 
     def keep(self, batch: int, content: bytes) -> None:
         """Store the results of a case, and remove those of other code."""
-        path = self._path(self._cases[batch])
-        write_whole(path, content)
-        drop_older(path)
+        super().keep(batch, content)
+        drop_older(self.path(batch))
 
-    def read(self, case: Case) -> Outcome | None:
+    def read(self, number: int) -> Outcome | None:
         """Return the results of a case, None if it was not flown or its file is damaged."""
         try:
-            values = parse_json(read_text(self._path(case)))
+            values = parse_json(read_text(self.path(number)))
             return tuple(FlownFault(**row) for row in values["flights"]), Boundary(**values["boundary"])
         except (ValueError, KeyError, TypeError):
             return None
-
-    def _path(self, case: Case) -> Path:
-        digest = digest_of([case.text.encode(), self._code])
-        return self.folder / f"{case.label}_{digest[:DIGITS]}.json"
 
 
 @dataclass(frozen=True)
@@ -140,8 +141,8 @@ class ResilienceResults:
             for fault in campaign.faults
             for subject in campaign.subjects
         }
-        for case in campaign.cases:
-            if (outcome := store.read(case)) is None:
+        for number, case in enumerate(campaign.cases):
+            if (outcome := store.read(number)) is None:
                 raise CampaignError(f"{store.folder}: {case.label} is missing; the same command flies it")
             square, (flights, boundary) = squares[case.fault, case.subject.name], outcome
             square.boundaries[case.moment] = boundary
