@@ -6,19 +6,19 @@ belongs to the instance, is cleared by ``reset`` and can be copied.
 
 from __future__ import annotations
 
-import multiprocessing
 import os
+import pickle
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from hsv.base.errors import HsvError, RunError
-from hsv.base.processes import ctrl_c_held_back
 from hsv.control.controller import ControllerInput
 from hsv.flight.assembly import assemble_flight
+from hsv.flight.campaign.executors import make_executor
 from hsv.flight.closed_loop import Components, fly
 from hsv.flight.flight import Flight
 from hsv.flight.history import SIGNALS, History
@@ -94,30 +94,20 @@ def from_copied_state(parts: Components, flight: Flight) -> str:
 def under_load(scenario: Scenario, first: Flight) -> Finding:
     """Fly ``scenario`` in more processes than there are processors, several flights at a time in each."""
     processes = min(os.cpu_count() or 1, 4) + 1
-    # A process of its own in every respect, as that of a campaign on another machine.
-    context = multiprocessing.get_context("spawn")
-    name = f"under load, {processes} processes"
+    name, histories = f"under load, {processes} processes", list[History]()
     try:
-        with ProcessPoolExecutor(processes, mp_context=context) as pool:
-            try:
-                with ctrl_c_held_back():
-                    flown = [pool.submit(_fly_at_once, scenario) for _ in range(processes)]
-                histories = [history for future in flown for history in future.result()]
-            except KeyboardInterrupt:
-                for process in multiprocessing.active_children():
-                    process.terminate()
-                raise
-    except BrokenProcessPool:
-        return Finding(name, processes * _FLIGHTS, "a process died")
+        with make_executor(processes) as executor:
+            for _, flown in executor.fly(partial(_fly_at_once, scenario), "", range(processes)):
+                histories += pickle.loads(flown)
     except HsvError as error:
         return Finding(name, processes * _FLIGHTS, str(error))
     differences = (_difference(first.history, history) for history in histories)
     return Finding(name, len(histories), next(filter(None, differences), ""))
 
 
-def _fly_at_once(scenario: Scenario) -> list[History]:
+def _fly_at_once(scenario: Scenario, text: str, number: int) -> bytes:
     with ThreadPoolExecutor(_FLIGHTS) as threads:
-        return list(threads.map(lambda _: fly(assemble_flight(scenario)).history, range(_FLIGHTS)))
+        return pickle.dumps(list(threads.map(lambda _: fly(assemble_flight(scenario)).history, range(_FLIGHTS))))
 
 
 def _flown_alike(first: Flight, parts: Components) -> str:
