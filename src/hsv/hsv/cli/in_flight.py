@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 from typer import Argument, Option
 
-from hsv.base.units import UnitSystem
+from hsv.base.errors import ParameterError
+from hsv.base.units import UnitSystem, parse_quantity
 from hsv.cli.options import GraphNamespaceOption, JsonOption, UnitsOption
-
-if TYPE_CHECKING:
-    from hsv.bags.description import NodeDescription
 
 fault = typer.Typer(
     no_args_is_help=True,
@@ -37,7 +35,6 @@ def inject(
 
     Example: hsv fault inject elevator_deflection loss_of_effectiveness 0.8 --duration "5 s"
     """
-    from hsv.bags.description import FAULT
     from hsv.base.parameters import read_number
     from hsv.model.faults.injector import DURATION
     from hsv.model.faults.table import read_fault
@@ -45,7 +42,7 @@ def inject(
     found = read_fault(channel, type, parameters or [])
     given = [f"{name}={value!r}" for name, value in found.parameters.items()]
     options = ["inject", "--duration", repr(read_number(DURATION, duration, "duration"))]
-    _become(FAULT, "fault", options, [channel, type, *given], namespace, json)
+    _become("FAULT", "fault", options, [channel, type, *given], namespace, json)
 
 
 @fault.command()
@@ -59,9 +56,7 @@ def clear(
 
     Example: hsv fault clear elevator_deflection
     """
-    from hsv.bags.description import FAULT
-
-    _become(FAULT, "fault", ["clear"], filter(None, (channel, type)), namespace, json)
+    _become("FAULT", "fault", ["clear"], filter(None, (channel, type)), namespace, json)
 
 
 @fault.command(name="list")
@@ -70,9 +65,7 @@ def list_(namespace: GraphNamespaceOption = "", json: JsonOption = False) -> Non
 
     Example: hsv fault list --json
     """
-    from hsv.bags.description import FAULT
-
-    _become(FAULT, "fault", ["list"], (), namespace, json)
+    _become("FAULT", "fault", ["list"], (), namespace, json)
 
 
 def set_(
@@ -85,9 +78,7 @@ def set_(
 
     Example: hsv set tau 0.8
     """
-    from hsv.bags.description import SET_PARAMETER
-
-    _become(SET_PARAMETER, "set", (), (name, value), namespace, json)
+    _become("SET_PARAMETER", "set", (), (name, value), namespace, json)
 
 
 def command(
@@ -106,17 +97,16 @@ def command(
 
     Example: hsv command "86000 ft" "8100 ft/s" --blend "4 s"
     """
-    from hsv.bags.description import SET_COMMAND_CLIENT
-    from hsv.base.units import parse_quantity
-
-    given = (
-        (altitude, "m", "altitude"),
-        (velocity, "m/s", "velocity"),
-        (duration, "s", "duration"),
-        (blend, "s", "blend"),
+    point = parse_quantity(altitude, "m", "altitude"), parse_quantity(velocity, "m/s", "velocity")
+    length, half = parse_quantity(duration, "s", "duration"), parse_quantity(blend, "s", "blend")
+    _become(
+        "SET_COMMAND_CLIENT",
+        "command",
+        ["--duration", repr(length), "--blend", repr(half)],
+        map(repr, point),
+        namespace,
+        json,
     )
-    *point, length, half = (repr(parse_quantity(*each)) for each in given)
-    _become(SET_COMMAND_CLIENT, "command", ["--duration", length, "--blend", half], point, namespace, json)
 
 
 def watch(
@@ -128,9 +118,7 @@ def watch(
 
     Example: hsv watch --units paper
     """
-    from hsv.bags.description import WATCH
-
-    _become(WATCH, "watch", ["--units", units], (), namespace, json)
+    _become("WATCH", "watch", ["--units", units], (), namespace, json)
 
 
 def topic(
@@ -146,23 +134,24 @@ def topic(
 
     Example: hsv topic /hsv/state --every 50
     """
-    from hsv.bags.description import TOPIC
-    from hsv.base.errors import ParameterError
-
     if not name and (once or every > 1):
         option = "once" if once else f"every = {every}"
         raise ParameterError(f"{option}: expected with a topic only")
     options = [*(["--once"] if once else []), "--every", str(every)]
-    _become(TOPIC, "topic", options, filter(None, [name]), namespace, json)
+    _become("TOPIC", "topic", options, filter(None, [name]), namespace, json)
 
 
 def _become(
-    node: NodeDescription, command: str, options: Sequence[str], values: Iterable[str], namespace: str, json: bool
+    node: str, command: str, options: Sequence[str], values: Iterable[str], namespace: str, json: bool
 ) -> NoReturn:
-    """Run the client ``node`` of ``hsv COMMAND`` in place of this process; a command of its own heads ``options``."""
+    """Run a client node, named in :mod:`hsv.bags.description`, in place of this process.
+
+    If the client has commands of its own, one of them heads the ``options``.
+    """
+    from hsv.bags import description
     from hsv.graph.launcher import become
 
     words = ["--prog", f"hsv {command}", *(["--json"] if json else []), *options]
     values = list(values)
     # Some values begin with a dash themselves, as negative numbers do.
-    become(node, [*words, *(["--", *values] if values else [])], namespace)
+    become(getattr(description, node), [*words, *(["--", *values] if values else [])], namespace)
