@@ -20,7 +20,6 @@ from hsv.base.errors import ParameterError, RunError
 from hsv.control.controller import ControllerInput, ExternalController
 from hsv.control.design import ControlDesign
 from hsv.control.nominal_trajectory import NominalTrajectory
-from hsv.control.reference_trajectory import ReferenceData
 
 FIRMWARE = Path(__file__).parent / "build" / "firmware.elf"
 REQUEST, ANSWER = struct.Struct("<q29d"), struct.Struct("<2d2I")
@@ -38,7 +37,7 @@ class CortexM:
 
     PARAMETERS = ()
 
-    def __init__(self, reference: ReferenceData) -> None:
+    def __init__(self, reference: Any) -> None:
         """Take the reference, whose defect is an input of the exported controller."""
         self.reference = reference
         self.instructions: list[int] = []

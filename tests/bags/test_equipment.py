@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from core_calls import written
 from recorded_flight import record_flight
 
 from hsv.bags.info import describe
 from hsv.base.units import UnitSystem
 from hsv.cli.look import info
 from hsv.core import lib
-from hsv.core.arithmetic import uniforms
 from hsv.pages.events import flight_events
 from hsv.pages.flights import reported_runs
 
@@ -59,7 +59,9 @@ def test_steps_in_which_a_link_held_are_counted(tmp_path):
     bag = record_flight(tmp_path / "bag", str(tmp_path / "linked.toml"), duration=4.0, fault=1.0)
     # In step 1 the command of step 0 is due; all others differ from those before.
     assert describe(bag)["equipment"]["held_steps"] == {
-        name: sum(uniforms(0, step, lib.LINK_LOSS + channel)[0] < share for step in range(1, 201))
+        name: sum(
+            written(lib.hsv_uniforms, 2, 0, step, lib.LINK_LOSS + channel, 0)[0] < share for step in range(1, 201)
+        )
         for channel, (name, share) in enumerate([("measurement", 0.2), ("command", 0.1)])
     }
 

@@ -30,8 +30,8 @@ def test_the_sensors_of_a_scenario_are_added_and_what_is_not_covered_is_named(hs
     ran = hsv("certify", str(BASELINE), "--scenario", str(mine), "--json")
     assert ran.code == 1
     assert ran.json["not_covered"] == [
-        "sensors.altitude: quantum 1 ft; the certificate is for an ideal one",
-        "sensors.velocity: drop out 0.01; the certificate is for an ideal one",
+        "sensors.altitude.quantum: 1 ft; the certificate is for an ideal one",
+        "sensors.velocity.drop_out: 0.01; the certificate is for an ideal one",
     ]
     verdicts = {verdict["name"]: verdict["certified"] for verdict in ran.json["verdicts"]}
     assert verdicts["sensor quantisation"] and verdicts["all"] and not verdicts["drop-out of a sensor"]

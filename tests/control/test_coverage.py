@@ -33,19 +33,20 @@ def test_a_certificate_that_does_not_say_what_it_covers_is_refused(inputs):
 
 BIAS = {"channel": ELEVATOR, "type": "bias", "start": "1 s", "offset": "-0.5 deg"}
 SLOWER = {"actuator.elevator_deflection": {"set": "elevator_150", "natural_frequency": "90 rad/s"}}
+SLOWER_WORDS = ("set: elevator_150", "natural_frequency: 90 rad/s")
 
 
 @pytest.mark.parametrize(
     ("changes", "named"),
     [
         ({}, []),
-        ({"sensors.pitch_rate.noise": "0.01 deg/s"}, ["sensors.pitch_rate: noise 0.01 deg/s; "]),
-        ({"sensors.altitude.random_walk": "1 ft/s^0.5"}, ["sensors.altitude: random walk; "]),
+        ({"sensors.pitch_rate.noise": "0.01 deg/s"}, ["sensors.pitch_rate.noise: 0.01 deg/s; "]),
+        ({"sensors.altitude.random_walk": "1 ft/s^0.5"}, ["sensors.altitude.random_walk: 1 ft/s^0.5; "]),
         ({"wind.up": "3 ft/s"}, ["wind.up: 3 ft/s; the certificate is for still air"]),
         ({"density.offset": "-2 %"}, ["density.offset: -0.02; the certificate is for the model's density"]),
-        ({"link.command.loss": "2 %", "link.command.burst": 3}, ["link.command: loss 0.02; the certificate is for an"]),
-        ({"link.computational_delay": "7 ms"}, ["link: computational delay 0.007 s; "]),
-        ({"estimator.enabled": True}, ["estimator: "]),
+        ({"link.command.loss": "2 %", "link.command.burst": 3}, ["link.command.loss: 0.02; the certificate is for an"]),
+        ({"link.computational_delay": "7 ms"}, ["link.computational_delay: 0.007 s; "]),
+        ({"estimator.enabled": True}, ["estimator.enabled: "]),
         ({"vehicle.coupling": "derived"}, ["vehicle.coupling: derived; the certificate is for paper_like"]),
         ({"vehicle.perturbation.mass": "12 %"}, ["vehicle.perturbation.mass: 12 %; the certificate is for 10 % at"]),
         ({"vehicle.perturbation.mass": "10 %"}, []),
@@ -55,7 +56,10 @@ SLOWER = {"actuator.elevator_deflection": {"set": "elevator_150", "natural_frequ
         ({"fault": [BIAS]}, ["fault: bias of elevator_deflection (offset -0.5 deg); the certificate is for a loss of"]),
         ({"actuator.elevator_deflection.stop": "29 deg"}, []),
         ({"actuator.elevator_deflection.stop": "28 deg"}, ["actuator.elevator_deflection.stop: 28 deg; "]),
-        (SLOWER, ["actuator.elevator_deflection: elevator_150, natural frequency 90 rad/s; the certificate is for an"]),
+        (SLOWER, [f"actuator.{ELEVATOR}.{own}; the certificate is for an ideal one" for own in SLOWER_WORDS]),
+        ({"sensors.set": "fine"}, ["sensors.set: fine; the certificate is for an ideal one"]),
+        ({"sensors.altitude": {"noise": "0 ft", "drift_time": "3 s", "drift_sigma": "0 ft"}}, []),
+        ({"sensors.altitude.minimum": "0 ft"}, ["sensors.altitude.minimum: 0 ft; the certificate is for an ideal one"]),
     ],
 )
 def test_what_is_not_covered_is_named(changes, named):
@@ -69,7 +73,9 @@ def test_a_design_covers_the_actuators_that_it_knows_and_no_others():
     known = {"actuator.elevator_deflection.set": "elevator_50", "actuator.fuel_equivalence_ratio.set": "fuel_10"}
     assert of(known | {"actuator.elevator_deflection.stop": "30 deg"}, REALISTIC) == []
     assert [text.partition(":")[0] for text in of(known, REALISTIC)] == ["actuator.elevator_deflection.stop"]
-    assert [text.partition(";")[0] for text in of({}, REALISTIC)] == [f"actuator.{name}: ideal" for name in INPUT_NAMES]
+    assert [text.partition(";")[0] for text in of({}, REALISTIC)] == [
+        f"actuator.{name}.set: ideal" for name in INPUT_NAMES
+    ]
 
 
 def test_where_no_tube_is_certified_nothing_is_covered():

@@ -1,12 +1,13 @@
 """The estimator of the elevator's effectiveness: what its intervals hold, and what it makes of faults."""
 
+import core_calls as calls
 import numpy as np
 import pytest
 from flights import components
 from marking import long
 
 from hsv.base.errors import ParameterError
-from hsv.control.effectiveness import EffectivenessMode, effectiveness_along, effectiveness_in
+from hsv.control.effectiveness import EffectivenessMode, effectiveness_in
 from hsv.control.tube_law import tube_memory
 from hsv.core import doubles, lib, records, vector
 from hsv.flight.assembly import assemble_flight
@@ -29,7 +30,7 @@ def active(effectiveness=0.9, **fault):
 def known_along(parts, flight):
     """Return what the estimator of ``parts`` knows after each step of a ``flight``."""
     data = parts.controller.kernel.effectiveness
-    return effectiveness_along(data, flight.history.estimate, flight.history.command)
+    return calls.effectiveness_along(data, flight.history.estimate, flight.history.command)
 
 
 def effectiveness_step(data, memory, step, x):

@@ -19,8 +19,7 @@ RAMP = ((1.0, 3.0), (LOW[0], NEAR[0]), (LOW[1], NEAR[1]), PERIOD, VEHICLE)
 
 def along(trajectory, steps):
     """States, inputs and defects of every step."""
-    rows = trajectory.rows(steps)
-    data = trajectory.data.rows(rows)
+    data = trajectory.along(steps)
     return data.state, data.input, data.defect
 
 

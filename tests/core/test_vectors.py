@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,22 +18,23 @@ import numpy as np
 import pytest
 
 from hsv.control.design import find_design, read_design
-from hsv.control.effectiveness import EffectivenessData, effectiveness_along, effectiveness_data
-from hsv.control.estimator import EstimatorData, steady_gain
-from hsv.control.nominal_law import NominalData, level
+from hsv.control.effectiveness import effectiveness_data
+from hsv.control.estimator import steady_gain
+from hsv.control.nominal_law import level
+from hsv.control.nominal_trajectory import nominal_data
 from hsv.control.notch_filter import NotchSection, discretise
 from hsv.control.reference_trajectory import ReferenceTrajectory
-from hsv.core import arithmetic, doubles, ffi, lib, vector
+from hsv.core import Struct, arithmetic, doubles, ffi, lib, vector
 from hsv.design.disturbance import decompose
 from hsv.design.error_system import tube_errors
 from hsv.flight.responses import along_filter, lag_response
 from hsv.flight.scenario import load_scenario
-from hsv.model.actuators import actuator_data, actuator_map, actuators_at_rest
+from hsv.model.actuators import actuator_data, actuators_at_rest
 from hsv.model.atmosphere import atmosphere_data, atmosphere_state
-from hsv.model.dynamics import VehicleParameters, advance, air_relative, derivative, forces, jacobian, vehicle_struct
-from hsv.model.faults.schedule import FaultRows, fault_memory, fault_rows
-from hsv.model.links import LinkData, link_state
-from hsv.model.lpv.actuated import SampledActuators, respond
+from hsv.model.dynamics import VehicleParameters, advance, derivative, forces, jacobian, vehicle_struct
+from hsv.model.faults.schedule import fault_memory, fault_rows
+from hsv.model.links import link_state
+from hsv.model.lpv.actuated import respond
 from hsv.model.lpv.linearisation import Filter, extended_derivative, extended_jacobian
 from hsv.model.lpv.polytope import Polytope, axis_weights
 from hsv.model.sensors import SENSOR_SETS, sensor_data, sensor_state
@@ -91,7 +91,7 @@ def _bits(array: np.ndarray) -> np.ndarray:
 
 def elementary(z: Golden) -> None:
     angles = z["elementary.angle.x"].tolist()
-    for name, column in zip(("sine", "cosine"), zip(*map(arithmetic.sine_cosine, angles), strict=True), strict=True):
+    for name, column in zip(("sine", "cosine"), zip(*map(calls.sine_cosine, angles), strict=True), strict=True):
         z.check(f"elementary.sine_cosine.{name}", column)
     z.check("elementary.tangent", arithmetic.of_each(arithmetic.tangent, angles))
     for name, function in (
@@ -101,14 +101,14 @@ def elementary(z: Golden) -> None:
     ):
         z.check(f"elementary.{name}", arithmetic.of_each(function, z[f"elementary.{name}.x"]))
     points = z["elementary.arctangent2.y"].tolist(), z["elementary.arctangent2.x"].tolist()
-    z.check("elementary.arctangent2", [arithmetic.arctangent2(y, x) for y, x in zip(*points, strict=True)])
+    z.check("elementary.arctangent2", [lib.hsv_arctangent2(y, x) for y, x in zip(*points, strict=True)])
 
 
 def noise(z: Golden) -> None:
-    z.check("noise.philox", [arithmetic.philox(tuple(c[:4]), tuple(c[4:])) for c in z["noise.philox.counter"].tolist()])
+    z.check("noise.philox", [calls.philox(c[:4], c[4:]) for c in z["noise.philox.counter"].tolist()])
     arguments = z["noise.numbers.arguments"].tolist()
-    z.check("noise.uniforms", [arithmetic.uniforms(*row) for row in arguments])
-    z.check("noise.normals", [arithmetic.normals(*row) for row in arguments])
+    z.check("noise.uniforms", [calls.written(lib.hsv_uniforms, 2, *row) for row in arguments])
+    z.check("noise.normals", [calls.written(lib.hsv_normals, 2, *row) for row in arguments])
 
 
 def design(name: str) -> Any:
@@ -128,7 +128,10 @@ def polytopes(z: Golden) -> None:
         data = polytope.data()
         # The schedule of one entry in each vertex is that of the weights.
         r = len(polytope.A)
-        ones = replace(data, S=np.pad(np.eye(r), ((0, 0), (0, -r % lib.SUMS))), entries=np.arange(r))
+        ones = Struct(
+            "hsv_polytope",
+            **data.values | {"S": np.pad(np.eye(r), ((0, 0), (0, -r % lib.SUMS))), "entries": np.arange(r)},
+        )
         z.check(f"polytope.{name}.weights", [calls.written(lib.hsv_schedule, 99, ones.pointer, *p)[:r] for p in points])
         z.check(f"polytope.{name}.S", [calls.written(lib.hsv_schedule, 99, data.pointer, *p) for p in points])
         room = ffi.new("double[99]")
@@ -144,7 +147,7 @@ def nominal_laws(z: Golden) -> None:
     defects = z["nominal_input.baseline.deviation"][::-1] * 0.0078125
     for name in ("baseline", "smooth"):
         own = design(name)
-        data = NominalData(own.polytope.data(), own.nominal_gains, own.nominal_ellipsoids, own.interpolated)
+        data = nominal_data(own)
         x = z[f"nominal_input.{name}.deviation"]
         u, index = np.empty((len(x), 2)), np.empty((len(x), 1))
         inside = [lib.hsv_nominal_input(data.pointer, *map(doubles, rows)) for rows in zip(x, u, index, strict=True)]
@@ -177,7 +180,10 @@ def vehicle(z: Golden) -> None:
         for a, b, p, now in zip(x, u, own, c, strict=True)
     ]
     z.check("dynamics.forces_in", windy)
-    z.check("dynamics.air_relative", [air_relative(a[1], a[3] - a[2], *b[:2]) for a, b in zip(x, c, strict=True)])
+    z.check(
+        "dynamics.air_relative",
+        [calls.written(lib.hsv_air_relative, 4, a[1], a[3] - a[2], *b[:2]) for a, b in zip(x, c, strict=True)],
+    )
     lengths = [*zip(z["integration.period"], z["integration.substeps"].tolist(), strict=True)]
     calm = [advance(*point, *length) for point, length in zip(points, lengths, strict=True)]
     z.check("integration.advance", calm)
@@ -208,7 +214,7 @@ def references(z: Golden) -> None:
 
 def actuators(z: Golden) -> None:
     rows = [*zip(z["actuator.order"].tolist(), z["actuator.arguments"].tolist(), strict=True)]
-    maps = [actuator_map(order, *row[:3]) if order else (0.0,) * 4 for order, row in rows]
+    maps = [calls.actuator_map(order, *row[:3]) if order else (0.0,) * 4 for order, row in rows]
     z.check("actuator.map", maps)
     steps = [
         calls.actuator_step(order, own, row[3:5], row[5], row[6:], row[2])
@@ -217,7 +223,7 @@ def actuators(z: Golden) -> None:
     z.check("actuator.step", steps)
 
 
-def tables(z: Golden, name: str) -> list[FaultRows]:
+def tables(z: Golden, name: str) -> list[Struct]:
     """Return the faults of every case before they act."""
     none = fault_rows((), (), PERIOD)
     columns = z[f"faults.{name}.tables"]
@@ -225,7 +231,7 @@ def tables(z: Golden, name: str) -> list[FaultRows]:
     rows["start"], rows["stop"], rows["channel"], rows["code"], rows["occurrence"] = columns[:, :5].T
     rows["cycle"], rows["parameter"] = columns[:, 5:7], columns[:, 7:]
     cases = np.split(rows, np.cumsum(z[f"faults.{name}.counts"])[:-1])
-    return [FaultRows(own.copy(), fault_memory(len(own)), PERIOD) for own in cases]
+    return [Struct("hsv_faults", rows=own.copy(), memory=fault_memory(len(own)), period=PERIOD) for own in cases]
 
 
 def faults(z: Golden) -> None:
@@ -291,7 +297,9 @@ def sensors(z: Golden) -> None:
 def equipment(z: Golden) -> None:
     payloads, found = z["links.payload"], []
     for i, row in enumerate(z["links.data"].tolist()):
-        link = LinkData(*map(int, row[:3]), *row[3:7], *map(bool, row[7:]))
+        names = [name for name, _ in ffi.typeof("hsv_link").fields]
+        values = *map(int, row[:3]), *row[3:7], *map(bool, row[7:])
+        link = Struct("hsv_link", **dict(zip(names, values, strict=True)))
         n = (9, 2)[i % 2]
         memory, lines = link_state(link, n, payloads[-1, :n] if i % 4 == 1 else None), np.zeros((len(payloads), 9))
         for k, payload in enumerate(payloads):
@@ -337,7 +345,8 @@ def filters(z: Golden) -> None:
         gain, needed = steady_gain(A, B, period, process, noise)
         z.check(f"estimator.{i}.gain", gain)
         assert needed == iterations
-        data, memory, lines = EstimatorData(gain, start, VEHICLES[i], period, 2), np.zeros(11), []
+        own = {"vehicle": vehicle_struct(VEHICLES[i]), "period": period, "substeps": 2}
+        data, memory, lines = Struct("hsv_estimator", gain=gain, start=start, **own), np.zeros(11), []
         for k in range(len(y)):
             estimate = calls.written(lib.hsv_estimate, 9, data.pointer, doubles(memory), k, y[k], u[max(k - 1, 0)])
             lines.append(np.concatenate((estimate, memory)))
@@ -347,13 +356,13 @@ def filters(z: Golden) -> None:
 
 def effectiveness(z: Golden) -> None:
     flown = load_scenario("case1_active_deep", {"duration": "6 s", "fault[0].start": "0.6 s"}).parameters()
-    names = [each.name for each in fields(EffectivenessData) if each.name not in ("vehicle", "start")]
+    names = [name for name, _ in ffi.typeof("hsv_effectiveness").fields if name not in ("vehicle", "start")]
     z.check("effectiveness.data.0", [getattr(effectiveness_data(flown, PERIOD), name) for name in names])
     for i, changes in enumerate(z["effectiveness.changes"]):
         data = effectiveness_data({**flown, **changes}, PERIOD)
         for kind in ("quiet", "noisy"):
             states, inputs = z[f"effectiveness.{kind}.states"], z[f"effectiveness.{kind}.inputs"]
-            known = effectiveness_along(data, states, inputs)
+            known = calls.effectiveness_along(data, states, inputs)
             rows = [[now.estimate, now.low, now.high, float(now.mode)] for now in known]
             z.check(f"effectiveness.{i}.{kind}", rows)
             z.check(f"effectiveness.{i}.{kind}.known", rows[::7])
@@ -380,7 +389,7 @@ def sequences(z: Golden) -> None:
     x, x_n, u, x_r, u_r, defect, lost, through, inverse, remaining, gain, lag = given.values()
     polytope = design("baseline").polytope
     notch = discretise([NotchSection(15.0, 0.02, 15.0, 0.5), NotchSection(19.5, 0.05, 20.0, 0.6)], PERIOD)
-    actuators = SampledActuators(*(z[f"designs.actuators.{field}"] for field in "ABCD"))
+    actuators = Struct("hsv_sampled", **{field: z[f"designs.actuators.{field}"] for field in "ABCD"})
     flight: Any = SimpleNamespace(
         history=SimpleNamespace(state=x, deviation=x_n), reference=x_r, reference_input=u_r, defect=defect
     )

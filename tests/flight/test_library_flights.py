@@ -147,7 +147,7 @@ def test_a_library_that_is_no_controller_is_refused(tmp_path, flags, message, mo
     build_probe(tmp_path, "-w", *flags)
     # As in the library's process, without starting one for each.
     library = LoadedLibrary(tmp_path / "probe.so", SharedMemory(-1))
-    monkeypatch.setattr("hsv.control.library_process._in_this_process", lambda path: library)
+    monkeypatch.setattr("hsv.control.library_process._in_this_process", library)
     with pytest.raises(ScenarioError, match=message):
         assemble_flight(load_scenario(written(tmp_path, design="baseline")))
 

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from core_calls import actuator_step
+from core_calls import actuator_map, actuator_step
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.base.errors import ParameterError
-from hsv.model.actuators import ACTUATOR_SETS, actuator_data, actuator_map
+from hsv.model.actuators import ACTUATOR_SETS, actuator_data
 from hsv.model.vehicle import load_vehicle
 
 VEHICLE = load_vehicle().coupled()

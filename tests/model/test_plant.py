@@ -7,7 +7,7 @@ from hsv.base.units import FOOT
 from hsv.model.dynamics import in_model_range
 from hsv.model.faults.schedule import ActiveFault
 from hsv.model.faults.table import Fault
-from hsv.model.plant import PLANT_PARAMETERS, FlightStatus, Plant, PlantFaults
+from hsv.model.plant import PLANT_PARAMETERS, FlightStatus, Plant, plant_faults
 
 DEFAULTS = {p.name: p.default for p in PLANT_PARAMETERS}
 
@@ -68,13 +68,13 @@ def test_a_change_of_faults_in_flight_leaves_the_memories_of_the_others():
     stuck = Fault.of("elevator_deflection", "lock_in_place", {}), 0, 2**62
     frozen = Fault.of("altitude", "sensor_freeze", {}), 0, 2**62
     unstart = Fault.of("engine", "inlet_unstart_outside", {}), 0, 2**62
-    before = PlantFaults.of([stuck, frozen, unstart], 0.02)
-    for number, faults in enumerate(before, 1):
+    before = plant_faults([stuck, frozen, unstart], 0.02)
+    for number, faults in enumerate(before.values.values(), 1):
         assert len(faults.memory) == 1
         faults.memory["kept"] = number
     added = [(Fault.of(channel, kind, given), 5, 2**62) for channel, kind, given in ADDED]
-    after = PlantFaults.of([*added, stuck, frozen, unstart], 0.02, before)
-    for number, faults in enumerate(after, 1):
+    after = plant_faults([*added, stuck, frozen, unstart], 0.02, before)
+    for number, faults in enumerate(after.values.values(), 1):
         assert sorted(faults.memory["kept"]) == [0.0, number]
 
 

@@ -7,19 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from hsv.core import Struct, doubles, lib, records, vector
-from hsv.model.faults.schedule import FaultRows
-
-_STRUCTS: dict[tuple[str, int], Struct] = {}
-"""By the object that each was filled from, which it keeps alive."""
-
-
-def pointer(kind: str, source: Any) -> Any:
-    """Return the pointer to the struct ``kind`` of ``source``, filled once."""
-    key = kind, id(source)
-    if key not in _STRUCTS:
-        _STRUCTS[key] = Struct(kind, source)
-    return _STRUCTS[key].pointer
+from hsv.control.effectiveness import Effectiveness, effectiveness_in
+from hsv.control.tube_law import tube_memory
+from hsv.core import Struct, doubles, ffi, lib, records, vector
 
 
 def written(function: Any, count: int, *arguments: Any) -> np.ndarray:
@@ -29,31 +19,27 @@ def written(function: Any, count: int, *arguments: Any) -> np.ndarray:
     return out
 
 
-def _faults(rows: FaultRows) -> Any:
-    return pointer("hsv_faults", rows)
-
-
-def begin_faults(rows: FaultRows, step: int, seed: int) -> int:
+def begin_faults(rows: Struct, step: int, seed: int) -> int:
     """Note in the memory of ``rows`` which of them act in a step; return how many do."""
-    return int(lib.hsv_begin_faults(_faults(rows), step, seed))
+    return int(lib.hsv_begin_faults(rows.pointer, step, seed))
 
 
-def command_faults(rows: FaultRows, step: int, seed: int, command: Sequence[float]) -> np.ndarray:
+def command_faults(rows: Struct, step: int, seed: int, command: Sequence[float]) -> np.ndarray:
     """Return what reaches the actuators (2) of a ``command`` (2)."""
     actuator = np.array(command, float)
-    lib.hsv_apply_command_faults(_faults(rows), step, seed, doubles(actuator))
+    lib.hsv_apply_command_faults(rows.pointer, step, seed, doubles(actuator))
     return actuator
 
 
-def engine_faults(rows: FaultRows, step: int, seed: int, alpha: float, mach: float, fuel: float) -> np.ndarray:
+def engine_faults(rows: Struct, step: int, seed: int, alpha: float, mach: float, fuel: float) -> np.ndarray:
     """Return the factors of thrust, lift and drag and the increment of the moment coefficient (4)."""
-    return written(lib.hsv_apply_engine_faults, 4, _faults(rows), step, seed, alpha, mach, fuel)
+    return written(lib.hsv_apply_engine_faults, 4, rows.pointer, step, seed, alpha, mach, fuel)
 
 
 def move_effectors(
-    data: Any,
+    data: Struct,
     moved: tuple[np.ndarray, np.ndarray],
-    rows: FaultRows,
+    rows: Struct,
     step: int,
     substep: float,
     command: np.ndarray,
@@ -63,9 +49,9 @@ def move_effectors(
     """Move actuators (2, 2) and effectors (2) over ``length`` substeps, in place."""
     state, effector = moved
     lib.hsv_move_effectors(
-        pointer("hsv_actuators", data),
+        data.pointer,
         doubles(state),
-        _faults(rows),
+        rows.pointer,
         step,
         substep,
         length,
@@ -85,28 +71,57 @@ def actuator_step(
     return written(lib.hsv_actuator_step, 3, order, np.array(map), np.array(state), command, *limits, h)
 
 
-def measure(sensors: Any, memory: np.ndarray, rows: FaultRows, step: int, seed: int, x: np.ndarray) -> np.ndarray:
+def measure(sensors: Struct, memory: np.ndarray, rows: Struct, step: int, seed: int, x: np.ndarray) -> np.ndarray:
     """Return the measurement (9) of the state ``x`` (9); ``memory`` is that of the sensors."""
     known = records("hsv_sensor_memory", memory)
-    return written(lib.hsv_measure, 9, pointer("hsv_sensors", sensors), known, _faults(rows), step, seed, x)
+    return written(lib.hsv_measure, 9, sensors.pointer, known, rows.pointer, step, seed, x)
 
 
-def receive(link: Any, memory: np.ndarray, step: int, seed: int, payload: np.ndarray) -> np.ndarray:
+def receive(link: Struct, memory: np.ndarray, step: int, seed: int, payload: np.ndarray) -> np.ndarray:
     """Return the payload that the receiver has in a step in which ``payload`` is sent."""
     taken = np.array(payload, float)
     sizes = len(memory), step, seed
-    lib.hsv_receive(pointer("hsv_link", link), doubles(memory), *sizes, doubles(taken), len(taken))
+    lib.hsv_receive(link.pointer, doubles(memory), *sizes, doubles(taken), len(taken))
     return taken
 
 
 def atmosphere_step(
-    atmosphere: Any, memory: np.ndarray, step: int, seed: int, altitude: float, speed: float
+    atmosphere: Struct, memory: np.ndarray, step: int, seed: int, altitude: float, speed: float
 ) -> np.ndarray:
     """Return wind forward and up (m/s) and the relative density (3) of a period; ``memory`` is that of the air."""
     given = doubles(memory), step, seed, altitude, speed
-    return written(lib.hsv_atmosphere_step, 3, pointer("hsv_atmosphere", atmosphere), *given)
+    return written(lib.hsv_atmosphere_step, 3, atmosphere.pointer, *given)
 
 
 def dryden_cross_map(r: float) -> np.ndarray:
     """Return F (2, 2) and the factor l11, l21, l22 (7) of the turbulence across the path over r = V T / L."""
     return written(lib.hsv_dryden_cross_map, 7, r)
+
+
+def effectiveness_along(data: Struct, states: np.ndarray, inputs: np.ndarray) -> list[Effectiveness]:
+    """Return the effectiveness after each step of a flight with ``states`` (n, 9) and commanded ``inputs`` (n, 2)."""
+    memory, known = tube_memory(), []
+    for step, (x, u) in enumerate(zip(states, inputs, strict=True)):
+        lib.hsv_effectiveness_step(data.pointer, records("hsv_tube_memory", memory), step, doubles(vector(x)))
+        memory["held"] = u
+        known.append(effectiveness_in(memory))
+    return known
+
+
+def sine_cosine(x: float) -> tuple[float, float]:
+    """Return the sine and the cosine of ``x`` (rad)."""
+    pair = ffi.new("double[2]")
+    lib.hsv_sine_cosine(x, pair, pair + 1)
+    return pair[0], pair[1]
+
+
+def philox(counter: Sequence[int], key: Sequence[int]) -> tuple[int, ...]:
+    """Return the four words of the ``counter`` (4) under the ``key`` (2)."""
+    words = ffi.new("uint64_t[4]")
+    lib.hsv_philox(counter, key, words)
+    return tuple(words)
+
+
+def actuator_map(order: int, frequency: float, damping: float, h: float) -> np.ndarray:
+    """Return the transition F11, F12, F21, F22 of position minus command, and rate, over ``h`` (s)."""
+    return written(lib.hsv_actuator_map, 4, int(order), frequency, damping, h)

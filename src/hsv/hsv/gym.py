@@ -31,7 +31,6 @@ from gymnasium.vector.utils import batch_space
 
 from hsv import core
 from hsv.base.errors import ControllerError, RunError, ScenarioError
-from hsv.control.reference_trajectory import ReferenceData
 from hsv.control.tube_law import no_tube
 from hsv.core import Struct, lanes, lib
 from hsv.flight.assembly import assemble_flight
@@ -97,7 +96,7 @@ class _Group:
     flights: list[Struct]
     """One per lane; spare lanes repeat the last flight"""
     memory: np.ndarray
-    references: list[ReferenceData]
+    references: list[Struct]
     step: int = 0
     over: bool = False
 

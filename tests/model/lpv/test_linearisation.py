@@ -1,16 +1,15 @@
 """Discretisation, extended models, modes and frequency responses; actuators and delays before the vehicle."""
 
-from functools import partial
-
 import numpy as np
 import pytest
+from core_calls import actuator_map
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import trapezoid
 from scipy.signal import lsim, lti
 
 from hsv.base.errors import DesignError
 from hsv.control.notch_filter import NotchSection, continuous, series
-from hsv.model.actuators import ACTUATOR_SETS, actuator_map
+from hsv.model.actuators import ACTUATOR_SETS
 from hsv.model.dynamics import jacobian
 from hsv.model.lpv.actuated import actuator_system, held_behind, respond, sampled_actuators
 from hsv.model.lpv.linearisation import (
@@ -21,11 +20,11 @@ from hsv.model.lpv.linearisation import (
     extended_state,
     frequency_response,
     from_true_rate,
-    grid_polytope,
     linearise,
     modes,
     zero_order_hold,
 )
+from hsv.model.lpv.polytopic import polytopic_model
 from hsv.model.signals import N_STATES
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
@@ -85,7 +84,8 @@ VELOCITIES = np.linspace(*load_vehicle().velocity_range, 5)
 
 @pytest.fixture(scope="module")
 def polytope():
-    return grid_polytope(partial(linearise, load_vehicle().coupled()), ALTITUDES, VELOCITIES, 0.02)
+    counts = len(ALTITUDES), len(VELOCITIES)
+    return polytopic_model(load_vehicle(), None, 0.02, counts, (np.ones(N_STATES), np.ones(2))).polytope
 
 
 def test_model_at_a_node_is_the_vertex(polytope):

@@ -78,11 +78,7 @@ def open_regular(path: Path) -> BufferedReader:
 
 
 def read_bytes(path: Path, max_bytes: int | None = None) -> bytes:
-    """Return the contents of the file ``path``; a file larger than ``max_bytes`` is refused.
-
-    Raises:
-        DocumentError: See :func:`open_regular`; or the file is larger.
-    """
+    """Return the contents of the file ``path``; a file larger than ``max_bytes`` is refused."""
     with open_regular(path) as stream:
         if max_bytes is not None and os.fstat(stream.fileno()).st_size > max_bytes:
             raise DocumentError(f"cannot be read (more than {max_bytes} bytes)")
@@ -93,11 +89,7 @@ def read_bytes(path: Path, max_bytes: int | None = None) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Return the text in the file ``path``, without a byte order mark and with the line ends of Unix.
-
-    Raises:
-        DocumentError: See :func:`read_bytes`; or the file is not UTF-8.
-    """
+    """Return the text in the file ``path``, without a byte order mark and with the line ends of Unix."""
     try:
         return read_bytes(path, MAX_BYTES).decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:

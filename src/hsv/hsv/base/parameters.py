@@ -130,6 +130,26 @@ def validate(table: Iterable[Parameter], values: Mapping[str, object]) -> dict[s
     return {p.name: p.check(values.get(p.name, p.default)) for p in table}
 
 
+def one_or(name: str, given: list[float], standard: float) -> float:
+    """Return the one value of the parameter ``name``, or the ``standard`` if none is given.
+
+    Raises:
+        ParameterError: There are several.
+    """
+    if len(given) > 1:
+        raise ParameterError(f"parameter {name}: {len(given)} values, expected one, or none for the set's")
+    return float(given[0]) if given else standard
+
+
+def check_lengths(values: Mapping[str, Any], first: str, *others: str) -> None:
+    """Refuse the arrays of ``others`` that have another number of values than that of ``first``."""
+    for name in others:
+        if len(values[name]) != len(values[first]):
+            raise ParameterError(
+                f"parameter {name}: {len(values[name])} values, expected as many as {first}, {len(values[first])}"
+            )
+
+
 def read_number(parameter: Parameter, text: object, field: str) -> float:
     """Return the number (SI) written in ``text`` in a file, for a ``parameter`` or one of its elements.
 

@@ -168,6 +168,11 @@ def si_unit_of(text: object) -> str:
     return "/".join((" ".join(factors) or "1", *divisors))
 
 
+def base_units(unit: str) -> dict[str, float]:
+    """Return the exponents of the base units of an SI unit: kg, m and s of ``"N"``."""
+    return {name: power / 2 for name, power in _squared(unit)[1]}
+
+
 def written(value: float, unit: str) -> float | str:
     """Return a number for a file: a text with its ``unit``, or the number if it has none; no digit is lost."""
     return value if unit == "1" else f"{value!r} {unit}"

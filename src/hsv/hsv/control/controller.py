@@ -163,7 +163,7 @@ class ControllerClass(Protocol):
 
 
 class NodeController(Controller):
-    """Placeholder for a controller that is a separate ROS 2 node and cannot be stepped here."""
+    """Placeholder for a controller that is a separate ROS 2 node; stepping it here raises a ParameterError."""
 
     def __init__(self, name: str) -> None:
         """Take the ``name`` for error messages."""
@@ -171,22 +171,14 @@ class NodeController(Controller):
 
     @property
     def kernel(self) -> Any:
-        """Raise an error.
-
-        Raises:
-            ParameterError: Always.
-        """
+        """Refuse."""
         raise self.refusal()
 
     def reset(self) -> None:
         """Do nothing."""
 
     def step(self, inputs: ControllerInput) -> ControllerResult:
-        """Raise an error.
-
-        Raises:
-            ParameterError: Always.
-        """
+        """Refuse."""
         raise self.refusal()
 
     def refusal(self) -> ParameterError:

@@ -135,9 +135,6 @@ def build_controller(values: Mapping[str, Any], design: ControlDesign | None = N
     Args:
         values: Parameters of the flight; the controller uses its own.
         design: The design in ``values`` if already built.
-
-    Raises:
-        ParameterError, DesignError: A wrong value, named; or the controller cannot be built.
     """
     name = str(validate(CONTROLLER_PARAMETERS, values)["controller"])
     if name.startswith(NODE):

@@ -8,14 +8,14 @@ statement about it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.base.parameters import Parameter, validate
-from hsv.base.units import UnitSystem, to_paper
+from hsv.base.parameters import validate
+from hsv.base.units import UnitSystem, in_system
 from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
 from hsv.control.estimator import ESTIMATOR_ENABLED
@@ -25,16 +25,16 @@ from hsv.model.atmosphere import ATMOSPHERE_PARAMETERS, atmosphere_data
 from hsv.model.faults.table import fault_parameters
 from hsv.model.links import COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER, MEASUREMENT_LINK_PARAMETERS
 from hsv.model.sensors import FIELDS, SENSOR_PARAMETERS, sensor_data
-from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES
 from hsv.model.vehicle import Vehicle
-
-_LINK_PARAMETERS = (*MEASUREMENT_LINK_PARAMETERS, *COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER)
 
 HARDWARE_PARAMETERS = (
     *ACTUATOR_PARAMETERS,
     *ATMOSPHERE_PARAMETERS,
     *SENSOR_PARAMETERS,
-    *_LINK_PARAMETERS,
+    *MEASUREMENT_LINK_PARAMETERS,
+    *COMMAND_LINK_PARAMETERS,
+    COMPUTATION_PARAMETER,
     ESTIMATOR_ENABLED,
 )
 """Parameters of the hardware of a flight: actuators, air, sensors, links and estimator."""
@@ -42,38 +42,55 @@ HARDWARE_PARAMETERS = (
 _LAW = "tube_mpc"
 """Name of the only controller that has a certificate."""
 
-_SENSOR_DATA = {"random_walk": "walk", "lag": "lag_decay"}
-"""Sensor fields that the sensor data store in another form: field to name in the data."""
+_CERTIFIED = {
+    **dict.fromkeys(("actuator", "sensors", "link"), "an ideal one"),
+    **dict.fromkeys(("wind", "turbulence", "gust"), "still air"),
+    "density": "the model's density",
+    "estimator": "a loop without one",
+}
+"""Hardware of the certificate, by the table of the parameters."""
 
-_SENSOR_TIMES = ("drift_time",)
-"""Sensor fields that have no effect on their own."""
-
-_LINK_DETAILS = ("burst", "checksum")
-"""Parameters of links that have no effect without a loss or a corruption."""
-
-_SHAPING = ("shear_altitude", "length", "length_forward", "length_up", "lengths", "stays", "starts")
-"""Parameters of the air that have no effect without a velocity or a density."""
+_SHAPING = (
+    *("drift_time", "burst", "checksum"),
+    *("shear_altitude", "length", "length_forward", "length_up", "lengths", "stays", "starts"),
+)
+"""Parameters that have no effect without another one of their table."""
 
 
 def uncovered_hardware(values: Mapping[str, Any], design: ControlDesign) -> list[str]:
-    """Return a message for each hardware parameter, or estimator, that the certificate of ``design`` does not cover.
-
-    Raises:
-        ParameterError: A wrong value, named.
-    """
+    """Return a message for each parameter of the hardware that the certificate of ``design`` does not cover."""
     v = validate(HARDWARE_PARAMETERS, values)
-    found = [*_actuators(v, design), *_sensors(v, design.period), *_links(v), *_air(v, design.period)]
-    if v[ESTIMATOR_ENABLED.name]:
-        found.append("estimator: the certificate has none in the loop")
+    sets = {f"actuator.{ACTUATOR_SETS[name].channel}.set": name for name in design.actuators}
+    standards = {f"sensors.{channel}.{field.name}": field.standard for channel in STATE_NAMES for field in FIELDS}
+    ideal = [table for table in ("wind", "turbulence", "gust", "density") if atmosphere_data(v, design.period).still]
+    ideal += ["sensors"] if sensor_data(v, design.period).ideal else []
+    found = []
+    for parameter in HARDWARE_PARAMETERS:
+        table, name = parameter.name.partition(".")[0], parameter.name.rpartition(".")[2]
+        given, certified = v[parameter.name], _CERTIFIED[table]
+        if isinstance(given, str):
+            covered, shown = given == sets.get(parameter.name, IDEAL), given
+            certified = sets.get(parameter.name, certified)
+        else:
+            numbers = given if isinstance(given, list) else [given]
+            covered = all(number == standards.get(parameter.name, 0.0) for number in numbers)
+            shown = "" if covered else _written(max(numbers, key=abs), parameter.unit, name)
+        # A stop is judged below: it matters only if it is narrower than the largest command.
+        if not covered and table not in ideal and name not in (*_SHAPING, "stop"):
+            found.append(f"{parameter.name}: {shown}; the certificate is for {certified}")
+    for channel, unit, reach in zip(INPUT_NAMES, INPUT_UNITS, commanded(design), strict=True):
+        chosen = ACTUATOR_SETS.get(v[f"actuator.{channel}.set"])
+        [stop] = v[f"actuator.{channel}.stop"] or [chosen.stop if chosen else np.inf]
+        if stop < reach:
+            largest = _written(reach, unit)
+            found.append(
+                f"actuator.{channel}.stop: {_written(stop, unit)}; the certificate lets commands go to {largest}"
+            )
     return found
 
 
 def uncovered_vehicle(values: Mapping[str, Any], design: ControlDesign) -> list[str]:
-    """Return a message for each property of vehicle and law that the certificate of ``design`` does not cover.
-
-    Raises:
-        ParameterError: A wrong value, named.
-    """
+    """Return a message for each property of vehicle and law that the certificate of ``design`` does not cover."""
     found = []
     coupling, digest = values.get("vehicle.coupling", design.coupling), values.get("vehicle.digest", design.vehicle)
     if coupling != design.coupling:
@@ -175,81 +192,8 @@ def commanded(design: ControlDesign) -> np.ndarray:
     return np.maximum(np.abs(lowest), np.abs(highest))
 
 
-def _actuators(v: Mapping[str, Any], design: ControlDesign) -> Iterator[str]:
-    known = {ACTUATOR_SETS[name].channel: name for name in design.actuators}
-    for i, channel in enumerate(INPUT_NAMES):
-        where = f"actuator.{channel}"
-        flown, certified = v[f"{where}.set"], known.get(channel, IDEAL)
-        # A stop is judged below: it matters only if it is narrower than the largest command.
-        own = [
-            _quantity(p, v[p.name][0])
-            for p in ACTUATOR_PARAMETERS
-            if p.name.startswith(f"{where}.")
-            and p.name != f"{where}.stop"
-            and isinstance(v[p.name], list)
-            and v[p.name]
-        ]
-        if flown != certified or own:
-            shown = ", ".join([flown, *own]) if own else flown
-            yield f"{where}: {shown}; the certificate is for {'an ideal one' if certified == IDEAL else certified}"
-        given = v[f"{where}.stop"]
-        stop = given[0] if given else ACTUATOR_SETS[flown].stop if flown != IDEAL else np.inf
-        reach = commanded(design)[i]
-        if stop < reach:
-            unit = INPUT_UNITS[i]
-            yield f"{where}.stop: {_written(stop, unit)}; the certificate lets commands go to {_written(reach, unit)}"
-
-
-def _sensors(v: Mapping[str, Any], period: float) -> Iterator[str]:
-    data = sensor_data(v, period)
-    chosen = v["sensors.set"]
-    of = f" (set {chosen})" if chosen != IDEAL else ""
-    for i, (channel, unit) in enumerate(zip(STATE_NAMES, STATE_UNITS, strict=True)):
-        errors = []
-        for field in FIELDS:
-            if field.name in _SENSOR_TIMES:
-                continue
-            value = float(getattr(data, _SENSOR_DATA.get(field.name, field.name))[i])
-            if value != field.standard:
-                name = field.name.replace("_", " ")
-                # The data hold lag and random walk per period, so that their value is not in the unit of the field.
-                errors.append(name if field.name in _SENSOR_DATA else f"{name} {_written(value, field.unit, unit)}")
-        if data.inertial_angle_of_attack and channel == "angle_of_attack" and data.on[i]:
-            errors.append("the error of the pitch angle")
-        if errors:
-            yield f"sensors.{channel}: {', '.join(errors)}{of}; the certificate is for an ideal one"
-
-
-def _links(v: Mapping[str, Any]) -> Iterator[str]:
-    for parameter in _LINK_PARAMETERS:
-        where, _, name = parameter.name.rpartition(".")
-        value = v[parameter.name]
-        if value and name not in _LINK_DETAILS:
-            unit = f" {parameter.unit}" if parameter.unit else ""
-            yield f"{where}: {name.replace('_', ' ')} {value:g}{unit}; the certificate is for an ideal one"
-
-
-def _air(v: Mapping[str, Any], period: float) -> Iterator[str]:
-    if atmosphere_data(v, period).still:
-        return
-    for parameter in ATMOSPHERE_PARAMETERS:
-        table, _, name = parameter.name.partition(".")
-        value = v[parameter.name]
-        largest = max(value, key=abs, default=0.0) if isinstance(value, list) else value
-        if name not in _SHAPING and largest != 0.0:
-            ideal = "the model's density" if table == "density" else "still air"
-            yield f"{parameter.name}: {_quantity(parameter, largest)}; the certificate is for {ideal}"
-
-
-def _quantity(parameter: Parameter, value: float) -> str:
-    """Return the text of a value: with the parameter's name for an actuator, without it for the air."""
-    name = parameter.name.rpartition(".")[2]
-    if name == "natural_frequency":
-        return f"natural frequency {value:g} rad/s"
-    named = f"{name.replace('_', ' ')} " if parameter in ACTUATOR_PARAMETERS else ""
-    return named + _written(value, parameter.unit)
-
-
-def _written(value: float, pattern: str, unit: str = "") -> str:
-    number, shown = to_paper(value, pattern.replace("{}", unit) or "1")
+def _written(value: float, unit: str, name: str = "") -> str:
+    # Angles are read in degrees, but natural frequencies in rad/s.
+    system = UnitSystem.si if name in ("natural_frequency", "lag") else UnitSystem.paper
+    number, shown = in_system(value, unit or "1", system)
     return f"{number:.4g}" + ("" if shown == "1" else f" {shown}")

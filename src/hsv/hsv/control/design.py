@@ -433,11 +433,7 @@ _POSITIVE = ("nominal_state_scale", "nominal_input_scale", "nominal_input_bound"
 
 
 def design_of(values: Mapping[str, Any]) -> ControlDesign | None:
-    """Return the design in the flat parameters of a flight, or ``None``.
-
-    Raises:
-        DesignError: See :meth:`ControlDesign.from_parameters`.
-    """
+    """Return the design in the flat parameters of a flight, or ``None``."""
     return ControlDesign.from_parameters(values) if brings_design(values) else None
 
 
@@ -531,11 +527,7 @@ def parse_parameters(text: str, source: str, node: str = "") -> dict[str, Any]:
 
 
 def parse_sections(text: str, source: str) -> dict[str, dict[str, Any]]:
-    """Return the flat parameters of every section in the ``text`` of a parameter YAML, ``"/**"`` for all nodes.
-
-    Raises:
-        DesignError: See :func:`parse_parameters`.
-    """
+    """Return the flat parameters of every section in the ``text`` of a parameter YAML, ``"/**"`` for all nodes."""
     try:
         tree = parse_yaml(text)
     except DocumentError as error:

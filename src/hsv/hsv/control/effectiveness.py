@@ -6,15 +6,15 @@ It is a named extension of the paper's tube law, off by default.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hsv.base.parameters import Parameter, validate
-from hsv.core import Data, doubles, dtype, lib, records, vector
-from hsv.model.dynamics import VehicleParameters
+from hsv.core import Struct
+from hsv.model.dynamics import vehicle_struct
 from hsv.model.trim import INITIAL_PARAMETERS, initial_trim
 from hsv.model.vehicle import VEHICLE_PARAMETERS, Vehicle
 
@@ -58,29 +58,6 @@ class EffectivenessMode(IntEnum):
     """A new explanation must first hold for more steps."""
 
 
-@dataclass(frozen=True, eq=False)
-class EffectivenessData(Data):
-    """The estimator for the core.
-
-    The nominal ``vehicle``, the state (9) in which the flight starts, T (s), relative bounds of the moment of inertia
-    and of the elevator's effect, then the parameters; ``learning`` and ``drift`` per step.
-    """
-
-    KIND = "hsv_effectiveness"
-    vehicle: VehicleParameters
-    start: np.ndarray
-    period: float
-    inertia: float
-    effect: float
-    least: float
-    bound: float
-    offset: float
-    learning: float
-    drift: float
-    noise: float
-    steps: float
-
-
 class Effectiveness(NamedTuple):
     """The effectiveness after a step: the value used, the interval that contains it, and the mode."""
 
@@ -100,12 +77,8 @@ class Effectiveness(NamedTuple):
         return words[self.mode]
 
 
-def effectiveness_data(values: Mapping[str, Any], period: float) -> EffectivenessData | None:
-    """Return the estimator that the flat parameters ``values`` describe, for a control ``period`` (s), if one does.
-
-    Raises:
-        ParameterError, TrimError: A wrong value, named.
-    """
+def effectiveness_data(values: Mapping[str, Any], period: float) -> Struct | None:
+    """Return the estimator that the flat parameters ``values`` describe, for a control ``period`` (s), if one does."""
     v = validate(EFFECTIVENESS_PARAMETERS, values)
     if not v[EFFECTIVENESS_ENABLED.name]:
         return None
@@ -114,8 +87,9 @@ def effectiveness_data(values: Mapping[str, Any], period: float) -> Effectivenes
     effect = 1.0
     for name in ("moment_elevator", "reference_area", "mean_aerodynamic_chord"):
         effect *= 1.0 + bounds.get(name, 0.0)
-    return EffectivenessData(
-        vehicle=nominal,
+    return Struct(
+        "hsv_effectiveness",
+        vehicle=vehicle_struct(nominal),
         start=start.state.copy(),
         period=period,
         inertia=bounds.get("moment_of_inertia", 0.0),
@@ -134,20 +108,3 @@ def effectiveness_in(memory: np.ndarray) -> Effectiveness:
     """Return the effectiveness in the ``memory`` of the tube law, a record ``hsv_tube_memory``."""
     estimate, low, high = memory["known"][:3].tolist()
     return Effectiveness(estimate, low, high, EffectivenessMode(int(memory["known"][_MODE])))
-
-
-def effectiveness_along(data: EffectivenessData, states: np.ndarray, inputs: np.ndarray) -> list[Effectiveness]:
-    """Return the effectiveness after each step of a flight.
-
-    Args:
-        data: The estimator.
-        states: Measured or estimated states (steps, 9).
-        inputs: Commanded inputs (steps, 2).
-    """
-    memory = np.zeros((), dtype("hsv_tube_memory"))
-    known = []
-    for step, (x, u) in enumerate(zip(states, inputs, strict=True)):
-        lib.hsv_effectiveness_step(data.pointer, records("hsv_tube_memory", memory), step, doubles(vector(x)))
-        memory["held"] = u
-        known.append(effectiveness_in(memory))
-    return known

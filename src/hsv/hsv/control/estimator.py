@@ -12,15 +12,14 @@ The gain is computed by iterating the Riccati equation in arithmetic that is the
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from hsv.base.errors import DesignError, ParameterError
 from hsv.base.parameters import Parameter, validate
-from hsv.core import Data, doubles, lib, vector
-from hsv.model.dynamics import VehicleParameters, jacobian
+from hsv.core import Struct, doubles, lib, vector
+from hsv.model.dynamics import VehicleParameters, jacobian, vehicle_struct
 from hsv.model.sensors import SENSOR_PARAMETERS, sensor_data
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_RIGID, N_STATES, STATE_NAMES, STATE_UNITS
 from hsv.model.trim import INITIAL_PARAMETERS, Trim, initial_trim
@@ -71,21 +70,9 @@ _SETTLED = 1e-12
 _MAX_ITERATIONS = 100_000
 
 
-@dataclass(frozen=True, eq=False)
-class EstimatorData(Data):
-    """The estimator for the core: its ``gain`` (11, 5), the model ``vehicle``, how it is integrated."""
-
-    KIND = "hsv_estimator"
-    gain: np.ndarray
-    start: np.ndarray
-    vehicle: VehicleParameters
-    period: float
-    substeps: int
-
-
 def estimator_data(
     values: Mapping[str, object], noise: np.ndarray, vehicle: VehicleParameters, start: Trim, period: float
-) -> EstimatorData:
+) -> Struct:
     """Return the estimator that :data:`hsv.control.estimator.ESTIMATOR_PARAMETERS` describe.
 
     Args:
@@ -112,7 +99,14 @@ def estimator_data(
     gain, iterations = steady_gain(A, B, period, process * np.sqrt(period), deviations)
     if iterations >= _MAX_ITERATIONS or not np.isfinite(gain).all():
         raise DesignError(f"estimator: no steady gain after {iterations} iterations, expected other noise")
-    return EstimatorData(gain, start.state.copy(), vehicle, period, 2)
+    return Struct(
+        "hsv_estimator",
+        gain=gain,
+        start=start.state.copy(),
+        vehicle=vehicle_struct(vehicle),
+        period=period,
+        substeps=2,
+    )
 
 
 def steady_gain(
@@ -143,17 +137,13 @@ class Estimator:
         *VEHICLE_PARAMETERS,
     )
 
-    def __init__(self, data: EstimatorData) -> None:
+    def __init__(self, data: Struct) -> None:
         self.data = data
         self._state = np.zeros(N_ESTIMATED)
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object], period: float) -> Self:
-        """Build from :attr:`PARAMETERS` for a control ``period`` (s).
-
-        Raises:
-            ParameterError, DesignError, TrimError: As :func:`estimator_data`, or a wrong value, named.
-        """
+        """Build from :attr:`PARAMETERS` for a control ``period`` (s)."""
         nominal, start = initial_trim(values)
         sensed = sensor_data({name: values[name] for name in _SENSED if name in values}, period)
         return cls(estimator_data(values, sensed.noise, nominal, start, period))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
 
@@ -84,7 +84,7 @@ def design_header(design: ControlDesign) -> str:
     )
     rows = [("block", *_COUNTS), *((name, *vars(most).values()) for name, most in step_bounds(design).items())]
     # The factors tau are a parameter of the block, so that the gain is F alone.
-    tube = replace(TubeLaw(design).kernel, gains=design.feedback_gain[None])
+    tube = TubeLaw(design).kernel.replaced(gains=design.feedback_gain[None])
     lines = [
         f'/* Numbers of the design "{_plain(design.name)}".',
         *(f" *\n{textwrap.fill(text, 119, initial_indent=' * ', subsequent_indent=' * ')}" for text in about),
@@ -97,8 +97,8 @@ def design_header(design: ControlDesign) -> str:
         f"enum {{ SECTIONS = {len(design.notch)}, FILTERED = {int(design.filtered)} }};",
         f"#define TAU_MINIMUM {_number(design.tau_minimum.min())}",
         constant_array("designed_tau", "double", design.tau),
-        *constant("hsv_nominal", "nominal_data", nominal_data(design)),
-        *constant("hsv_tube", "tube_data", tube),
+        *constant("nominal_data", nominal_data(design)),
+        *constant("tube_data", tube),
     ]
     return "\n".join(lines) + "\n"
 
@@ -137,32 +137,32 @@ def step_bounds(design: ControlDesign) -> dict[str, StepBound]:
     }
 
 
-def constant(kind: str, name: str, source: Any) -> list[str]:
-    """Return a struct of core.h with the numbers of ``source``, after the arrays that it points to.
+def constant(name: str, struct: Struct) -> list[str]:
+    """Return a struct of core.h in C, after the arrays that it points to.
 
     The array of a field is called like the path of the field: ``tube_data_notch_A``.
     """
     arrays: list[str] = []
 
-    def fields(struct: Any, name: str, source: Any, indent: str) -> str:
+    def fields(struct: Struct, name: str, indent: str) -> str:
         lines = []
-        for field, declared in ffi.typeof(struct).fields:
-            value, own = getattr(struct, field), f"{name}_{field}"
+        for field, declared in ffi.typeof(struct.kind).fields:
+            value, own = getattr(struct.pointer, field), f"{name}_{field}"
             if declared.type.kind == "struct":
-                text = fields(value, own, getattr(source, field), indent + "    ")
+                text = fields(getattr(struct, field), own, indent + "    ")
             elif declared.type.kind == "pointer":
                 text = f"({declared.type.item.cname} *){own}" if value else "0"
                 if value:
-                    arrays.append(constant_array(own, declared.type.item.cname, getattr(source, field)))
+                    arrays.append(constant_array(own, declared.type.item.cname, getattr(struct, field)))
             elif declared.type.kind == "array":
-                text = _number(np.asarray(getattr(source, field)))
+                text = _number(np.asarray(getattr(struct, field)))
             else:
                 text = _number(value)
             lines.append(f"\n{indent}.{field} = {text}")
         return f"{{{','.join(lines)}}}"
 
-    text = fields(Struct(kind, source).pointer[0], name, source, "    ")
-    return [*arrays, f"static const {kind} {name} = {text};"]
+    text = fields(struct, name, "    ")
+    return [*arrays, f"static const {struct.kind} {name} = {text};"]
 
 
 def constant_array(name: str, element: str, numbers: np.ndarray) -> str:

@@ -18,26 +18,13 @@ from xml.etree import ElementTree
 import numpy as np
 
 from hsv.base.errors import ParameterError
+from hsv.base.units import base_units
 from hsv.control.library import CBlock, load_block
 from hsv.model.signals import SignalType, numbers_of
 
 _SOURCE = "fmu.c"
 _HEADER = "fmu_block.h"
 _FLAGS = ("-std=gnu99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC")
-_BASE_UNITS: dict[str, dict[str, int]] = {
-    "1": {},
-    "m": {"m": 1},
-    "s": {"s": 1},
-    "1/s": {"s": -1},
-    "m/s": {"m": 1, "s": -1},
-    "rad": {"rad": 1},
-    "rad/s": {"rad": 1, "s": -1},
-    "rad s": {"rad": 1, "s": 1},
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "N m": {"kg": 1, "m": 2, "s": -2},
-    "Pa": {"kg": 1, "m": -1, "s": -2},
-}
-"""Units of the signals in base units; those of the elastic states are left out: FMI has integer exponents only."""
 
 
 class ExportedBlock(NamedTuple):
@@ -168,9 +155,10 @@ def _model_description(block: ExportedBlock, described: CBlock, token: str) -> b
     named: list[tuple[Any, ...]] = [("time", "s"), *inputs, *parameters, *outputs]
     for unit in dict.fromkeys(str(row[1]) for row in named):
         definition = ElementTree.SubElement(units, "Unit", name=unit)
-        if unit in _BASE_UNITS:
-            exponents = {name: str(power) for name, power in _BASE_UNITS[unit].items()}
-            ElementTree.SubElement(definition, "BaseUnit", exponents)
+        exponents = base_units(unit)
+        # FMI has integer exponents only, which the units of the elastic states have not.
+        if all(float(power).is_integer() for power in exponents.values()):
+            ElementTree.SubElement(definition, "BaseUnit", {name: f"{power:g}" for name, power in exponents.items()})
     ElementTree.SubElement(ElementTree.SubElement(root, "LogCategories"), "Category", name="logStatusError")
     experiment = {"startTime": "0", "stepSize": period}
     experiment |= {} if block.stop is None else {"stopTime": repr(block.stop)}

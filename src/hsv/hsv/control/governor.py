@@ -18,11 +18,10 @@ import numpy as np
 
 from hsv.base.errors import GovernorError, TrimError
 from hsv.control.design import ControlDesign, PlanBounds
-from hsv.control.nominal_law import NominalData
 from hsv.control.nominal_trajectory import LAWS, NominalTrajectory
 from hsv.control.reference_trajectory import TRIMS, Corner, ReferenceTrajectory
-from hsv.core import doubles, lib, vector
-from hsv.model.actuators import ActuatorData, actuator_data
+from hsv.core import Struct, doubles, lib, vector
+from hsv.model.actuators import actuator_data
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES
 from hsv.model.vehicle import Vehicle
@@ -62,7 +61,7 @@ class InputBounds:
     rate: np.ndarray
 
 
-def input_bounds(plan: PlanBounds, actuators: ActuatorData) -> InputBounds:
+def input_bounds(plan: PlanBounds, actuators: Struct) -> InputBounds:
     """Return the bounds that a design has certified for its ``plan``, with the rates of the ``actuators`` flown."""
     return InputBounds(plan.input_minimum, plan.input_maximum, actuators.rate_limit)
 
@@ -118,7 +117,7 @@ def legs_of(
 class Governor:
     """Finds references for the nominal system ``nominal`` of a design and the decoupled vehicle ``rigid``."""
 
-    def __init__(self, nominal: NominalData, rigid: VehicleParameters, period: float, bounds: InputBounds) -> None:
+    def __init__(self, nominal: Struct, rigid: VehicleParameters, period: float, bounds: InputBounds) -> None:
         """Plan with ``period`` (s) within ``bounds``."""
         self._nominal, self._rigid, self._period = nominal, rigid, period
         self._bounds = bounds

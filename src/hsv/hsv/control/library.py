@@ -31,7 +31,7 @@ from hsv.control.controller import (
     StepKernel,
     flat_input,
 )
-from hsv.control.library_process import LibraryUser, library_user
+from hsv.control.library_process import library_user
 from hsv.control.notch_filter import NotchFilter
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import SignalType
@@ -352,7 +352,7 @@ class LibraryController(ExternalController):
         self._state = np.zeros(state_size)
 
     @property
-    def library(self) -> LibraryUser:
+    def library(self) -> Any:
         """The process of the library."""
         return library_user(self.path)
 

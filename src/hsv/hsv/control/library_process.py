@@ -15,11 +15,11 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -179,21 +179,6 @@ class LibraryProcess:
                 raise ProcessError(f"no answer for {NO_PROGRESS:g} s")
 
 
-class LibraryUser(Protocol):
-    """Interface of a user of a library, in a child process or in this process."""
-
-    def describe(self, symbol: str) -> CBlock:
-        """Describe the library, see :meth:`LibraryProcess.describe`."""
-
-    def request(
-        self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, begun: Callable[[], int] = ...
-    ) -> Any:
-        """Send a request, see :meth:`LibraryProcess.request`."""
-
-    def sharing(self, numbers: int) -> AbstractContextManager[np.ndarray]:
-        """Share memory, see :meth:`LibraryProcess.sharing`."""
-
-
 _children: dict[Path, LibraryProcess] = {}
 
 
@@ -206,17 +191,15 @@ def _end_children() -> None:
 # A forked process inherits the connections, but not the children.
 os.register_at_fork(after_in_child=_children.clear)
 
-_in_this_process: Callable[[Path], LibraryUser] | None = None
+_in_this_process: Any = None
 
 
-def use_in_this_process(user: Callable[[Path], LibraryUser]) -> None:
-    """Use libraries in this process, a child, through ``user``, which takes the path of a library."""
+def use_in_this_process(library: Any) -> None:
+    """Use the ``library`` in this process, a child, see :class:`hsv.flight.library_child.LoadedLibrary`."""
     global _in_this_process
-    _in_this_process = user
+    _in_this_process = library
 
 
-def library_user(path: Path) -> LibraryUser:
-    """Return the user of the library at ``path``: a child of this process, or this process if it is the child."""
-    if _in_this_process:
-        return _in_this_process(path)
-    return _children.get(path) or _children.setdefault(path, LibraryProcess(path))
+def library_user(path: Path) -> Any:
+    """Return the process of the library at ``path``, or the library loaded in this process if it is the child."""
+    return _in_this_process or _children.get(path) or _children.setdefault(path, LibraryProcess(path))

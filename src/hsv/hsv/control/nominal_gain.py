@@ -18,7 +18,7 @@ gain of the next one inside, too.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -29,7 +29,6 @@ from hsv.control.optimisation import (
     GAIN_DIGITS,
     SolverReport,
     Unknown,
-    Whitening,
     lqr_whitening,
     minimise,
     rounded,
@@ -168,7 +167,14 @@ class NominalGain:
         }
 
 
-def nominal_gain(problem: NominalProblem, state: np.ndarray, outside: np.ndarray | None = None) -> NominalGain:
+def nominal_gain(
+    problem: NominalProblem,
+    state: np.ndarray,
+    outside: np.ndarray | None = None,
+    *,
+    interpolated: bool = False,
+    name: str = "nominal gain K, LMI (32)-(35)",
+) -> NominalGain:
     """Return the gain with the smallest worst-case cost from ``state``, verified after solving.
 
     Paper eq. 32, eq. 33, eq. 34, eq. 35; of the co-designed model eq. 49, eq. 50, eq. 51, eq. 52.
@@ -177,55 +183,13 @@ def nominal_gain(problem: NominalProblem, state: np.ndarray, outside: np.ndarray
         problem: Vertices, weights and input bounds.
         state: (n) nominal deviation x_n to start from, SI.
         outside: (n, n) Q of an ellipsoid that the new one must lie in, or None.
+        interpolated: Whether gains between this one and that of ``outside`` are to be certified, too.
+        name: Name of the result, for error messages.
 
     Raises:
         DesignError: No solution, or a solution that fails one of its inequalities when recomputed.
     """
     white = lqr_whitening(problem.A, problem.B, problem.state_scale, problem.input_scale)
-    return _solve(problem, white, state, outside, False, "nominal gain K, LMI (32)-(35)")
-
-
-def nested_gains(
-    problem: NominalProblem,
-    state: np.ndarray,
-    scales: Sequence[float],
-    *,
-    interpolated: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> list[NominalGain]:
-    """Return one gain for each of ``scales`` times ``state``, ellipsoids nested, outermost first.
-
-    Args:
-        problem: Vertices, weights and input bounds.
-        state: (n) the largest nominal deviation x_n, SI.
-        scales: Decreasing factors, the first usually 1.
-        interpolated: Whether gains between those of two ellipsoids are to be certified, too.
-        progress: Called with (solved, total).
-
-    Raises:
-        DesignError: Scales that do not decrease, no solution, or one that fails an inequality when recomputed.
-    """
-    if not scales or min(scales) <= 0.0 or any(b >= a for a, b in pairwise(scales)):
-        raise DesignError(f"nominal.scales = {list(scales)}: expected decreasing factors above zero")
-    white = lqr_whitening(problem.A, problem.B, problem.state_scale, problem.input_scale)
-    gains: list[NominalGain] = []
-    for index, scale in enumerate(scales):
-        outside = gains[-1].Q if gains else None
-        name = f"nominal gain {index + 1} of {len(scales)}, LMI (32)-(35)"
-        gains.append(_solve(problem, white, scale * state, outside, interpolated, name))
-        if progress:
-            progress(index + 1, len(scales))
-    return gains
-
-
-def _solve(
-    problem: NominalProblem,
-    white: Whitening,
-    state: np.ndarray,
-    outside: np.ndarray | None,
-    interpolated: bool,
-    name: str,
-) -> NominalGain:
     n, m = problem.B.shape[1:]
     # With the state at unit length and inputs in units of their bounds, everything sought comes out near one.
     x = white.to_white @ state
@@ -274,45 +238,61 @@ def _solve(
     K = white.gain(np.linalg.solve(G.T, (bound[:, None] * Y).T).T)
     K = rounded(K, problem.input_scale[:, None] / problem.state_scale, GAIN_DIGITS)
     Q_si = rounded_matrix(white.covariance(Q * size**2))
-    gain = _verified(problem, K, Q_si, gamma[0, 0] * size**2 * problem.period, state, solver, name)
-    return gain if outside is None else _nested(problem, gain, outside, interpolated, name)
-
-
-def _verified(
-    problem: NominalProblem,
-    K: np.ndarray,
-    Q: np.ndarray,
-    gamma: float,
-    state: np.ndarray,
-    solver: SolverReport,
-    name: str,
-) -> NominalGain:
-    """Return the gain with the residuals of (33) to (35), recomputed from the rounded matrices."""
-    certified, decrease = certified_cost(problem, K, Q, name)
+    certified, decrease = certified_cost(problem, K, Q_si, name)
     if not decrease.min() > -1e-9:
         raise DesignError(f"{name}: smallest eigenvalue of (34) = {decrease.min():.3g}, expected not below zero")
-    level = 1.0 - float(state @ np.linalg.solve(Q, state))
+    level = 1.0 - float(state @ np.linalg.solve(Q_si, state))
     if level < 0.0:
         raise DesignError(f"{name}: level of the initial state = {1.0 - level:.9g}, expected at most 1")
-    inputs = 1.0 - np.einsum("ij,jk,ik->i", K, Q, K) / problem.input_bound**2
+    inputs = 1.0 - np.einsum("ij,jk,ik->i", K, Q_si, K) / problem.input_bound**2
     if inputs.min() < 0.0:
         raise DesignError(f"{name}: largest input over its bound = {np.sqrt(1.0 - inputs)}, expected at most 1")
-    radii = spectral_radii(problem.A + problem.B @ K)
-    return NominalGain(K, K @ Q, Q, gamma, certified, level, decrease, inputs, None, None, radii, solver)
+    nesting: float | None = None
+    between: np.ndarray | None = None
+    if outside is not None:
+        factor = np.linalg.inv(np.linalg.cholesky(outside))
+        nesting = float(smallest_eigenvalues(np.eye(n) - factor @ Q_si @ factor.T))
+        if nesting < 0.0:
+            raise DesignError(f"{name}: reaches {-nesting:.3g} outside the ellipsoid before it, expected inside")
+        between = decrease_between(problem, K, outside) if interpolated else None
+        if between is not None and not between.min() > 0.0:
+            raise DesignError(
+                f"{name}: decrease of the level in the ellipsoid before it = {between.min():.3g}, expected above zero "
+                "for interpolated gains; scales that are closer to each other help"
+            )
+    radii, bound_of_cost = spectral_radii(problem.A + problem.B @ K), gamma[0, 0] * size**2 * problem.period
+    return NominalGain(
+        K, K @ Q_si, Q_si, bound_of_cost, certified, level, decrease, inputs, nesting, between, radii, solver
+    )
 
 
-def _nested(
-    problem: NominalProblem, gain: NominalGain, outside: np.ndarray, interpolated: bool, name: str
-) -> NominalGain:
-    """Return the gain with the residuals of its nesting in the ellipsoid ``outside`` (n, n)."""
-    factor = np.linalg.inv(np.linalg.cholesky(outside))
-    nesting = float(smallest_eigenvalues(np.eye(len(gain.Q)) - factor @ gain.Q @ factor.T))
-    if nesting < 0.0:
-        raise DesignError(f"{name}: reaches {-nesting:.3g} outside the ellipsoid before it, expected inside")
-    between = decrease_between(problem, gain.K, outside) if interpolated else None
-    if between is not None and not between.min() > 0.0:
-        raise DesignError(
-            f"{name}: decrease of the level in the ellipsoid before it = {between.min():.3g}, expected above zero for "
-            "interpolated gains; scales that are closer to each other help"
-        )
-    return replace(gain, nesting=nesting, between=between)
+def nested_gains(
+    problem: NominalProblem,
+    state: np.ndarray,
+    scales: Sequence[float],
+    *,
+    interpolated: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[NominalGain]:
+    """Return one gain for each of ``scales`` times ``state``, ellipsoids nested, outermost first.
+
+    Args:
+        problem: Vertices, weights and input bounds.
+        state: (n) the largest nominal deviation x_n, SI.
+        scales: Decreasing factors, the first usually 1.
+        interpolated: Whether gains between those of two ellipsoids are to be certified, too.
+        progress: Called with (solved, total).
+
+    Raises:
+        DesignError: Scales that do not decrease, no solution, or one that fails an inequality when recomputed.
+    """
+    if not scales or min(scales) <= 0.0 or any(b >= a for a, b in pairwise(scales)):
+        raise DesignError(f"nominal.scales = {list(scales)}: expected decreasing factors above zero")
+    gains: list[NominalGain] = []
+    for index, scale in enumerate(scales):
+        outside = gains[-1].Q if gains else None
+        name = f"nominal gain {index + 1} of {len(scales)}, LMI (32)-(35)"
+        gains.append(nominal_gain(problem, scale * state, outside, interpolated=interpolated, name=name))
+        if progress:
+            progress(index + 1, len(scales))
+    return gains

@@ -5,14 +5,12 @@ from __future__ import annotations
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import IntFlag
-from typing import Protocol
 
 import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
-from hsv.core import Data, doubles, ffi, lib, vector
-from hsv.model.lpv.polytope import PolytopeData
+from hsv.core import Struct, doubles, ffi, lib, vector
 from hsv.model.signals import N_RIGID, N_STATES
 
 MEMBERSHIP_TOLERANCE = 1e-6
@@ -32,20 +30,6 @@ class NominalStatus(IntFlag):
     FAMILY_FALLBACK = 8
 
 
-@dataclass(frozen=True, eq=False)
-class NominalData(Data):
-    """Polytope, gains K (g, 2, 9) and ellipsoids P (g, 5, 5) as the core takes them, outermost first.
-
-    ``interpolated``: whether the gain between two ellipsoids is one between theirs, or that of the outer one.
-    """
-
-    KIND = "hsv_nominal"
-    polytope: PolytopeData
-    gains: np.ndarray
-    ellipsoids: np.ndarray
-    interpolated: bool
-
-
 @dataclass(frozen=True)
 class LawResult:
     """u_n (2); the gain K (2, 9) in it and its index in the family, ``NOT_IN_FAMILY`` if found in flight; status.
@@ -59,19 +43,6 @@ class LawResult:
     status: NominalStatus
 
 
-class NominalLaw(Protocol):
-    """A nominal law: deterministic, stepped once a control period."""
-
-    in_core: bool
-    """Whether it is the nested family, which the core has in its loop."""
-
-    def reset(self) -> None:
-        """Forget the past."""
-
-    def step(self, deviation: np.ndarray) -> LawResult:
-        """Return the nominal input for x_n (9), ``deviation``."""
-
-
 def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
     """Return x' P x for the first s states, with P (s, s)."""
     n = len(ellipsoid)
@@ -81,12 +52,14 @@ def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
 class FamilyLaw:
     """The nested family: the gain of the smallest ellipsoid with x_n, or of the outermost if x_n lies in none.
 
-    Or, interpolated, one between it and that of the next ellipsoid inside.
+    Or, interpolated, one between it and that of the next ellipsoid inside. Other laws derive from it, and fall back to
+    it; a law is deterministic and stepped once a control period.
     """
 
     in_core = True
+    """Whether the core has the law in its loop"""
 
-    def __init__(self, data: NominalData) -> None:
+    def __init__(self, data: Struct) -> None:
         self.data = data
 
     def reset(self) -> None:
@@ -109,13 +82,7 @@ _HEADROOM = 1.02
 """Factor on the state that is solved for, so that the state of 100 steps later still lies in the ellipsoid."""
 
 
-@dataclass(frozen=True)
-class _Solution:
-    gain: np.ndarray
-    ellipsoid: np.ndarray
-
-
-class KothareLaw:
+class KothareLaw(FamilyLaw):
     """u_n = K x_n with K from the LMI for x_n(k), in effect from step k + ``SOLVE_STEPS`` exactly.
 
     A worker thread solves between the steps. A step whose solution is late waits for it, so that the flight depends on
@@ -127,7 +94,8 @@ class KothareLaw:
 
     in_core = False
 
-    def __init__(self, design: ControlDesign, data: NominalData) -> None:
+    def __init__(self, design: ControlDesign, data: Struct) -> None:
+        super().__init__(data)
         # Modelling and solver take a second to import: only this law pays for them.
         from hsv.control.nominal_gain import NominalProblem, nominal_gain
 
@@ -141,9 +109,8 @@ class KothareLaw:
             design.nominal_input_scale,
             design.nominal_input_bound,
         )
-        self._family = FamilyLaw(data)
         self._worker = ThreadPoolExecutor(1, "kothare")
-        self._pending: Future[_Solution | None] | None = None
+        self._pending: Future[tuple[np.ndarray, np.ndarray] | None] | None = None
         self.reset()
 
     def reset(self) -> None:
@@ -152,7 +119,7 @@ class KothareLaw:
             self._pending.cancel()
         self._pending = None
         self._step = 0
-        self._solution: _Solution | None = None
+        self._gain: np.ndarray | None = None
         self._status = NominalStatus.OK
 
     def step(self, deviation: np.ndarray) -> LawResult:
@@ -161,28 +128,28 @@ class KothareLaw:
             if self._pending:
                 self._take(self._pending.result(), deviation)
                 self._pending = None
-            if level(self._family.data.ellipsoids[-1], deviation) > 1.0:
+            if level(self.data.ellipsoids[-1], deviation) > 1.0:
                 self._pending = self._worker.submit(self._solve, deviation[:N_RIGID].copy())
         self._step += 1
-        if self._solution is None:
-            result = self._family.step(deviation)
+        if self._gain is None:
+            result = super().step(deviation)
             return LawResult(result.input, result.gain, result.gain_index, result.status | self._status)
-        gain = self._solution.gain
-        return LawResult(gain @ deviation, gain, NOT_IN_FAMILY, self._status)
+        return LawResult(self._gain @ deviation, self._gain, NOT_IN_FAMILY, self._status)
 
-    def _solve(self, state: np.ndarray) -> _Solution | None:
+    def _solve(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return the gain (2, 9) for a rigid state (5), and the P of its ellipsoid, or None if the solver fails."""
         try:
             found = self._nominal_gain(self._problem, _HEADROOM * state)
         except DesignError:
             return None
-        gain = np.zeros(self._family.data.gains.shape[1:])
+        gain = np.zeros(self.data.gains.shape[1:])
         gain[:, :N_RIGID] = found.K
-        return _Solution(gain, np.linalg.inv(found.Q))
+        return gain, np.linalg.inv(found.Q)
 
-    def _take(self, solution: _Solution | None, deviation: np.ndarray) -> None:
-        if solution is not None and level(solution.ellipsoid, deviation) <= 1.0:
-            self._solution, self._status = solution, NominalStatus.OK
+    def _take(self, solution: tuple[np.ndarray, np.ndarray] | None, deviation: np.ndarray) -> None:
+        if solution is not None and level(solution[1], deviation) <= 1.0:
+            self._gain, self._status = solution[0], NominalStatus.OK
             return
         self._status = NominalStatus.SOLVER_FAILED
-        if self._solution is None:
+        if self._gain is None:
             self._status |= NominalStatus.FAMILY_FALLBACK

@@ -10,12 +10,11 @@ import numpy as np
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, validate
 from hsv.control.design import ControlDesign, design_of
-from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, KothareLaw, NominalData, NominalLaw, NominalStatus
+from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, KothareLaw, NominalStatus
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS
 from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTrajectory
-from hsv.core import doubles, lib
+from hsv.core import Struct, doubles, lib
 from hsv.model.actuators import ACTUATOR_PARAMETERS
-from hsv.model.lpv.polytope import AxisWeights, PolytopeData
 from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES
 from hsv.model.vehicle import VEHICLE_PARAMETERS
 
@@ -51,7 +50,7 @@ class NominalTrajectory:
     """The actuators limit what can be commanded in flight (:class:`hsv.control.governor.CommandGovernor`)."""
 
     def __init__(
-        self, design: ControlDesign | None, reference: ReferenceTrajectory, law: NominalLaw | None = None
+        self, design: ControlDesign | None, reference: ReferenceTrajectory, law: FamilyLaw | None = None
     ) -> None:
         """Use ``law``, by default the nested family of the design; without a design there is only the reference."""
         self.reference = reference
@@ -69,9 +68,6 @@ class NominalTrajectory:
         Args:
             values: Flat parameters.
             design: The design in ``values``, where it is known already.
-
-        Raises:
-            ParameterError, DesignError, TrimError: A wrong value, named.
         """
         v = validate(NOMINAL_PARAMETERS, values)
         design = design or design_of(values)
@@ -133,23 +129,37 @@ class NominalTrajectory:
         )
 
 
-_FLAT = AxisWeights(np.array([0.0, 1.0]), np.zeros((4, 1, 0)))
+_FLAT = Struct("hsv_axis", breakpoints=np.array([0.0, 1.0]), coefficients=np.zeros((4, 1, 0)))
 
-NO_NOMINAL = NominalData(
-    PolytopeData(np.zeros((0, 0)), np.zeros(0, np.int64), np.zeros(2 * N_STATES + 1, np.int64), _FLAT, _FLAT),
-    np.zeros((0, N_INPUTS, N_STATES)),
-    np.zeros((0, N_RIGID, N_RIGID)),
-    False,
+NO_NOMINAL = Struct(
+    "hsv_nominal",
+    polytope=Struct(
+        "hsv_polytope",
+        S=np.zeros((0, 0)),
+        entries=np.zeros(0, np.int64),
+        starts=np.zeros(2 * N_STATES + 1, np.int64),
+        altitude=_FLAT,
+        velocity=_FLAT,
+    ),
+    gains=np.zeros((0, N_INPUTS, N_STATES)),
+    ellipsoids=np.zeros((0, N_RIGID, N_RIGID)),
+    interpolated=False,
 )
 """Placeholder for a nominal system if there is no design: x_n and u_n stay zero."""
 
 
-def nominal_data(design: ControlDesign) -> NominalData:
+def nominal_data(design: ControlDesign) -> Struct:
     """Return the nominal system and the nested family of ``design`` as the core takes them."""
-    return NominalData(design.polytope.data(), design.nominal_gains, design.nominal_ellipsoids, design.interpolated)
+    return Struct(
+        "hsv_nominal",
+        polytope=design.polytope.data(),
+        gains=design.nominal_gains,
+        ellipsoids=design.nominal_ellipsoids,
+        interpolated=design.interpolated,
+    )
 
 
-def _law(values: Mapping[str, Any], design: ControlDesign, reference: ReferenceTrajectory) -> NominalLaw | None:
+def _law(values: Mapping[str, Any], design: ControlDesign, reference: ReferenceTrajectory) -> FamilyLaw | None:
     if values["nominal.law"] == "kothare_online":
         return KothareLaw(design, nominal_data(design))
     if values["nominal.law"] == "qp":

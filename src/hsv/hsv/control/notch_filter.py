@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, validate
 from hsv.control.estimator import ESTIMATOR_ENABLED, Estimator
-from hsv.core import Data, doubles, lib
+from hsv.core import Struct, doubles, lib
 from hsv.core.arithmetic import solve, tangent
 from hsv.model.signals import PITCH_RATE
 
@@ -68,27 +68,13 @@ def default_sections() -> tuple[NotchSection, ...]:
     return flown_sections({})
 
 
-@dataclass(frozen=True, eq=False)
-class NotchData(Data):
-    """Sections in series: A (n, 2, 2), B (n, 2), C (n, 2), D (n), and the equilibrium G (n, 2) for unit input."""
-
-    KIND = "hsv_notch"
-
-    A: np.ndarray
-    B: np.ndarray
-    C: np.ndarray
-    D: np.ndarray
-    G: np.ndarray
-
-
-def discretise(sections: Sequence[NotchSection], period: float) -> NotchData:
+def discretise(sections: Sequence[NotchSection], period: float) -> Struct:
     """Return the sections discretised at ``period`` (s), each prewarped to keep its centre frequency.
 
     Raises:
         ParameterError: A centre frequency at or above the Nyquist frequency.
     """
-    n = len(sections)
-    data = NotchData(np.zeros((n, 2, 2)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n), np.zeros((n, 2)))
+    found = []
     for i, section in enumerate(sections):
         angle = section.zero_frequency * period / 2.0
         if angle >= math.pi / 2.0:
@@ -101,30 +87,26 @@ def discretise(sections: Sequence[NotchSection], period: float) -> NotchData:
         half = tangent(angle) / section.zero_frequency
         identity = np.eye(2)
         inverse = solve(identity - half * A, identity)
-        data.A[i] = 2.0 * inverse - identity  # inverse (I + half A), since I + half A = 2 I - (I - half A)
-        data.B[i] = 2.0 * half * inverse[:, 0]  # the section has B = (1, 0)
-        data.C[i] = C[0] * inverse[0] + C[1] * inverse[1]
-        data.D[i] = D + half * data.C[i, 0]
-        data.G[i] = _equilibrium(A)
-    return data
+        output = C[0] * inverse[0] + C[1] * inverse[1]
+        # inverse (I + half A) = 2 inverse - I, since I + half A = 2 I - (I - half A); the section has B = (1, 0).
+        found.append((2.0 * inverse - identity, 2.0 * half * inverse[:, 0], output, D + half * output[0]))
+    return _in_series(sections, found)
 
 
-def continuous(sections: Sequence[NotchSection]) -> NotchData:
+def continuous(sections: Sequence[NotchSection]) -> Struct:
     """Return the sections in continuous time (paper eq. 39)."""
+    return _in_series(sections, [section.state_space() for section in sections])
+
+
+def _in_series(sections: Sequence[NotchSection], found: Sequence[tuple[Any, ...]]) -> Struct:
+    """Return sections A, B, C, D with their equilibria for unit input, which the bilinear rule does not change."""
     n = len(sections)
-    data = NotchData(np.zeros((n, 2, 2)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n), np.zeros((n, 2)))
-    for i, section in enumerate(sections):
-        data.A[i], data.B[i], data.C[i], data.D[i] = section.state_space()
-        data.G[i] = _equilibrium(data.A[i])
-    return data
-
-
-def _equilibrium(A: np.ndarray) -> np.ndarray:
-    """Return the equilibrium (2) for unit input of a continuous section with ``A`` (2, 2).
-
-    The bilinear rule does not change it.
-    """
-    return np.array([0.0, -1.0 / A[0, 1]])
+    columns = ([np.array(row[k], float) for row in found] for k in range(4))
+    A, B, C, D = (
+        np.reshape(column, (n, *shape)) for column, shape in zip(columns, ((2, 2), (2,), (2,), ()), strict=True)
+    )
+    G = np.array([[0.0, 1.0 / (section.pole_frequency * section.pole_frequency)] for section in sections])
+    return Struct("hsv_notch", A=A, B=B, C=C, D=D, G=G.reshape(n, 2))
 
 
 def notch_response(sections: Sequence[NotchSection], frequencies: np.ndarray) -> np.ndarray:
@@ -142,7 +124,7 @@ def notch_response(sections: Sequence[NotchSection], frequencies: np.ndarray) ->
 
 
 def with_notch(
-    A: np.ndarray, B: np.ndarray, gain: np.ndarray, notch: NotchData
+    A: np.ndarray, B: np.ndarray, gain: np.ndarray, notch: Struct
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the open loop of vehicle and notch filter, in discrete time, and the gain of its state.
 
@@ -165,7 +147,7 @@ def with_notch(
     return whole, inputs, full
 
 
-def series(data: NotchData) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def series(data: Struct) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Return A (2 n, 2 n), B (2 n), C (2 n), D of all n sections in series, with the states in section order."""
     size = 2 * len(data.D)
     A, B, C, D = np.zeros((size, size)), np.zeros(size), np.zeros(size), 1.0
@@ -181,11 +163,7 @@ def series(data: NotchData) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
 
 
 def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
-    """Return the sections of the filter in flight: the values of the flight where given, else those of the design.
-
-    Raises:
-        ParameterError: A wrong value, or arrays of different lengths.
-    """
+    """Return the sections of the filter in flight: the values of the flight where given, else those of the design."""
     v = validate((*DESIGN_NOTCH_PARAMETERS, *FLOWN_NOTCH_PARAMETERS), values)
     pairs = zip(DESIGN_NOTCH_PARAMETERS[1:], FLOWN_NOTCH_PARAMETERS, strict=True)
     chosen = [flown if v[flown.name] else designed for designed, flown in pairs]

@@ -32,18 +32,17 @@ from hsv.base.errors import DesignError
 
 @dataclass(frozen=True)
 class SolverReport:
-    """Report on a solved problem: versions, ``status``, ``iterations``, ``time`` (s) and the ``objective`` returned."""
+    """Report on a solved problem: versions, ``status``, ``iterations`` and the ``objective`` returned."""
 
     solver: str
     modelling: str
     status: str
     iterations: int
-    time: float
     objective: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report for JSON, without the time, so that it is the same at every run."""
-        return {name: value for name, value in asdict(self).items() if name != "time"}
+        """Return the report for JSON, the same at every run."""
+        return asdict(self)
 
 
 def smallest_eigenvalues(matrices: np.ndarray) -> np.ndarray:
@@ -149,10 +148,6 @@ class Whitening:
     def covariance(self, N: np.ndarray) -> np.ndarray:
         """Return a matrix N (n, n) of the kind x' N^-1 x <= 1, found in the new coordinates, in the original ones."""
         return _symmetric(self.from_white @ N @ self.from_white.T)
-
-    def cross(self, M: np.ndarray) -> np.ndarray:
-        """Return M = gain times covariance (m, n), found in the new coordinates, in the original ones."""
-        return np.asarray(self.input_scale[:, None] * (M @ self.from_white.T))
 
 
 def _symmetric(matrix: np.ndarray) -> np.ndarray:
@@ -316,7 +311,6 @@ def _solved(c: np.ndarray, found: list[_Inequality], least: float, name: str) ->
         modelling=f"cvxpy {version('cvxpy')}",
         status=str(problem.status),
         iterations=int(statistics.num_iters or 0),
-        time=float(statistics.solve_time or 0.0),
         objective=float(problem.value),
     )
     return np.asarray(x.value), report

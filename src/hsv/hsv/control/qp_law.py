@@ -13,8 +13,9 @@ from scipy.linalg import solve_discrete_are
 
 from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
-from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, LawResult, NominalData, NominalStatus
+from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, LawResult, NominalStatus
 from hsv.control.reference_trajectory import ReferenceTrajectory
+from hsv.core import Struct
 from hsv.model.signals import N_RIGID, PITCH_RATE
 
 BLOCKS = 30
@@ -34,7 +35,7 @@ _ITERATIONS = 60
 """Iteration limit of the solver; about 10 are needed."""
 
 
-class QpLaw:
+class QpLaw(FamilyLaw):
     """Nominal law by quadratic programming: horizon 15 s, model and Riccati gain K at the final reference.
 
     With this K the infinite-horizon cost is x' P x plus the sum of c' (R + B' P B) c. The Hessian is therefore
@@ -45,7 +46,7 @@ class QpLaw:
 
     in_core = False
 
-    def __init__(self, design: ControlDesign, data: NominalData, reference: ReferenceTrajectory) -> None:
+    def __init__(self, design: ControlDesign, data: Struct, reference: ReferenceTrajectory) -> None:
         """Prepare the programme: its bounds are the plan bounds of the design minus the reference inputs of the flight.
 
         Raises:
@@ -60,7 +61,7 @@ class QpLaw:
                 f"reference inputs {inputs.min(axis=0).tolist()} to {inputs.max(axis=0).tolist()}: expected inside the "
                 f"plan bounds, {bounds.lower.tolist()} to {bounds.upper.tolist()}, for nominal.law = 'qp'"
             )
-        self._family = FamilyLaw(data)
+        super().__init__(data)
         self._lower, self._upper = bounds.lower - inputs.min(axis=0), bounds.upper - inputs.max(axis=0)
         self._scale = design.nominal_input_scale
         self._block = round(BLOCK_TIME / design.period)
@@ -103,7 +104,7 @@ class QpLaw:
             status = NominalStatus.SOLVER_FAILED
         block = self._age // self._block
         if self._plan is None or block >= BLOCKS:
-            result = self._family.step(deviation)
+            result = super().step(deviation)
             status |= result.status | NominalStatus.FAMILY_FALLBACK
             return LawResult(result.input, result.gain, result.gain_index, status)
         planned = self.gain @ deviation + self._plan[block]

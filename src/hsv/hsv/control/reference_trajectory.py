@@ -24,14 +24,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
 
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, validate
-from hsv.core import Data, doubles, lib, vector
+from hsv.base.parameters import Parameter, check_lengths, validate
+from hsv.core import Struct, doubles, lib, vector
 from hsv.model.dynamics import VehicleParameters, vehicle_struct
 from hsv.model.signals import N_INPUTS, N_STATES
 from hsv.model.trim import CONVERGED, INITIAL_GUESS, check_equilibrium
@@ -69,22 +68,8 @@ class Corner(NamedTuple):
     blend: float
 
 
-@dataclass(frozen=True, eq=False)
-class ReferenceData(Data):
-    """Reference x_r (r, 9), u_r (r, 2) and defect d_r (r, 9) for the core; row 0 belongs to step ``first``.
-
-    The reference is constant before the first row and after the last.
-    """
-
-    KIND = "hsv_reference"
-    first: int
-    state: np.ndarray
-    input: np.ndarray
-    defect: np.ndarray
-
-    def rows(self, chosen: np.ndarray | slice) -> ReferenceData:
-        """Return the chosen rows as a reference that begins at step 0."""
-        return ReferenceData(0, self.state[chosen], self.input[chosen], self.defect[chosen])
+def _reference(first: int, state: np.ndarray, input: np.ndarray, defect: np.ndarray) -> Struct:
+    return Struct("hsv_reference", first=first, state=state, input=input, defect=defect)
 
 
 class ReferenceTrajectory:
@@ -131,10 +116,11 @@ class ReferenceTrajectory:
         # A static trim has neither climb rate nor acceleration nor turn.
         rate, bend = (slope / period, bend / (period * period)) if trim == "climbing" else (0.0 * slope, 0.0 * bend)
         rows = len(steps)
-        self.data = ReferenceData(
+        self.data = _reference(
             first, np.zeros((rows, N_STATES)), np.zeros((rows, N_INPUTS)), np.zeros((rows, N_STATES))
         )
-        self._along = self.data.rows(slice(0))
+        """x_r (r, 9), u_r (r, 2), d_r (r, 9); row 0 belongs to step ``first``. Before and after, nothing changes."""
+        self._along: Struct | None = None
         self.corners = tuple(map(Corner, *(map(float, column) for column in (times, altitudes, velocities, blends))))
         """The corners of the commands in order of time."""
         size, inputs = np.full(rows, np.inf), self.data.input
@@ -163,9 +149,6 @@ class ReferenceTrajectory:
         Args:
             values: Flat parameters.
             period: Control period (s).
-
-        Raises:
-            ParameterError, TrimError: As for the constructor.
         """
         v = validate(REFERENCE_PARAMETERS, values)
         vehicle = Vehicle.from_parameters(values)
@@ -188,13 +171,12 @@ class ReferenceTrajectory:
         """Return the rows of :attr:`data` (steps) for the first ``steps`` steps."""
         return np.clip(np.arange(steps) - self.data.first, 0, len(self.data.state) - 1)
 
-    def along(self, steps: int) -> ReferenceData:
+    def along(self, steps: int) -> Struct:
         """Return the reference with one row for each of the first ``steps`` steps, cached; do not change it."""
-        along = self._along
-        if len(along.state) != steps:
-            rows = self.rows(steps)
-            self._along = along = self.data.rows(rows)
-        return along
+        if self._along is None or len(self._along.state) != steps:
+            data, rows = self.data, self.rows(steps)
+            self._along = _reference(0, data.state[rows], data.input[rows], data.defect[rows])
+        return self._along
 
     @property
     def end(self) -> float:
@@ -210,11 +192,8 @@ class ReferenceTrajectory:
 def _commands(times: Sequence[float], altitudes: Sequence[float], velocities: Sequence[float]) -> np.ndarray:
     if not len(times):
         raise ParameterError("parameter reference.times: empty, expected at least one time")
-    for name, column in (("altitudes", altitudes), ("velocities", velocities)):
-        if len(column) != len(times):
-            raise ParameterError(
-                f"parameter reference.{name}: {len(column)} values, expected as many as reference.times, {len(times)}"
-            )
+    columns = {"reference.times": times, "reference.altitudes": altitudes, "reference.velocities": velocities}
+    check_lengths(columns, *columns)
     for index, (before, after) in enumerate(itertools.pairwise(times), start=1):
         if after < before:
             raise ParameterError(f"parameter reference.times[{index}] = {after:g}: expected at least {before:g}")

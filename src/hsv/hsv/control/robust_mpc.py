@@ -12,8 +12,8 @@ from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, validate
 from hsv.control.controller import Controller, ControllerInput
 from hsv.control.design import ControlDesign
-from hsv.control.notch_filter import discretise
-from hsv.control.tube_law import TubeData, TubeResult, TubeStatusCode, tube_memory, tube_step
+from hsv.control.tube_law import TubeResult, TubeStatusCode, tube_data, tube_memory, tube_step
+from hsv.core import Struct
 from hsv.model.signals import N_RIGID
 
 ROBUST_MPC_PARAMETERS = (Parameter("robust_mpc.gain_index", 0, "which of nominal.gains: 0 the outermost", "", 0, 63),)
@@ -24,7 +24,7 @@ class RobustMpc(Controller):
 
     PARAMETERS = ROBUST_MPC_PARAMETERS
     in_core = True
-    kernel: TubeData
+    kernel: Struct
 
     def __init__(self, design: ControlDesign, gain_index: int = 0) -> None:
         """Take gain number ``gain_index`` of the family.
@@ -35,11 +35,7 @@ class RobustMpc(Controller):
         gains = design.nominal_gains
         if not 0 <= gain_index < len(gains):
             raise ParameterError(f"parameter robust_mpc.gain_index = {gain_index}: expected 0 to {len(gains) - 1}")
-        limits = design.input_minimum, design.input_maximum
-        no_notch = discretise((), design.period)
-        self.kernel = TubeData(
-            gains[gain_index][None], np.zeros(1, np.int64), *limits, False, False, no_notch, 0.0, design.period
-        )
+        self.kernel = tube_data(gains[gain_index][None], design.input_minimum, design.input_maximum, design.period)
         self._memory = tube_memory()
 
     @classmethod

@@ -57,34 +57,23 @@ RECOMPUTED_DESIGN = 1e-3
 """Largest deviation, in scaled coordinates, of a recomputed design."""
 
 PARAMETERS = {
-    "period": "copied",
-    "notch.zero_frequency": "copied",
-    "notch.zero_damping": "copied",
-    "notch.pole_frequency": "copied",
-    "notch.pole_damping": "copied",
-    "model.a": "model.a",
-    "model.b": "model.b",
-    "scheduling.altitude.breakpoints": "copied",
-    "scheduling.altitude.weights": "weights",
-    "scheduling.velocity.breakpoints": "copied",
-    "scheduling.velocity.weights": "weights",
-    "feedback.gain": "feedback gain",
-    "feedback.tau": "copied",
-    "feedback.tau_minimum": "copied",
-    "nominal.gains": "nominal gains",
-    "nominal.ellipsoids": "ellipsoids",
-    "nominal.state_scale": "copied",
-    "nominal.input_scale": "copied",
-    "nominal.input_bound": "relaxed bounds",
-    "input.minimum": "copied",
-    "input.maximum": "copied",
-    "tube.centre": "centre",
-    "tube.shape": "ellipsoids",
-    "tube.half_width": "half-widths",
-    "nominal.input_minimum": "plans",
-    "nominal.input_maximum": "plans",
-    "nominal.region_minimum": "plans",
-    "nominal.region_maximum": "plans",
+    name: kind
+    for kind, names in {
+        "copied": "period notch.zero_frequency notch.zero_damping notch.pole_frequency notch.pole_damping "
+        "scheduling.altitude.breakpoints scheduling.velocity.breakpoints feedback.tau feedback.tau_minimum "
+        "nominal.state_scale nominal.input_scale input.minimum input.maximum",
+        "model.a": "model.a",
+        "model.b": "model.b",
+        "weights": "scheduling.altitude.weights scheduling.velocity.weights",
+        "feedback gain": "feedback.gain",
+        "nominal gains": "nominal.gains",
+        "ellipsoids": "nominal.ellipsoids tube.shape",
+        "relaxed bounds": "nominal.input_bound",
+        "centre": "tube.centre",
+        "half-widths": "tube.half_width",
+        "plans": "nominal.input_minimum nominal.input_maximum nominal.region_minimum nominal.region_maximum",
+    }.items()
+    for name in names.split()
 }
 """The tolerance of every number of a design file."""
 

@@ -26,19 +26,17 @@ from hsv.control.effectiveness import (
     EFFECTIVENESS_PARAMETERS,
     WATCHED_PARAMETERS,
     Effectiveness,
-    EffectivenessData,
     effectiveness_data,
     effectiveness_in,
 )
 from hsv.control.nominal_law import level
 from hsv.control.notch_filter import (
     FLOWN_NOTCH_PARAMETERS,
-    NotchData,
     NotchSection,
     discretise,
     flown_sections,
 )
-from hsv.core import Data, doubles, dtype, lib, records, vector
+from hsv.core import Struct, doubles, dtype, lib, records, vector
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES
 from hsv.model.vehicle import COUPLING_PARAMETER
@@ -68,42 +66,34 @@ TUBE_PARAMETERS = (
 """Parameters of the tube law in addition to those of the design; declared hardware affects the status only."""
 
 
-@dataclass(frozen=True, eq=False)
-class TubeData(Data):
-    """The law for the core.
+def tube_data(
+    gains: np.ndarray, minimum: np.ndarray, maximum: np.ndarray, period: float = 1.0, **others: Any
+) -> Struct:
+    """Return the law for the core, ``hsv_tube``, by default a feedback on x - x_r without memory.
 
-    ``gains`` F diag(tau) (c, 2, 9), each from its step in ``starts`` (c) on, the first from the beginning; input limits
-    (2); ``planned``: whether the error is taken from the plan x_r + x_n, or from x_r alone; ``filtered``: whether the
-    pitch rate of the plan passes the ``notch`` filter; rate (1/s) and ``period`` (s) of the integral action; the
-    effectiveness estimator, or None.
+    Args:
+        gains: F diag(tau) (c, 2, 9).
+        minimum: Limits of the input (2).
+        maximum: (2)
+        period: T (s).
+        others: ``starts`` (c), the first step of each gain; ``planned``, whether the error is taken from the plan
+            x_r + x_n; ``filtered``, whether the pitch rate of the plan passes the ``notch`` filter; ``integral_rate``
+            (1/s); ``effectiveness``, the estimator.
     """
-
-    KIND = "hsv_tube"
-    gains: np.ndarray
-    starts: np.ndarray
-    minimum: np.ndarray
-    maximum: np.ndarray
-    planned: bool
-    filtered: bool
-    notch: NotchData
-    integral_rate: float
-    period: float
-    effectiveness: EffectivenessData | None = None
+    values: dict[str, Any] = {
+        "starts": np.zeros(1, np.int64),
+        "planned": False,
+        "filtered": False,
+        "notch": discretise((), period),
+        "integral_rate": 0.0,
+        "effectiveness": None,
+    }
+    return Struct("hsv_tube", gains=gains, minimum=minimum, maximum=maximum, period=period, **values | others)
 
 
-def no_tube(vehicle: VehicleParameters) -> TubeData:
+def no_tube(vehicle: VehicleParameters) -> Struct:
     """Return the data that replace a tube law if another controller flies: the input limits of ``vehicle``."""
-    return TubeData(
-        np.zeros((1, N_INPUTS, N_STATES)),
-        np.zeros(1, np.int64),
-        vehicle.input_minimum,
-        vehicle.input_maximum,
-        False,
-        False,
-        discretise((), 1.0),
-        0.0,
-        1.0,
-    )
+    return tube_data(np.zeros((1, N_INPUTS, N_STATES)), vehicle.input_minimum, vehicle.input_maximum)
 
 
 class TubeStep(NamedTuple):
@@ -120,7 +110,7 @@ def tube_memory() -> np.ndarray:
     return np.zeros((), dtype("hsv_tube_memory"))
 
 
-def tube_step(data: TubeData, memory: np.ndarray, inputs: ControllerInput, *, monitored: bool = True) -> TubeStep:
+def tube_step(data: Struct, memory: np.ndarray, inputs: ControllerInput, *, monitored: bool = True) -> TubeStep:
     """Return a step of the law (paper eq. 21, eq. 36), see ``core/tube_law.h``.
 
     Args:
@@ -147,7 +137,7 @@ def tube_step(data: TubeData, memory: np.ndarray, inputs: ControllerInput, *, mo
     return TubeStep(feedback, unsaturated, limited, int(active))
 
 
-def active_gain(data: TubeData, step: int) -> int:
+def active_gain(data: Struct, step: int) -> int:
     """Return the index of the active gain in ``step``."""
     return max(int(np.searchsorted(data.starts, step, side="right")) - 1, 0)
 
@@ -180,7 +170,7 @@ class TubeLaw(Controller):
 
     PARAMETERS = (*TUBE_PARAMETERS, *(p for p in WATCHED_PARAMETERS if p is not COUPLING_PARAMETER))
     in_core = True
-    kernel: TubeData
+    kernel: Struct
     design: ControlDesign
     factors: list[tuple[int, np.ndarray]]
     """First step and tau (5) of each gain of the kernel."""
@@ -194,7 +184,7 @@ class TubeLaw(Controller):
         integral_rate: float = 0.0,
         vehicle: str | None = None,
         hardware_covered: bool = True,
-        effectiveness: EffectivenessData | None = None,
+        effectiveness: Struct | None = None,
     ) -> None:
         """Fly ``design`` on a ``vehicle``, by its digest, with this set of inertial coupling.
 
@@ -256,17 +246,17 @@ class TubeLaw(Controller):
         self.factors = factors
         self._compact = [compact(tau) for _, tau in factors]
         design = self.design
-        self.kernel = TubeData(
+        self.kernel = tube_data(
             np.stack([design.adjusted_gain(tau) for _, tau in factors]),
-            np.array([start for start, _ in factors], np.int64),
             design.input_minimum,
             design.input_maximum,
-            True,
-            design.filtered,
-            self._notch,
-            self._integral_rate,
             design.period,
-            self._effectiveness,
+            starts=np.array([start for start, _ in factors], np.int64),
+            planned=True,
+            filtered=design.filtered,
+            notch=self._notch,
+            integral_rate=self._integral_rate,
+            effectiveness=self._effectiveness,
         )
 
     def step(self, inputs: ControllerInput) -> TubeResult:

@@ -222,7 +222,7 @@ def model_checks(subject: Subject) -> Checks:
     shown_values = [values[:8] for values in model.singular_values]
     yield recomputed(subject, "model.singular_values", shown_values, "singular values")
     judged = design.polytope if inputs["system"] == "DM" else model.whole
-    for name, value in model.accuracy(judged, scales).report().items():
+    for name, value in model.accuracy(judged, scales).items():
         kind = {"points": "copied", "smallest_weight": "weights", "weight_sum_error": "sums"}.get(name, "accuracy")
         yield recomputed(subject, f"model.accuracy.{name}", value, kind)
 

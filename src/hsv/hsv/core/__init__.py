@@ -1,8 +1,7 @@
-"""The numeric core in C99, called through cffi: structs filled from Python objects by the names of their fields.
+"""The numeric core in C99, called through cffi: structs filled by the names of their fields.
 
-``core.h`` declares every struct once. :class:`Struct` fills one from an object with attributes of the same names. The
-comment after an array in ``core.h`` gives its shape; arrays of another shape are refused. Fields that count elements,
-such as ``sections``, are set from the shapes.
+``core.h`` declares every struct once, and :class:`Struct` fills one. The comment after an array in ``core.h`` gives its
+shape; arrays of another shape are refused. Fields that count elements, such as ``sections``, are set from the shapes.
 """
 
 from __future__ import annotations
@@ -10,14 +9,12 @@ from __future__ import annotations
 import os
 import re
 from array import array
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.resources import files
 from operator import index
 from time import perf_counter
-from types import SimpleNamespace
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -26,7 +23,6 @@ from hsv.core._core import ffi, lib
 
 __all__ = [
     "Callback",
-    "Data",
     "Struct",
     "doubles",
     "dtype",
@@ -195,94 +191,69 @@ def loop_memory(flights: int) -> np.ndarray:
 
 
 class Struct:
-    """A struct of core.h, filled from an object; what it points to lives as long as this does."""
+    """A struct of core.h. The values of its fields are attributes, and live as long as this does."""
 
-    def __init__(self, kind: str, source: Any) -> None:
+    def __init__(self, kind: str, **values: Any) -> None:
         """Fill the struct ``kind``.
 
         Args:
             kind: Its name in core.h.
-            source: Has an attribute for each field but the counts of arrays. An array that the core writes to is not
-                copied; a nested struct is an object likewise, or a :class:`Struct`.
+            values: By the names of the fields, all but the counts of arrays. An array that the core writes to is not
+                copied; a nested struct is a :class:`Struct`.
 
         Raises:
-            ParameterError: A value of another type or shape than declared; the field is named.
+            ParameterError: A value that is missing, or of another type or shape than declared; the field is named.
         """
+        vars(self).update(values)
         self.kind = kind
-        self.source = source
         self.pointer = ffi.new(f"{kind} *")
-        self._kept: list[Any] = []
-        self._fill(kind, self.pointer[0], source)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Struct, (self.kind, self.source)
-
-    def replaced(self, source: Any, names: Iterable[str]) -> Struct:
-        """Return a struct of a ``source`` that differs in the fields of these ``names`` alone."""
-        other = Struct.__new__(Struct)
-        other.kind, other.source, other._kept = self.kind, source, [*self._kept]
-        other.pointer = ffi.new(f"{self.kind} *", self.pointer[0])
-        counts: dict[str, int] = {}
-        for name in names:
-            other._set(self.kind, other.pointer[0], name, _fields(self.kind)[name], source, counts)
-        if counts:
-            raise ParameterError(f"{self.kind}.{next(iter(counts))}: may have changed, expected a new struct")
-        return other
-
-    def _fill(self, kind: str, target: Any, source: Any) -> None:
-        named: Any = source
-        if isinstance(source, tuple) and {*map(type, source)} == {float} and named._fields == (*_fields(kind),):
-            # The numbers of a vehicle, many times.
-            ffi.memmove(ffi.addressof(target), ffi.new(f"{kind} *", named._asdict()), ffi.sizeof(kind))
-            return
         counts: dict[str, int] = {}
         for name, declared in _fields(kind).items():
-            self._set(kind, target, name, declared, source, counts)
+            self._set(name, declared, counts)
         for name, count in counts.items():
-            setattr(target, name, count)
+            setattr(self.pointer, name, count)
 
-    def _set(self, kind: str, target: Any, name: str, declared: Any, source: Any, counts: dict[str, int]) -> None:
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The values by field."""
+        return {name: getattr(self, name) for name in _fields(self.kind)}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self.kind, self.values)
+
+    def replaced(self, **changes: Any) -> Struct:
+        """Return a copy with other values of some fields."""
+        return Struct(self.kind, **self.values | changes)
+
+    def _set(self, name: str, declared: Any, counts: dict[str, int]) -> None:
+        target = self.pointer
         try:
-            value = getattr(source, name)
+            value = getattr(self, name)
             if declared.kind == "primitive":
                 setattr(target, name, value if declared.cname == "double" else index(value))
             elif declared.kind == "array":
-                self._copy(getattr(target, name), declared, np.asarray(value))
+                _copy_array(getattr(target, name), declared, np.asarray(value))
             elif declared.kind == "struct":
-                self._nest(declared.cname, getattr(target, name), value)
+                if not isinstance(value, Struct) or value.kind != declared.cname:
+                    found = value.kind if isinstance(value, Struct) else type(value).__name__
+                    raise TypeError(f"{found}, expected a Struct {declared.cname}")
+                ffi.memmove(ffi.addressof(target, name), value.pointer, ffi.sizeof(declared))
             else:
-                setattr(target, name, self._address(kind, name, declared, value, counts))
-        except ParameterError:
-            raise
+                setattr(target, name, self._address(name, declared, value, counts))
         except (AttributeError, TypeError, ValueError, OverflowError) as error:
-            raise ParameterError(f"{kind}.{name}: {error}") from error
+            raise ParameterError(f"{self.kind}.{name}: {error}") from error
 
-    def _copy(self, target: Any, declared: Any, value: np.ndarray) -> None:
-        element, shape = _element(declared)
-        if value.shape != shape:
-            raise ValueError(f"array of shape {value.shape}, expected {shape}")
-        array = np.ascontiguousarray(value, _ELEMENTS[element])
-        ffi.memmove(target, ffi.from_buffer(array), array.nbytes)
-
-    def _nest(self, kind: str, target: Any, value: Any) -> None:
-        if isinstance(value, Struct):
-            if value.kind != kind:
-                raise TypeError(f"a Struct {value.kind}, expected {kind}")
-            ffi.memmove(ffi.addressof(target), value.pointer, ffi.sizeof(kind))
-            self._kept.append(value)
-        else:
-            self._fill(kind, target, value)
-
-    def _address(self, kind: str, name: str, declared: Any, value: Any, counts: dict[str, int]) -> Any:
-        pointer = _pointers(kind).get(name)  # of a function there is none
+    def _address(self, name: str, declared: Any, value: Any, counts: dict[str, int]) -> Any:
+        pointer = _pointers(self.kind).get(name)  # of a function there is none
         if value is None and (pointer is None or pointer.optional):
             return ffi.NULL
-        value = value.struct if isinstance(value, Data) else value
         if isinstance(value, Struct):
-            self._kept.append(value)
             return value.pointer
         if pointer is None or isinstance(value, ffi.CData):
-            self._kept.append(value)
             return value if isinstance(value, ffi.CData) else ffi.cast(declared, value)
         constant, shape, _ = pointer
         element = declared.item.cname
@@ -290,41 +261,27 @@ class Struct:
         fits = isinstance(value, np.ndarray) and value.dtype == required and value.flags.c_contiguous
         if not constant and not (fits and value.flags.writeable):
             raise TypeError("expected an array that the core can write to")
-        given = np.asarray(value)
-        if given.size and not np.can_cast(given.dtype, required, "same_kind"):
-            raise TypeError(f"array of {given.dtype}, expected {required}")
-        array = value if fits else np.ascontiguousarray(given, required)
+        if not fits:
+            given = np.asarray(value)
+            if given.size and not np.can_cast(given.dtype, required, "same_kind"):
+                raise TypeError(f"array of {given.dtype}, expected {required}")
+            value = np.ascontiguousarray(given, required)
+            setattr(self, name, value)
         if shape:
-            _measure(array.shape, shape, counts)
-        self._kept.append(array)
-        return ffi.cast(declared, ffi.from_buffer(array))
+            _measure(value.shape, shape, counts)
+        return ffi.cast(declared, ffi.from_buffer(value))
 
 
-@dataclass(frozen=True, eq=False)
-class Data:
-    """Base of a frozen dataclass whose fields are those of a struct of core.h."""
+def _restored(kind: str, values: dict[str, Any]) -> Struct:
+    return Struct(kind, **values)
 
-    KIND: ClassVar[str]
-    """Name of the struct"""
 
-    @property
-    def struct(self) -> Struct:
-        """The struct for the core, shared by all threads."""
-        return vars(self).get("_struct") or vars(self).setdefault("_struct", Struct(self.KIND, self))
-
-    @property
-    def pointer(self) -> Any:
-        """The pointer to :attr:`struct`."""
-        return self.struct.pointer
-
-    def replaced(self, **changes: Any) -> Self:
-        """Return the data with other values of some fields; the struct is copied from this one."""
-        other = replace(self, **changes)
-        vars(other)["_struct"] = self.struct.replaced(other, changes)
-        return other
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name != "_struct"}
+def _copy_array(target: Any, declared: Any, value: np.ndarray) -> None:
+    element, shape = _element(declared)
+    if value.shape != shape:
+        raise ValueError(f"array of shape {value.shape}, expected {shape}")
+    array = np.ascontiguousarray(value, _ELEMENTS[element])
+    ffi.memmove(target, ffi.from_buffer(array), array.nbytes)
 
 
 def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: dict[str, int]) -> None:
@@ -358,7 +315,7 @@ class Callback:
         self.times = array("d")
         self._handle = ffi.new_handle(self)
         state = ffi.cast("double *", self._handle)
-        self.call = SimpleNamespace(function=lib.hsv_call_python, state=state, par=None)
+        self.call = Struct("hsv_call", function=lib.hsv_call_python, state=state, par=None)
 
 
 def _keep_exception(kind: type[BaseException], error: BaseException, traceback: Any) -> None:

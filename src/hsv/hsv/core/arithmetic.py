@@ -1,4 +1,4 @@
-"""Arithmetic with the same bits on every processor: elementary functions, linear equations and random numbers."""
+"""Arithmetic with the same bits on every processor: elementary functions and linear equations."""
 
 from __future__ import annotations
 
@@ -8,24 +8,13 @@ from typing import Any
 import numpy as np
 
 from hsv.base.parameters import Parameter
-from hsv.core import doubles, ffi, lib
-
-
-def sine_cosine(x: float) -> tuple[float, float]:
-    """Return the sine and the cosine of ``x`` (rad), up to 1e5 in magnitude."""
-    pair = ffi.new("double[2]")
-    lib.hsv_sine_cosine(x, pair, pair + 1)
-    return pair[0], pair[1]
-
+from hsv.core import doubles, lib
 
 tangent: Callable[[float], float] = lib.hsv_tangent
 """Return the tangent of an angle (rad) up to 1e5 in magnitude."""
 
 arcsine: Callable[[float], float] = lib.hsv_arcsine
 """Angle (rad) from -pi / 2 to pi / 2 whose sine is given, from -1 to 1."""
-
-arctangent2: Callable[[float, float], float] = lib.hsv_arctangent2
-"""Angle (rad) from -pi to pi of the point (x, y), given y first; each zero or of magnitude 1e-140 to 1e140."""
 
 exponential: Callable[[float], float] = lib.hsv_exponential
 """Return the exponential of a number up to 700 in magnitude."""
@@ -58,24 +47,3 @@ SEED_PARAMETER = Parameter("seed", 0, "key of all random numbers of the flight",
 
 LARGEST = float(np.sqrt(106.0 * 0.6931471805599453))
 """Largest magnitude of a normal number, 8.57: the logarithm in Box and Muller has an argument of at least 2^-53."""
-
-
-def philox(counter: tuple[int, int, int, int], key: tuple[int, int]) -> tuple[int, int, int, int]:
-    """Return the four words of the ``counter`` under the ``key``."""
-    words = ffi.new("uint64_t[4]")
-    lib.hsv_philox(counter, key, words)
-    return tuple(words)
-
-
-def uniforms(seed: int, step: int, stream: int, draw: int = 0) -> tuple[float, float]:
-    """Return two independent numbers, each uniform on the multiples of 2^-53 in [0, 1)."""
-    pair = ffi.new("double[2]")
-    lib.hsv_uniforms(seed, step, stream, draw, pair)
-    return pair[0], pair[1]
-
-
-def normals(seed: int, step: int, stream: int, draw: int = 0) -> tuple[float, float]:
-    """Return two independent standard normal numbers (Box and Muller 1958)."""
-    pair = ffi.new("double[2]")
-    lib.hsv_normals(seed, step, stream, draw, pair)
-    return pair[0], pair[1]

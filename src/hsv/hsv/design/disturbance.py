@@ -24,13 +24,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsv.control.design import ControlDesign
-from hsv.control.notch_filter import NotchData, discretise
+from hsv.control.notch_filter import discretise
 from hsv.control.optimisation import outward
-from hsv.core import doubles, lib
+from hsv.core import Struct, doubles, lib
 from hsv.design.error_system import tube_errors
 from hsv.flight.flight import Flight
 from hsv.flight.responses import along_filter, lag_response
-from hsv.model.lpv.actuated import SampledActuators, respond, sampled_actuators
+from hsv.model.lpv.actuated import respond, sampled_actuators
 from hsv.model.lpv.linearisation import linearise, zero_order_hold
 from hsv.model.lpv.polytope import Polytope
 from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
@@ -94,7 +94,7 @@ class ChannelModel:
     vehicle: Vehicle
 
     @cached_property
-    def notch(self) -> NotchData:
+    def notch(self) -> Struct:
         """The discrete filter."""
         return discretise(self.design.notch, self.design.period)
 
@@ -104,7 +104,7 @@ class ChannelModel:
         return acceleration_channels(self.vehicle, self.design.period)
 
     @cached_property
-    def actuators(self) -> SampledActuators | None:
+    def actuators(self) -> Struct | None:
         """The actuators of the design."""
         known = self.design.actuator_sets
         return sampled_actuators(known, self.design.period) if known else None
@@ -152,7 +152,7 @@ class ChannelModel:
 
 def decompose(
     polytope: Polytope,
-    notch: NotchData,
+    notch: Struct,
     inverse: np.ndarray,
     remaining: np.ndarray,
     flight: Flight,

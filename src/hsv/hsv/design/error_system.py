@@ -23,10 +23,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hsv.control.notch_filter import NotchData, with_notch
+from hsv.control.notch_filter import with_notch
+from hsv.core import Struct
 from hsv.flight.responses import along_filter
 from hsv.model.actuators import ActuatorSet
-from hsv.model.lpv.actuated import SampledActuators, actuator_names, respond, sampled_actuators
+from hsv.model.lpv.actuated import actuator_names, respond, sampled_actuators
 from hsv.model.signals import N_RIGID, PITCH_RATE, STATE_NAMES
 
 
@@ -57,7 +58,7 @@ def error_system(
     A: np.ndarray,
     B: np.ndarray,
     F: np.ndarray,
-    notch: NotchData,
+    notch: Struct,
     channels: np.ndarray,
     actuators: Sequence[ActuatorSet] = (),
     period: float = 0.0,
@@ -98,7 +99,7 @@ def error_system(
 
 
 def _with_actuators(
-    A: np.ndarray, B: np.ndarray, F: np.ndarray, actuators: SampledActuators
+    A: np.ndarray, B: np.ndarray, F: np.ndarray, actuators: Struct
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return vertices A (r, n + a, n + a) and B (r, n + a, 2), and F (2, n + a), the actuators' states last."""
     (r, n, _), a = A.shape, len(actuators.A)
@@ -119,8 +120,8 @@ def tube_errors(
     state: np.ndarray,
     deviation: np.ndarray,
     reference: np.ndarray,
-    notch: NotchData,
-    actuators: SampledActuators | None = None,
+    notch: Struct,
+    actuators: Struct | None = None,
     beyond_plan: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return e (k, n) of a flight: rigid states, then the filter's, then those of actuators that the design knows.

@@ -87,7 +87,7 @@ def design_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[NotchSec
     """Return :func:`polytopic_model` with its accuracy between the samples in the report."""
     model = polytopic_model(inputs, vehicle, notch)
     scales = state_scale(inputs, notch), inputs.tensor_product.input_scale.array()
-    return replace(model, report=model.report | {"accuracy": model.found.accuracy(model.whole, scales).report()})
+    return replace(model, report=model.report | {"accuracy": model.found.accuracy(model.whole, scales)})
 
 
 def _rounded(polytope: Polytope, state_scale: np.ndarray, input_scale: np.ndarray) -> Polytope:

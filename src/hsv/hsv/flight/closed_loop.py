@@ -8,7 +8,6 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import accumulate, pairwise
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from hsv import core
 from hsv.base.errors import ControllerError, ProcessError
 from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInput
-from hsv.control.nominal_law import NominalLaw
+from hsv.control.nominal_law import FamilyLaw
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.notch_filter import NotchFilter
 from hsv.control.tube_law import no_tube
@@ -25,7 +24,7 @@ from hsv.flight.flight import Flight, flight_of
 from hsv.flight.history import History
 from hsv.model.faults.injector import FaultInjector
 from hsv.model.faults.table import COMMAND
-from hsv.model.plant import Plant, PlantFaults
+from hsv.model.plant import Plant, plant_faults
 from hsv.model.signals import N_INPUTS, N_STATES, VARYING
 
 
@@ -108,7 +107,7 @@ def fly_into(history: History, components: Components) -> tuple[int, dict[str, S
     calls = {name: callback.call for name, callback in callbacks.items()}
     if not controller.in_core and controller.kernel is not None:
         address, state, parameters = controller.kernel
-        calls["controller"] = SimpleNamespace(function=address, state=state.copy(), par=parameters)
+        calls["controller"] = Struct("hsv_call", function=address, state=state.copy(), par=parameters)
     flight = flight_struct(components, history, **calls)
     with _ONE_AT_A_TIME if callbacks else nullcontext():
         if callbacks:
@@ -126,7 +125,7 @@ def fly_into(history: History, components: Components) -> tuple[int, dict[str, S
     return rows, {nodes[name]: callback.times for name, callback in callbacks.items()}
 
 
-NO_CALL = SimpleNamespace(function=None, state=None, par=None)
+NO_CALL = Struct("hsv_call", function=None, state=None, par=None)
 """Placeholder for an external block: the law of the core is used."""
 
 
@@ -141,17 +140,17 @@ def flight_struct(components: Components, history: History, **others: Any) -> St
     tube = controller.kernel if controller.in_core else no_tube(plant.vehicle)
     fields = {
         "x": plant.initial.state,
-        "plant": plant.data.struct,
-        "plant_memory": Struct("hsv_plant_memory", plant.memory()),
-        "plant_faults": Struct("hsv_plant_faults", PlantFaults.of(injector.known, plant.period)),
-        "notch": notch.data.struct,
-        "estimator": notch.estimator.data.struct if notch.estimator else None,
-        "nominal": nominal.data.struct,
-        "reference": nominal.reference.data.struct,
-        "tube": tube.struct,
-        "link": injector.link.struct,
+        "plant": plant.data,
+        "plant_memory": plant.memory(),
+        "plant_faults": plant_faults(injector.known, plant.period),
+        "notch": notch.data,
+        "estimator": notch.estimator.data if notch.estimator else None,
+        "nominal": nominal.data,
+        "reference": nominal.reference.data,
+        "tube": tube,
+        "link": injector.link,
         "link_memory": injector.link_state(),
-        "faults": Struct("hsv_faults", injector.rows((COMMAND,))),
+        "faults": injector.rows((COMMAND,)),
         "nominal_law": NO_CALL,
         "controller": NO_CALL,
         "commanded": None,
@@ -164,10 +163,10 @@ def flight_struct(components: Components, history: History, **others: Any) -> St
         "answer": [0.0] * N_INPUTS,
         "worst": -np.inf,
     }
-    return Struct("hsv_flight", SimpleNamespace(**fields | others))
+    return Struct("hsv_flight", **fields | others)
 
 
-def _law_callback(law: NominalLaw) -> Callback:
+def _law_callback(law: FamilyLaw) -> Callback:
     def solve(step: int, arguments: Any, out: Any) -> None:
         result = law.step(np.array(ffi.unpack(arguments, N_STATES)))
         out[0], out[1] = result.input

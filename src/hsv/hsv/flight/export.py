@@ -11,7 +11,7 @@ from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import Components
 from hsv.flight.scenario import Scenario
 from hsv.model.faults.table import COMMAND as COMMAND_SIDE
-from hsv.model.plant import PlantFaults
+from hsv.model.plant import plant_faults
 from hsv.model.signals import COMMAND, numbers_of
 
 SOURCE = "vehicle.c"
@@ -44,11 +44,11 @@ def scenario_header(components: Components) -> str:
         f"enum {{ FINAL_STEP = {plant.steps}, COMMAND_LINK_PAYLOADS = {len(payloads)} }};",
         constant_array("initial_state", "double", plant.initial.state),
         constant_array("command_link_memory", "double", payloads),
-        *constant("hsv_plant", "plant_data", plant.data),
-        *constant("hsv_plant_memory", "memory_data", plant.memory()),
-        *constant("hsv_plant_faults", "faults_data", PlantFaults.of(injector.known, plant.period)),
-        *constant("hsv_faults", "command_faults", injector.rows((COMMAND_SIDE,))),
-        *constant("hsv_link", "command_link_data", injector.link),
-        *constant("hsv_reference", "reference_data", components.nominal_trajectory.reference.data),
+        *constant("plant_data", plant.data),
+        *constant("memory_data", plant.memory()),
+        *constant("faults_data", plant_faults(injector.known, plant.period)),
+        *constant("command_faults", injector.rows((COMMAND_SIDE,))),
+        *constant("command_link_data", injector.link),
+        *constant("reference_data", components.nominal_trajectory.reference.data),
     ]
     return "\n".join(lines) + "\n"

@@ -10,7 +10,6 @@ import tomli_w
 from hsv.base.errors import GovernorError
 from hsv.base.units import rounded, written
 from hsv.control.governor import GovernedReference, Governor, InputBounds, input_bounds, legs_of
-from hsv.control.nominal_law import FamilyLaw
 from hsv.control.tube_law import TubeLaw
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.scenario import load_scenario, scenario_table, scenario_text
@@ -40,7 +39,7 @@ def governed(name: str, blend: float) -> GovernedScenario:
             f"scenario {scenario.name!r}: controller = {scenario.controller!r}, design = {scenario.design!r}: expected "
             "tube_mpc with a design that has tightened inputs"
         )
-    if not isinstance(law, FamilyLaw):
+    if not law.in_core:
         given = scenario.settings["nominal.law"]
         raise GovernorError(f"scenario {scenario.name!r}: nominal.law = {given!r}: expected 'family'")
     design, allowed = controller.design, controller.design.plan_bounds

@@ -107,7 +107,7 @@ def main() -> None:
 
 def serve(library: LoadedLibrary, connection: Connection[Any, Any]) -> NoReturn:
     """Serve requests until the parent has ended, or the library ends this process."""
-    use_in_this_process(lambda path: library)
+    use_in_this_process(library)
     Thread(target=_end_with_parent, args=(connection.fileno(),), daemon=True).start()
     kept: dict[str, Any] = {}
     while True:

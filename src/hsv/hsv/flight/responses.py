@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsv.control.notch_filter import NotchData
-from hsv.core import doubles, lib, vector
-from hsv.model.lpv.actuated import SampledActuators
+from hsv.core import Struct, doubles, lib, vector
 from hsv.model.lpv.polytope import Polytope
 from hsv.model.signals import N_INPUTS, N_RIGID
 
 
-def along_filter(notch: NotchData, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def along_filter(notch: Struct, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return ``rate`` (k) filtered, from rest for its first value, and the filter's states (k, s) before each step."""
     filtered, states = np.empty(len(rate)), np.empty((len(rate), 2 * len(notch.D)))
     lib.hsv_notch_along(notch.pointer, len(rate), *map(doubles, (vector(rate), filtered, states)))
@@ -21,8 +19,8 @@ def along_filter(notch: NotchData, rate: np.ndarray) -> tuple[np.ndarray, np.nda
 def lag_response(
     polytope: Polytope,
     gain: np.ndarray,
-    notch: NotchData,
-    actuators: SampledActuators,
+    notch: Struct,
+    actuators: Struct,
     scheduled: np.ndarray,
     lag: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:

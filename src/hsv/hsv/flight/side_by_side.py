@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, is_dataclass
-from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -74,7 +72,7 @@ class TubeLevels:
         self.set: Struct | None = None
         """The set as the core takes it; None if no set holds for the flights"""
         if tube:
-            self.set = Struct("hsv_tube_set", SimpleNamespace(notch=notch.data, shape=tube.shape, centre=tube.centre))
+            self.set = Struct("hsv_tube_set", notch=notch.data, shape=tube.shape, centre=tube.centre)
 
     def worst(self, flight: FlightData) -> float | None:
         """Return the largest level (e - c)' P (e - c) of the flight, None if no set holds for it."""
@@ -120,15 +118,15 @@ def _shared(components: Components) -> tuple[Any, ...]:
         notch.data,
         notch.estimator and notch.estimator.data,
         nominal,
-        [getattr(tube, field.name) for field in fields(tube) if field.name not in ("gains", "starts")],
+        [value for name, value in tube.values.items() if name not in ("gains", "starts")],
     )
 
 
 def _same(a: Any, b: Any) -> bool:
     if a is b:
         return True
-    if is_dataclass(a) and is_dataclass(b):
-        return all(_same(getattr(a, field.name), getattr(b, field.name)) for field in fields(a))
+    if isinstance(a, Struct) and isinstance(b, Struct):
+        return _same([*a.values.values()], [*b.values.values()])
     if isinstance(a, tuple | list):
         return len(a) == len(b) and all(map(_same, a, b))
     return np.array_equal(a, b)

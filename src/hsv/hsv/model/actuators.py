@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from math import inf
 
 import numpy as np
 
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, validate
-from hsv.core import ffi, lib
+from hsv.base.parameters import Parameter, one_or, validate
+from hsv.core import Struct, doubles, lib
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS
 
@@ -42,42 +42,28 @@ class ActuatorSet:
 
 IDEAL = "ideal"
 
+_FUEL, _ELEVATOR = INPUT_NAMES
+
 ACTUATOR_SETS = {
-    "elevator_50": ActuatorSet(
-        INPUT_NAMES[1],
-        2,
-        50.0,
-        0.7,
-        math.radians(20.0),
-        math.radians(400.0),
-        "Zipfel, GHAME hypersonic vehicle, CADAC GHAME6",
-    ),
-    "elevator_150": ActuatorSet(
-        INPUT_NAMES[1],
-        2,
-        150.0,
-        0.7,
-        math.radians(30.0),
-        math.radians(100.0),
-        "Wiese, generic hypersonic vehicle, MIT thesis 2013",
-    ),
-    "elevator_20": ActuatorSet(
-        INPUT_NAMES[1], 2, 20.0, 0.7, math.radians(30.0), math.inf, "NASA, Generic Urban Air Mobility simulation"
-    ),
-    "elevator_first_order_20": ActuatorSet(
-        INPUT_NAMES[1], 1, 20.0, 1.0, math.inf, math.inf, "scramjet vehicle trade studies, AIAA 2009-7287"
-    ),
-    "fuel_10": ActuatorSet(
-        INPUT_NAMES[0],
-        1,
-        10.0,
-        1.0,
-        math.inf,
-        math.inf,
-        "Wiese, generic hypersonic vehicle, MIT thesis 2013: fuel delivery",
-    ),
+    name: ActuatorSet(channel, order, frequency, damping, math.radians(stop), math.radians(rate), source)
+    for name, channel, order, frequency, damping, stop, rate, source in (
+        ("elevator_50", _ELEVATOR, 2, 50.0, 0.7, 20.0, 400.0, "Zipfel, GHAME hypersonic vehicle, CADAC GHAME6"),
+        ("elevator_150", _ELEVATOR, 2, 150.0, 0.7, 30.0, 100.0, "Wiese, generic hypersonic vehicle, MIT thesis 2013"),
+        ("elevator_20", _ELEVATOR, 2, 20.0, 0.7, 30.0, inf, "NASA, Generic Urban Air Mobility simulation"),
+        (
+            "elevator_first_order_20",
+            _ELEVATOR,
+            1,
+            20.0,
+            1.0,
+            inf,
+            inf,
+            "scramjet vehicle trade studies, AIAA 2009-7287",
+        ),
+        ("fuel_10", _FUEL, 1, 10.0, 1.0, inf, inf, "Wiese, generic hypersonic vehicle, MIT thesis 2013: fuel delivery"),
+    )
 }
-"""Actuator sets that a scenario can name."""
+"""Actuator sets that a scenario can name; in this table with stops in degrees and rates in degrees per second."""
 
 
 def _parameters() -> tuple[Parameter, ...]:
@@ -104,44 +90,8 @@ ACTUATOR_PARAMETERS = _parameters()
 """Parameters of the actuators; an empty array means the value of the set."""
 
 
-class ActuatorData(NamedTuple):
-    """Actuators for the core: arrays with an entry for each channel (2), and the length ``substep`` (s) of a substep.
-
-    ``map`` (2, 4): :func:`actuator_map` over a substep.
-    """
-
-    order: np.ndarray
-    natural_frequency: np.ndarray
-    damping_ratio: np.ndarray
-    map: np.ndarray
-    minimum: np.ndarray
-    maximum: np.ndarray
-    rate_limit: np.ndarray
-    acceleration_limit: np.ndarray
-    substep: float
-    ideal: bool
-
-
-def actuator_map(order: int, frequency: float, damping: float, h: float) -> tuple[float, float, float, float]:
-    """Return the exact transition F11, F12, F21, F22 of position minus command, and rate, for a held command.
-
-    Args:
-        order: 1 (F11 alone) or 2.
-        frequency: Natural frequency (rad/s).
-        damping: Damping ratio up to 1, for order 2.
-        h: Length (s).
-    """
-    found = ffi.new("double[4]")
-    lib.hsv_actuator_map(int(order), frequency, damping, h, found)
-    return tuple(found)
-
-
-def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> ActuatorData:
-    """Return the actuators that :data:`ACTUATOR_PARAMETERS` describe, of ``vehicle``, on substeps of ``period`` (s).
-
-    Raises:
-        ParameterError: A wrong value, named.
-    """
+def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> Struct:
+    """Return the actuators that :data:`ACTUATOR_PARAMETERS` describe, of ``vehicle``, on substeps of ``period`` (s)."""
     v = validate(ACTUATOR_PARAMETERS, values)
     h = period / SUBSTEPS
     order, map = np.zeros(N_INPUTS, np.int64), np.zeros((N_INPUTS, 4))
@@ -150,16 +100,16 @@ def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, peri
     for i, channel in enumerate(INPUT_NAMES):
         where = f"actuator.{channel}"
         name = v[f"{where}.set"]
-        base = ACTUATOR_SETS.get(name, ActuatorSet(channel, 0, math.inf, 1.0, math.inf, math.inf, ""))
+        base = ACTUATOR_SETS.get(name, ActuatorSet(channel, 0, inf, 1.0, inf, inf, ""))
         given = {
-            field: _one(v, f"{where}.{field}", standard)
+            field: one_or(f"{where}.{field}", v[f"{where}.{field}"], standard)
             for field, standard in (
                 ("order", float(base.order)),
                 ("natural_frequency", base.natural_frequency),
                 ("damping_ratio", base.damping_ratio),
                 ("stop", base.stop),
                 ("rate_limit", base.rate_limit),
-                ("acceleration_limit", math.inf),
+                ("acceleration_limit", inf),
             )
         }
         order[i] = int(given["order"])
@@ -171,7 +121,7 @@ def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, peri
                 raise ParameterError(
                     f"parameter {where}.natural_frequency: none given, expected one for an order of {order[i]}"
                 )
-            map[i] = actuator_map(order[i], frequency[i], damping[i], h)
+            lib.hsv_actuator_map(order[i], frequency[i], damping[i], h, doubles(map[i]))
         elif math.isfinite(frequency[i]):
             raise ParameterError(f"parameter {where}.order: 0, expected 1 or 2 with a natural frequency")
         for field in ("damping_ratio", "acceleration_limit"):
@@ -179,14 +129,19 @@ def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, peri
                 raise ParameterError(f"parameter {where}.{field}: expected none for an order of {order[i]}")
     stops = np.array_equal(low, vehicle.input_minimum) and np.array_equal(high, vehicle.input_maximum)
     ideal = not order.any() and stops and not np.isfinite(rate).any()
-    return ActuatorData(order, frequency, damping, map, low, high, rate, acceleration, h, bool(ideal))
-
-
-def _one(values: Mapping[str, Any], name: str, standard: float) -> float:
-    given = values[name]
-    if len(given) > 1:
-        raise ParameterError(f"parameter {name}: {len(given)} values, expected one, or none for the set's")
-    return float(given[0]) if len(given) else standard
+    return Struct(
+        "hsv_actuators",
+        order=order,
+        natural_frequency=frequency,
+        damping_ratio=damping,
+        map=map,
+        minimum=low,
+        maximum=high,
+        rate_limit=rate,
+        acceleration_limit=acceleration,
+        substep=h,
+        ideal=bool(ideal),
+    )
 
 
 def actuators_at_rest(position: np.ndarray) -> np.ndarray:

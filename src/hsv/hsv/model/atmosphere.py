@@ -6,13 +6,12 @@ The air is held over a control period. Turbulence is Dryden's (MIL-F-8785C, MIL-
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
-from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, validate
+from hsv.base.parameters import Parameter, check_lengths, validate
 from hsv.base.units import FOOT
+from hsv.core import Struct
 from hsv.model.signals import first_step
 
 _LENGTH = 1750.0 * FOOT
@@ -49,63 +48,35 @@ _MEMORY = 4
 """Size of the memory of the air without the distance flown into each gust"""
 
 
-class AtmosphereData(NamedTuple):
-    """The atmosphere for the core, SI; gusts are rows (g), which begin in step ``gust_start``."""
-
-    wind: np.ndarray
-    shear: float
-    shear_altitude: float
-    sigma: np.ndarray
-    length: np.ndarray
-    gust_start: np.ndarray
-    gust: np.ndarray
-    gust_length: np.ndarray
-    gust_stays: np.ndarray
-    density_offset: float
-    density_sigma: float
-    density_length: float
-    period: float
-    still: bool
-    """Whether the air is still and of the model's density; it is then not stepped"""
-
-
-def atmosphere_data(values: Mapping[str, object], period: float) -> AtmosphereData:
-    """Return the atmosphere that :data:`ATMOSPHERE_PARAMETERS` describe, stepped every ``period`` (s).
-
-    Raises:
-        ParameterError: A wrong value, or arrays of different lengths.
-    """
+def atmosphere_data(values: Mapping[str, object], period: float) -> Struct:
+    """Return the atmosphere that :data:`ATMOSPHERE_PARAMETERS` describe, stepped every ``period`` (s)."""
     v = validate(ATMOSPHERE_PARAMETERS, values)
     starts = v["gust.starts"]
-    columns = {}
-    for name, standard in (("forward", 0.0), ("up", 0.0), ("lengths", 0.0), ("stays", 0.0)):
-        given = v[f"gust.{name}"] or ([standard] * len(starts) if name != "lengths" else [])
-        if len(given) != len(starts):
-            raise ParameterError(
-                f"parameter gust.{name}: {len(given)} values, expected as many as gust.starts, {len(starts)}"
-            )
-        columns[name] = np.array(given, np.float64)
+    for name in ("gust.forward", "gust.up", "gust.stays"):
+        v[name] = v[name] or [0.0] * len(starts)
+    check_lengths(v, "gust.starts", "gust.forward", "gust.up", "gust.lengths", "gust.stays")
     wind = np.array([v["wind.forward"], v["wind.up"]])
     sigma = np.array([v["turbulence.sigma_forward"], v["turbulence.sigma_up"]])
     changed = (v["wind.shear"], v["density.offset"], v["density.sigma"])
-    return AtmosphereData(
-        wind,
-        v["wind.shear"],
-        v["wind.shear_altitude"],
-        sigma,
-        np.array([v["turbulence.length_forward"], v["turbulence.length_up"]]),
-        np.array([first_step(start, period) for start in starts], np.int64),
-        np.column_stack((columns["forward"], columns["up"])),
-        columns["lengths"],
-        columns["stays"],
-        v["density.offset"],
-        v["density.sigma"],
-        v["density.length"],
-        period,
-        not (wind.any() or sigma.any() or len(starts) or any(changed)),
+    return Struct(
+        "hsv_atmosphere",
+        wind=wind,
+        shear=v["wind.shear"],
+        shear_altitude=v["wind.shear_altitude"],
+        sigma=sigma,
+        length=np.array([v["turbulence.length_forward"], v["turbulence.length_up"]]),
+        gust_start=np.array([first_step(start, period) for start in starts], np.int64),
+        gust=np.column_stack((v["gust.forward"], v["gust.up"])),
+        gust_length=np.array(v["gust.lengths"], float),
+        gust_stays=np.array(v["gust.stays"], float),
+        density_offset=v["density.offset"],
+        density_sigma=v["density.sigma"],
+        density_length=v["density.length"],
+        period=period,
+        still=not (wind.any() or sigma.any() or len(starts) or any(changed)),
     )
 
 
-def atmosphere_state(data: AtmosphereData) -> np.ndarray:
+def atmosphere_state(data: Struct) -> np.ndarray:
     """Return the memory (4 + g) of the air, which the first step fills."""
     return np.zeros(_MEMORY + len(data.gust_start))

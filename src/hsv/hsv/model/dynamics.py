@@ -209,7 +209,7 @@ POSITIVE = frozenset(
 @lru_cache(maxsize=64)
 def vehicle_struct(vehicle: VehicleParameters) -> Struct:
     """Return the parameters as the struct of the core."""
-    return Struct("hsv_vehicle", vehicle)
+    return Struct("hsv_vehicle", **vehicle._asdict())
 
 
 def forces(
@@ -236,16 +236,6 @@ def forces(
     )
     lift, drag, thrust, moment, pressure, _ = found
     return lift, drag, thrust, moment, pressure
-
-
-def air_relative(velocity: float, path_angle: float, forward: float, up: float) -> tuple[float, float, float, float]:
-    """Return speed (m/s) relative to air that moves forward and up (m/s), turn (rad) of its path, its sine and cosine.
-
-    The turn is the angle from the inertial path, at ``path_angle`` (rad), to the air-relative one.
-    """
-    found = ffi.new("double[4]")
-    lib.hsv_air_relative(velocity, path_angle, forward, up, found)
-    return tuple(found)
 
 
 def derivative(x: Any, u: Any, p: VehicleParameters, conditions: np.ndarray | None = None) -> np.ndarray:

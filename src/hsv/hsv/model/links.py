@@ -16,13 +16,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, validate
-from hsv.core import Data, doubles, lib, vector
+from hsv.core import Struct, doubles, lib, vector
 
 MAX_DELAY = 50
 """Steps."""
@@ -73,56 +72,25 @@ _ACCEPTED = 3
 """Size of the memory of a link without its payloads."""
 
 
-@dataclass(frozen=True, eq=False)
-class LinkData(Data):
-    """A link for the core: delays in steps, and probabilities.
-
-    The probability of a loss is ``loss`` in step 0, then ``loss_after_arrival`` or ``loss_after_loss``.
-    """
-
-    KIND = "hsv_link"
-    channel: int
-    delay: int
-    jitter: int
-    loss: float
-    loss_after_arrival: float
-    loss_after_loss: float
-    corruption: float
-    checksum: bool
-    ideal: bool
-
-
 def computation(values: Mapping[str, object], period: float) -> tuple[int, float]:
-    """Return the computing time of the controller: an integer number of periods, and the remaining share of one.
-
-    Raises:
-        ParameterError: A wrong value, named.
-    """
+    """Return the computing time of the controller: an integer number of periods, and the remaining share of one."""
     time = validate((COMPUTATION_PARAMETER,), values)[COMPUTATION_PARAMETER.name]
     periods = round(time / period, 9)  # the rounding of the division allowed for
     whole = math.floor(periods)
     return whole, periods - whole
 
 
-def measurement_link(values: Mapping[str, object]) -> LinkData:
-    """Return the link that :data:`MEASUREMENT_LINK_PARAMETERS` describe.
-
-    Raises:
-        ParameterError: A wrong value, named.
-    """
+def measurement_link(values: Mapping[str, object]) -> Struct:
+    """Return the link that :data:`MEASUREMENT_LINK_PARAMETERS` describe."""
     return _link(MEASUREMENT_LINK, values, 0)
 
 
-def command_link(values: Mapping[str, object], period: float) -> LinkData:
-    """Return the link that :data:`COMMAND_LINK_PARAMETERS` describe, delayed by the periods of the computation.
-
-    Raises:
-        ParameterError: A wrong value, named.
-    """
+def command_link(values: Mapping[str, object], period: float) -> Struct:
+    """Return the link that :data:`COMMAND_LINK_PARAMETERS` describe, delayed by the periods of the computation."""
     return _link(COMMAND_LINK, values, computation(values, period)[0])
 
 
-def _link(name: str, values: Mapping[str, object], computing: int) -> LinkData:
+def _link(name: str, values: Mapping[str, object], computing: int) -> Struct:
     v = validate(_parameters(name), values)
     delay, jitter, loss, burst, corruption, checksum = v.values()
     # A two-state Gilbert channel with the given mean burst length and loss rate (Gilbert 1960).
@@ -130,20 +98,21 @@ def _link(name: str, values: Mapping[str, object], computing: int) -> LinkData:
     if burst and burst < least:
         raise ParameterError(f"parameter link.{name}.burst = {burst}: expected 0, or at least {least:.6g}")
     bursts = burst > 0.0 and loss < 1.0
-    return LinkData(
-        _CHANNELS[name],
-        int(delay) + computing,
-        int(jitter),
-        loss,
-        loss / (burst * (1.0 - loss)) if bursts else loss,
-        1.0 - 1.0 / burst if bursts else loss,
-        corruption,
-        checksum,
-        not (delay or computing or jitter or loss or corruption),
+    return Struct(
+        "hsv_link",
+        channel=_CHANNELS[name],
+        delay=int(delay) + computing,
+        jitter=int(jitter),
+        loss=loss,
+        loss_after_arrival=loss / (burst * (1.0 - loss)) if bursts else loss,
+        loss_after_loss=1.0 - 1.0 / burst if bursts else loss,
+        corruption=corruption,
+        checksum=checksum,
+        ideal=not (delay or computing or jitter or loss or corruption),
     )
 
 
-def link_state(link: LinkData, size: int, before: np.ndarray | None = None) -> np.ndarray:
+def link_state(link: Struct, size: int, before: np.ndarray | None = None) -> np.ndarray:
     """Return the memory of a link.
 
     Args:

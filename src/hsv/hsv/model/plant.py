@@ -4,35 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple, Self
 
 import numpy as np
 
 from hsv.base.parameters import Parameter, validate
-from hsv.core import Data, Struct, doubles, lib, vector
+from hsv.core import Struct, doubles, lib, vector
 from hsv.core.arithmetic import SEED_PARAMETER
-from hsv.model.actuators import ACTUATOR_PARAMETERS, SUBSTEPS, ActuatorData, actuator_data, actuators_at_rest
-from hsv.model.atmosphere import (
-    ATMOSPHERE_PARAMETERS,
-    AtmosphereData,
-    atmosphere_data,
-    atmosphere_state,
-)
-from hsv.model.dynamics import COEFFICIENT_UNITS, VehicleParameters, forces, in_model_range
-from hsv.model.faults.schedule import ActiveFault, FaultRows, ScheduledFault, fault_rows
+from hsv.model.actuators import ACTUATOR_PARAMETERS, SUBSTEPS, actuator_data, actuators_at_rest
+from hsv.model.atmosphere import ATMOSPHERE_PARAMETERS, atmosphere_data, atmosphere_state
+from hsv.model.dynamics import COEFFICIENT_UNITS, VehicleParameters, forces, in_model_range, vehicle_struct
+from hsv.model.faults.schedule import ActiveFault, ScheduledFault, fault_rows
 from hsv.model.faults.table import COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR
 from hsv.model.links import (
     COMPUTATION_PARAMETER,
     MEASUREMENT_LINK_PARAMETERS,
-    LinkData,
     command_link,
     computation,
     link_state,
     measurement_link,
 )
-from hsv.model.sensors import SENSOR_PARAMETERS, SensorData, sensor_data, sensor_state
+from hsv.model.sensors import SENSOR_PARAMETERS, sensor_data, sensor_state
 from hsv.model.signals import N_INPUTS, N_STATES
 from hsv.model.trim import INITIAL_PARAMETERS, Trim, initial_trim
 from hsv.model.vehicle import VEHICLE_PARAMETERS
@@ -69,11 +62,7 @@ EQUIPMENT_PARAMETERS = (
 
 
 def check_equipment(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> None:
-    """Check :data:`EQUIPMENT_PARAMETERS` and the parameters of the command's link.
-
-    Raises:
-        ParameterError: A wrong value, or values that contradict each other, named.
-    """
+    """Check :data:`EQUIPMENT_PARAMETERS` and the parameters of the command's link."""
     actuator_data(values, vehicle, period)
     atmosphere_data(values, period)
     sensor_data(values, period)
@@ -87,59 +76,11 @@ CALM = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
 _CALM = CALM.tolist()
 
 
-@dataclass(frozen=True, eq=False)
-class PlantData(Data):
-    """The plant for the core; ``period`` T (s).
-
-    The actuators receive the command of a period ``late`` substeps after its beginning.
-    """
-
-    KIND = "hsv_plant"
-    vehicle: VehicleParameters
-    period: float
-    substeps: int
-    actuators: ActuatorData
-    atmosphere: AtmosphereData
-    sensors: SensorData
-    link: LinkData
-    late: float
-    seed: int
-
-    @property
-    def ideal(self) -> bool:
-        """Whether the equipment is ideal, the air still and the command in time."""
-        ideal = self.actuators.ideal and self.sensors.ideal and self.link.ideal
-        return ideal and self.atmosphere.still and self.late == 0.0
-
-
-class PlantMemory(NamedTuple):
-    """The memory of the plant besides the state x, updated in place.
-
-    Position and rate of the actuators (2, 2); the command and the effectors of the period before (2 each); the memories
-    of the atmosphere, of the sensors and of the link of the measurement; the conditions (7) of the last period.
-    """
-
-    actuators: np.ndarray
-    command: np.ndarray
-    effector: np.ndarray
-    atmosphere: np.ndarray
-    sensors: np.ndarray
-    link: np.ndarray
-    conditions: np.ndarray
-
-
-class PlantFaults(NamedTuple):
-    """Faults of actuators and effectors, of the engine and of the sensors."""
-
-    effector: FaultRows
-    engine: FaultRows
-    sensor: FaultRows
-
-    @classmethod
-    def of(cls, scheduled: Sequence[ScheduledFault], period: float, before: PlantFaults | None = None) -> PlantFaults:
-        """Return the ``scheduled`` faults by side; the faults in ``before`` keep their memory."""
-        sides = ((DYNAMICS, EFFECTOR), (ENGINE_SIDE,), (SENSOR,))
-        return cls._make(fault_rows(side, scheduled, period, before and before[i]) for i, side in enumerate(sides))
+def plant_faults(scheduled: Sequence[ScheduledFault], period: float, before: Struct | None = None) -> Struct:
+    """Return the ``scheduled`` faults of the plant by side; the faults in ``before`` keep their memory."""
+    sides = {"effector": (DYNAMICS, EFFECTOR), "engine": (ENGINE_SIDE,), "sensor": (SENSOR,)}
+    rows = {name: fault_rows(side, scheduled, period, before and getattr(before, name)) for name, side in sides.items()}
+    return Struct("hsv_plant_faults", **rows)
 
 
 class PlantResult(NamedTuple):
@@ -190,26 +131,24 @@ class Plant:
         self.period = period
         self.steps = steps
         values = dict(equipment or {})
-        self.data = PlantData(
-            vehicle,
-            period,
-            substeps,
-            actuator_data(values, vehicle, period),
-            atmosphere_data(values, period),
-            sensor_data(values, period),
-            measurement_link(values),
-            SUBSTEPS * computation(values, period)[1],
-            validate((SEED_PARAMETER,), values)[SEED_PARAMETER.name],
+        self.data = Struct(
+            "hsv_plant",
+            vehicle=vehicle_struct(vehicle),
+            period=period,
+            substeps=substeps,
+            actuators=actuator_data(values, vehicle, period),
+            atmosphere=atmosphere_data(values, period),
+            sensors=sensor_data(values, period),
+            link=measurement_link(values),
+            # The actuators receive the command of a period so many substeps after its beginning.
+            late=SUBSTEPS * computation(values, period)[1],
+            seed=validate((SEED_PARAMETER,), values)[SEED_PARAMETER.name],
         )
         self.reset()
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
-        """Build from :data:`PLANT_PARAMETERS` and those of the vehicle.
-
-        Raises:
-            ParameterError, TrimError: A wrong value, named.
-        """
+        """Build from :data:`PLANT_PARAMETERS` and those of the vehicle."""
         v = validate(PLANT_PARAMETERS, values)
         nominal, initial = initial_trim(values)
         vehicle = nominal.perturbed({n: v[f"vehicle.perturbation.{n}"] for n in COEFFICIENT_UNITS})
@@ -224,13 +163,15 @@ class Plant:
         """Return a plant with another ``vehicle`` of the same limits and another ``seed``; other data are shared."""
         other = copy(self)
         other.vehicle = vehicle
-        other.data = self.data.replaced(vehicle=vehicle, seed=seed)
-        other._begun = False
+        other.data = self.data.replaced(vehicle=vehicle_struct(vehicle), seed=seed)
+        other._begin()
         return other
 
     def is_ideal(self, scheduled: Sequence[ScheduledFault]) -> bool:
         """Return whether equipment and air are ideal and stay so under the ``scheduled`` faults."""
-        return self.data.ideal and all(row.fault.kind.side == COMMAND for row in scheduled)
+        data = self.data
+        ideal = data.actuators.ideal and data.sensors.ideal and data.link.ideal and data.atmosphere.still
+        return ideal and data.late == 0.0 and all(row.fault.kind.side == COMMAND for row in scheduled)
 
     def reset(self) -> PlantResult:
         """Return to the initial trim; return that state."""
@@ -241,26 +182,25 @@ class Plant:
         self._state = self.initial.state.copy()
         self._step = 0
         self._memory = self.memory()
-        self._remembered = Struct("hsv_plant_memory", self._memory)
         self._active: tuple[ActiveFault, ...] = ()
-        self._know(PlantFaults.of((), self.period))
-        self._begun = True
+        self._faults = plant_faults((), self.period)
 
-    def memory(self) -> PlantMemory:
+    def memory(self) -> Struct:
         """Return the memory with which a flight begins: actuators at rest in trim, still air."""
         held = self.initial.input
-        air = atmosphere_state(self.data.atmosphere)
-        sensors, link = sensor_state(), link_state(self.data.link, N_STATES)
-        return PlantMemory(actuators_at_rest(held), held.copy(), held.copy(), air, sensors, link, CALM.copy())
-
-    def _know(self, faults: PlantFaults) -> None:
-        self._faults = faults
-        self._known = Struct("hsv_plant_faults", faults)
+        return Struct(
+            "hsv_plant_memory",
+            actuators=actuators_at_rest(held),
+            command=held.copy(),
+            effector=held.copy(),
+            atmosphere=atmosphere_state(self.data.atmosphere),
+            sensors=sensor_state(),
+            link=link_state(self.data.link, N_STATES),
+            conditions=CALM.copy(),
+        )
 
     def place(self, step: int, state: np.ndarray) -> None:
         """Continue from ``state`` (9) at ``step``, as a replay does with recorded states."""
-        if not self._begun:
-            self._begin()
         self._state[:] = state
         self._step = step
 
@@ -269,15 +209,12 @@ class Plant:
 
         ``active``: the active faults; those of the command have been applied already.
         """
-        if not self._begun:
-            self._begin()
         if active != self._active:
             known = [ScheduledFault(fault, since) for fault, since in active]
-            self._know(PlantFaults.of(known, self.period, self._faults))
+            self._faults = plant_faults(known, self.period, self._faults)
             self._active = active
-        memory, faults = self._remembered.pointer, self._known.pointer
-        given = doubles(vector(actuator), N_INPUTS), doubles(self._state)
-        lib.hsv_advance_plant(self.data.pointer, memory, faults, self._step, *given)
+        blocks = self.data.pointer, self._memory.pointer, self._faults.pointer
+        lib.hsv_advance_plant(*blocks, self._step, doubles(vector(actuator), N_INPUTS), doubles(self._state))
         self._step += 1
         return self._result()
 
@@ -292,12 +229,6 @@ class Plant:
         calm = conditions.tolist() == _CALM
         felt = forces(self._state, effector, self.vehicle, None if calm else conditions)
         measurement = np.empty(N_STATES)
-        lib.hsv_sense(
-            self.data.pointer,
-            self._remembered.pointer,
-            self._known.pointer,
-            self._step,
-            doubles(self._state),
-            doubles(measurement),
-        )
+        blocks = self.data.pointer, self._memory.pointer, self._faults.pointer
+        lib.hsv_sense(*blocks, self._step, doubles(self._state), doubles(measurement))
         return PlantResult(self._step, self._state.copy(), measurement, felt, effector, conditions[:3], status)

@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, validate
+from hsv.base.parameters import Parameter, one_or, validate
 from hsv.base.units import FOOT, readable
-from hsv.core import dtype
+from hsv.core import Struct, dtype
 from hsv.core.arithmetic import exponential
 from hsv.model.signals import N_STATES, STATE_NAMES, STATE_UNITS
 
@@ -123,45 +123,16 @@ SENSOR_PARAMETERS = (
 """Parameters of the sensors; an empty array means the value of the set."""
 
 
-class SensorData(NamedTuple):
-    """Sensors for the core: arrays with an entry for each state (9); ``on`` marks sensors that are not ideal.
-
-    Lag and drift as shares that remain over a period, the random walk per root of a period.
-    """
-
-    on: np.ndarray
-    noise: np.ndarray
-    bias: np.ndarray
-    bias_sigma: np.ndarray
-    drift_sigma: np.ndarray
-    drift_decay: np.ndarray
-    walk: np.ndarray
-    scale: np.ndarray
-    scale_sigma: np.ndarray
-    lag_decay: np.ndarray
-    latency: np.ndarray
-    drop_out: np.ndarray
-    quantum: np.ndarray
-    minimum: np.ndarray
-    maximum: np.ndarray
-    inertial_angle_of_attack: bool
-    ideal: bool
-
-
-def sensor_data(values: Mapping[str, object], period: float) -> SensorData:
-    """Return the sensors that :data:`SENSOR_PARAMETERS` describe, read every ``period`` (s).
-
-    Raises:
-        ParameterError: A wrong value, named.
-    """
+def sensor_data(values: Mapping[str, object], period: float) -> Struct:
+    """Return the sensors that :data:`SENSOR_PARAMETERS` describe, read every ``period`` (s)."""
     v = validate(SENSOR_PARAMETERS, values)
     chosen = SENSOR_SETS[v["sensors.set"]]
-    table = {field.name: np.full(N_STATES, field.standard) for field in FIELDS}
+    table: dict[str, np.ndarray] = {field.name: np.full(N_STATES, field.standard) for field in FIELDS}
     for i, channel in enumerate(STATE_NAMES):
         for field in FIELDS:
             name = f"sensors.{channel}.{field.name}"
             standard = chosen.channels.get(channel, {}).get(field.name, field.standard)
-            table[field.name][i] = _one(name, v[name], standard)
+            table[field.name][i] = one_or(name, v[name], standard)
     for channel, unit, low, high in zip(STATE_NAMES, STATE_UNITS, table["minimum"], table["maximum"], strict=True):
         if not low < high:
             raise ParameterError(
@@ -172,7 +143,7 @@ def sensor_data(values: Mapping[str, object], period: float) -> SensorData:
             known = v[f"sensors.{channel}.{other}"] or other in chosen.channels.get(channel, {})
             if v[f"sensors.{channel}.{given}"] and not known:
                 raise ParameterError(f"parameter sensors.{channel}.{given}: expected with a {other} only")
-    inertial = _one(
+    inertial = one_or(
         "sensors.inertial_angle_of_attack",
         v["sensors.inertial_angle_of_attack"],
         float(chosen.inertial_angle_of_attack),
@@ -183,31 +154,19 @@ def sensor_data(values: Mapping[str, object], period: float) -> SensorData:
             on |= table[field.name] != field.standard
     if inertial:
         on[ALPHA] |= on[PITCH]
-    return SensorData(
-        on,
-        table["noise"],
-        table["bias"],
-        table["bias_sigma"],
-        table["drift_sigma"],
-        np.array([exponential(-period / time) if period < 700.0 * time else 0.0 for time in table["drift_time"]]),
-        table["random_walk"] * np.sqrt(period),
-        table["scale"],
-        table["scale_sigma"],
-        np.array([exponential(-frequency * period) if frequency > 0.0 else 0.0 for frequency in table["lag"]]),
-        table["latency"].astype(np.int64),
-        table["drop_out"],
-        table["quantum"],
-        table["minimum"],
-        table["maximum"],
-        bool(inertial),
-        not on.any(),
+    # Lag and drift as shares that remain over a period, the random walk per root of a period.
+    drift_time, walk, lag = (table.pop(name) for name in ("drift_time", "random_walk", "lag"))
+    table["latency"] = table["latency"].astype(np.int64)
+    return Struct(
+        "hsv_sensors",
+        **table,
+        on=on,
+        drift_decay=np.array([exponential(-period / time) if period < 700.0 * time else 0.0 for time in drift_time]),
+        walk=walk * np.sqrt(period),
+        lag_decay=np.array([exponential(-frequency * period) if frequency > 0.0 else 0.0 for frequency in lag]),
+        inertial_angle_of_attack=bool(inertial),
+        ideal=not on.any(),
     )
-
-
-def _one(name: str, given: list[float], standard: float) -> float:
-    if len(given) > 1:
-        raise ParameterError(f"parameter {name}: {len(given)} values, expected one, or none for the set's")
-    return float(given[0]) if given else standard
 
 
 def sensor_state() -> np.ndarray:

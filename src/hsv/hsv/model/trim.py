@@ -43,32 +43,6 @@ class Trim:
         return dict(zip((*STATE_NAMES[:n], *INPUT_NAMES), zip(values, units, strict=True), strict=True))
 
 
-def balance(
-    rigid: VehicleParameters,
-    path_angle: float,
-    acceleration: float,
-    unknown: np.ndarray,
-    x: np.ndarray,
-    u: np.ndarray,
-    pitch_rate: float = 0.0,
-) -> float:
-    """Complete the equilibrium of ``x`` (9) and ``u`` (2) in place; return the greatest remaining imbalance.
-
-    See ``hsv_balance`` in ``core/trim.h``.
-
-    Args:
-        rigid: Parameters of the decoupled vehicle.
-        path_angle: Flight-path angle (rad), pitch angle less angle of attack.
-        acceleration: dV/dt (m/s^2).
-        unknown: First guess (3), replaced by the best that was found.
-        x: Altitude and velocity given; the others are written.
-        u: Written.
-        pitch_rate: That of a steady pull-up (rad/s), the rate of the flight-path angle.
-    """
-    struct = vehicle_struct(rigid).pointer
-    return float(lib.hsv_balance(struct, path_angle, acceleration, pitch_rate, *map(doubles, (unknown, x, u))))
-
-
 def trim(
     vehicle: VehicleParameters,
     altitude: float,
@@ -97,7 +71,9 @@ def trim(
         raise TrimError(f"{where}: expected a climb rate below the velocity and a finite acceleration")
     x, u = np.zeros(N_STATES), np.zeros(N_INPUTS)
     x[0], x[1] = altitude, velocity
-    size = balance(vehicle.decoupled(), arcsine(climb_rate / velocity), acceleration, INITIAL_GUESS.copy(), x, u)
+    # Newton's method completes state and input; size is the greatest remaining imbalance, see hsv_balance in trim.h.
+    rigid, path_angle = vehicle_struct(vehicle.decoupled()).pointer, arcsine(climb_rate / velocity)
+    size = lib.hsv_balance(rigid, path_angle, acceleration, 0.0, *map(doubles, (INITIAL_GUESS.copy(), x, u)))
     check_equilibrium(where, size, u, vehicle)
     rates = derivative(x, u, vehicle)
     rates[:2] -= climb_rate, acceleration
@@ -128,7 +104,7 @@ def trim_at(
 
 
 def check_equilibrium(where: str, size: float, u: np.ndarray, vehicle: VehicleParameters) -> None:
-    """Check the result of :func:`balance`, and that the input ``u`` (2) is within the limits of ``vehicle``.
+    """Check the imbalance ``size`` of an equilibrium, and that the input ``u`` (2) is within the limits of ``vehicle``.
 
     Raises:
         TrimError: Names ``where`` and the reason.
@@ -150,11 +126,7 @@ INITIAL_PARAMETERS = (
 
 
 def initial_trim(values: Mapping[str, object]) -> tuple[VehicleParameters, Trim]:
-    """Return the nominal vehicle of a flight and its trim, from :data:`INITIAL_PARAMETERS` and the vehicle's.
-
-    Raises:
-        ParameterError, TrimError: A wrong value, named.
-    """
+    """Return the nominal vehicle of a flight and its trim, from :data:`INITIAL_PARAMETERS` and the vehicle's."""
     v = validate(INITIAL_PARAMETERS, values)
     vehicle = Vehicle.from_parameters(values)
     vehicle.check_envelope(INITIAL_PARAMETERS, v)

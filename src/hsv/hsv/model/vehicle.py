@@ -27,7 +27,7 @@ import tomli_w
 
 from hsv.base.errors import DocumentError, HsvError, ParameterError, QuantityError, VehicleError, one_of
 from hsv.base.files import EXTENDS, Tables, follow_extends, is_path, parse_toml, read_text
-from hsv.base.parameters import Parameter, validate
+from hsv.base.parameters import Parameter, table_values, validate
 from hsv.base.units import UnitSystem, parse_quantity, readable
 from hsv.model.dynamics import AT_REST, COEFFICIENT_UNITS, POSITIVE, STRUCTURES, VehicleParameters
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, PUBLISHED_ALTITUDE, PUBLISHED_VELOCITY
@@ -57,9 +57,8 @@ MAX_UNCERTAINTY = 0.9
 """Largest relative bound."""
 
 _DAMPING = ("damping_ratio_1", "damping_ratio_2")
-_COUPLING_UNITS = dict.fromkeys(("inertial_coupling_1", "inertial_coupling_2"), "kg^0.5 m")
+_PSI = dict.fromkeys(("inertial_coupling_1", "inertial_coupling_2"), "kg^0.5 m")
 _AXES = {"altitude": "m", "velocity": "m/s"}
-_INPUTS = dict(zip(INPUT_NAMES, INPUT_UNITS, strict=True))
 
 COUPLING_PARAMETER = Parameter(
     "vehicle.coupling", "paper_like", "set of inertial coupling, or a multiple of the derived"
@@ -84,7 +83,7 @@ VEHICLE_PARAMETERS = (
     Parameter("vehicle.input_minimum", [], "least fuel equivalence ratio (-) and elevator deflection (rad)"),
     Parameter("vehicle.input_maximum", [], "largest fuel equivalence ratio (-) and elevator deflection (rad)"),
     Parameter("vehicle.uncertainty.names", [""], "names of the uncertain coefficients"),
-    Parameter("vehicle.uncertainty.bounds", [], "relative bound of each"),
+    Parameter("vehicle.uncertainty.bounds", [], "relative bound of each", "", 0.0, MAX_UNCERTAINTY),
 )
 """Parameters of a vehicle for the nodes; missing ones are taken from the vehicle of that name."""
 
@@ -135,11 +134,9 @@ class Vehicle:
                     f"inertial_coupling.{name} = {psi_1:.6g}, {psi_2:.6g} kg^0.5 m: expected squares whose "
                     f"sum is at most {p.moment_of_inertia:.6g} kg m^2, the moment of inertia"
                 )
-        for name, bound in self.uncertainty.items():
+        for name in self.uncertainty:
             if name not in p.form.names:
                 raise QuantityError(f"uncertainty.names: {name!r}, expected names of coefficients")
-            if not 0.0 <= bound <= MAX_UNCERTAINTY:
-                raise QuantityError(f"{name}: uncertainty = {bound}: expected 0 to {MAX_UNCERTAINTY:g}")
         if len(self.uncertainty) > MAX_UNCERTAIN:
             raise QuantityError(
                 f"uncertainty: of {len(self.uncertainty)} coefficients, expected at most {MAX_UNCERTAIN}: a design "
@@ -187,11 +184,7 @@ class Vehicle:
         return repr(scale)
 
     def coupled(self, coupling: str | float = "") -> VehicleParameters:
-        """Return the coupled model (paper eq. 1) with a set of inertial coupling, or a multiple of the derived.
-
-        Raises:
-            QuantityError: See :meth:`coupling_name`.
-        """
+        """Return the coupled model (paper eq. 1) with a set of inertial coupling, or a multiple of the derived."""
         name = self.coupling_name(coupling)
         if name in self.couplings:
             psi_1, psi_2 = self.couplings[name]
@@ -346,11 +339,7 @@ def vehicle_tables(name: str) -> Tables:
 
 
 def vehicle_text(name: str) -> str:
-    """Return the text of a vehicle file, by name or path, with the files that it extends merged in.
-
-    Raises:
-        VehicleError: See :func:`load_vehicle`.
-    """
+    """Return the text of a vehicle file, by name or path, with the files that it extends merged in."""
     load_vehicle(name)
     return tomli_w.dumps(vehicle_tables(name)) if EXTENDS in _read(name) else read_text(_path(name))
 
@@ -395,37 +384,48 @@ def _parsed(tables: Mapping[str, Any], name: str) -> Vehicle:
     if structure not in STRUCTURES:
         raise QuantityError(f"structure = {structure!r}: expected {one_of(STRUCTURES, str(structure))}")
     form = STRUCTURES[structure]
-    elastic = ("inertial_coupling",) if form.elastic else ()
-    _refuse_unknown(tables, ("title", "structure", *form.tables, *elastic, "envelope", "input_limits"))
-    title = tables.get("title", "")
-    if not isinstance(title, str) or (not title.strip() and "title" in tables):
+    sets = tables.get("inertial_coupling", {}) if form.elastic else {}
+    names = [*sets] if isinstance(sets, Mapping) else []
+    for coupling in names:
+        if not (coupling.isidentifier() and coupling.islower()):
+            raise QuantityError(f"inertial_coupling.{coupling}: expected a name of lower-case letters, digits and _")
+    coefficients = {f"{table}.{key}": unit for table, units in form.tables.items() for key, unit in units.items()}
+    rows = coefficients | {f"inertial_coupling.{one}.{psi}": unit for one in names for psi, unit in _PSI.items()}
+    ends = {f"envelope.{axis}": unit for axis, unit in _AXES.items()}
+    ends |= {f"input_limits.{field}": unit for field, unit in zip(INPUT_NAMES, INPUT_UNITS, strict=True)}
+    quantities = {f"{row}.value": unit for row, unit in rows.items()} | {"envelope.angle.maximum": "rad"}
+    quantities |= {f"{row}.{end}": unit for row, unit in ends.items() for end in ("minimum", "maximum")}
+    parameters = [
+        Parameter("title", "", "title of the vehicle"),
+        Parameter("structure", "", "form of the equations of motion"),
+        *(Parameter(field, 0.0, "", "" if unit == "1" else unit) for field, unit in quantities.items()),
+        *(Parameter(f"{row}.symbol", "", "") for row in rows),
+        *(Parameter(f"{row}.uncertainty", 0.0, "", "", 0.0, MAX_UNCERTAINTY) for row in coefficients),
+    ]
+    v = table_values(parameters, tables)
+    title = v.get("title", "")
+    if not title.strip() and "title" in tables:
         raise QuantityError(f"title = {title!r}: expected a text that is not empty")
-    coefficients: dict[str, float] = {}
-    uncertainty: dict[str, float] = {}
-    for section, units in form.tables.items():
-        table = _table(tables, section, units)
-        for coefficient, unit in units.items():
-            field = f"{section}.{coefficient}"
-            row = _table(table, field, ("value", "symbol", "uncertainty"), unit)
-            coefficients[coefficient] = _quantity(row, field, "value", unit)
-            bound = _quantity(row, field, "uncertainty", "1") if "uncertainty" in row else 0.0
-            if bound:  # a vehicle that extends another one may set a bound to zero
-                uncertainty[coefficient] = bound
-    envelope = _table(tables, "envelope", (*_AXES, "angle"))
-    ranges = {axis: _range(envelope, f"envelope.{axis}", unit) for axis, unit in _AXES.items()}
-    angle = _table(envelope, "envelope.angle", ("maximum",), "rad")
-    angle_limit = _quantity(angle, "envelope.angle", "maximum", "rad")
-    inputs = _table(tables, "input_limits", _INPUTS)
-    limits = [_range(inputs, f"input_limits.{field}", unit) for field, unit in _INPUTS.items()]
+    for field, unit in quantities.items():
+        if field not in v:
+            raise QuantityError(
+                f"{field}: missing, expected a quantity such as {'1.0' if unit == '1' else f'1.0 {unit}'!r}"
+            )
+    (altitude, velocity, *limits) = [(v[f"{row}.minimum"], v[f"{row}.maximum"]) for row in ends]
     low, high = zip(*limits, strict=True)
+    psi = {one: [v[f"inertial_coupling.{one}.{key}.value"] for key in _PSI] for one in names}
+    known = {row.rpartition(".")[2]: (v[f"{row}.value"], v.get(f"{row}.uncertainty", 0.0)) for row in coefficients}
     return Vehicle(
         name=name,
         title=title,
-        decoupled=_parameters(structure, coefficients, low, high, angle_limit),
-        couplings=_couplings(tables) if form.elastic else {DERIVED: (0.0, 0.0)},
-        altitude_range=ranges["altitude"],
-        velocity_range=ranges["velocity"],
-        uncertainty=uncertainty,
+        decoupled=_parameters(
+            structure, {key: value for key, (value, _) in known.items()}, low, high, v["envelope.angle.maximum"]
+        ),
+        couplings={one: (pair[0], pair[1]) for one, pair in psi.items()} if form.elastic else {DERIVED: (0.0, 0.0)},
+        altitude_range=altitude,
+        velocity_range=velocity,
+        # A vehicle that extends another one may set a bound to zero.
+        uncertainty={key: bound for key, (_, bound) in known.items() if bound},
     )
 
 
@@ -437,54 +437,3 @@ def _parameters(
     places = {} if STRUCTURES[structure].elastic else AT_REST
     code = float([*STRUCTURES].index(structure))
     return VehicleParameters(**coefficients, **places, **limits, structure=code, angle_limit=angle_limit)
-
-
-def _couplings(tables: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-    table = _table(tables, "inertial_coupling")
-    found = {}
-    for name in table:
-        if not (name.isidentifier() and name.islower()):
-            raise QuantityError(f"inertial_coupling.{name}: expected a name of lower-case letters, digits and _")
-        rows = _table(table, f"inertial_coupling.{name}", _COUPLING_UNITS)
-        psi = []
-        for key, unit in _COUPLING_UNITS.items():
-            field = f"inertial_coupling.{name}.{key}"
-            psi.append(_quantity(_table(rows, field, ("value", "symbol"), unit), field, "value", unit))
-        found[name] = (psi[0], psi[1])
-    return found
-
-
-def _range(table: Mapping[str, Any], field: str, unit: str) -> tuple[float, float]:
-    row = _table(table, field, ("minimum", "maximum"), unit)
-    return _quantity(row, field, "minimum", unit), _quantity(row, field, "maximum", unit)
-
-
-def _table(
-    parent: Mapping[str, Any], field: str, keys: Iterable[str] | None = None, unit: str = ""
-) -> Mapping[str, Any]:
-    """Return the table ``field`` of its ``parent`` with no key but these; ``unit``: of the value that it holds."""
-    first = next(iter(keys or ()), "")
-    quantity = "1.0" if unit == "1" else f"1.0 {unit}"
-    expected = f'expected a table such as {{ {first} = "{quantity}" }}' if unit else "expected a table"
-    key = field.rpartition(".")[2]
-    if key not in parent:
-        raise QuantityError(f"{field}: missing, {expected}")
-    table = parent[key]
-    if not isinstance(table, Mapping):
-        raise QuantityError(f"{field} = {table!r}: {expected}")
-    if keys is not None:
-        _refuse_unknown(table, keys, field)
-    return table
-
-
-def _refuse_unknown(table: Mapping[str, Any], keys: Iterable[str], field: str = "") -> None:
-    for key in table:
-        if key not in keys:
-            raise QuantityError(f"{f'{field}.' if field else ''}{key}: unknown field, expected {one_of(keys, key)}")
-
-
-def _quantity(row: Mapping[str, Any], field: str, key: str, unit: str) -> float:
-    if key not in row:
-        quantity = "1.0" if unit == "1" else f"1.0 {unit}"
-        raise QuantityError(f"{field}.{key}: missing, expected a quantity such as {quantity!r}")
-    return parse_quantity(row[key], unit, f"{field}.{key}")

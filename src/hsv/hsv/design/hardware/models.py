@@ -17,6 +17,7 @@ import numpy as np
 from hsv.base.errors import DesignError, QuantityError, one_of
 from hsv.base.units import parse_quantity
 from hsv.control.estimator import ESTIMATOR_ENABLED
+from hsv.core import Struct
 from hsv.core.arithmetic import LARGEST
 from hsv.design.certified import CertifiedDesign, Plan
 from hsv.design.disturbance import CHANNELS, DisturbanceSet
@@ -28,7 +29,7 @@ from hsv.model.atmosphere import atmosphere_data
 from hsv.model.dynamics import derivative
 from hsv.model.links import command_link, computation, measurement_link
 from hsv.model.lpv.linearisation import linearise, zero_order_hold
-from hsv.model.sensors import ALPHA, PITCH, SENSOR_SETS, SensorData, sensor_data
+from hsv.model.sensors import ALPHA, PITCH, SENSOR_SETS, sensor_data
 from hsv.model.signals import INPUT_NAMES, N_RIGID, N_STATES, PITCH_RATE, STATE_NAMES, STATE_UNITS
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
@@ -168,7 +169,7 @@ def with_models(problem: TubeProblem, models: Sequence[Model]) -> TubeProblem:
     return TubeProblem(delayed(system, late) if late.any() else system, DisturbanceSet(lower, upper))
 
 
-def sensors(data: SensorData, plan: Plan, reach: float = REACH, of: str = "sensor") -> dict[str, Model]:
+def sensors(data: Struct, plan: Plan, reach: float = REACH, of: str = "sensor") -> dict[str, Model]:
     """Return the sensor models of the rigid states by name; ideal ones are omitted.
 
     Noise, Gauss-Markov biases, and random biases and scale factors are bounded by ``reach`` standard deviations, and
@@ -280,7 +281,7 @@ def _airs(subject: CertifiedDesign, bounds: Mapping[str, np.ndarray]) -> dict[st
     return {name: air(subject.vehicle, subject.design.period, *of) for name, of in bounds.items() if of.any()}
 
 
-def _without_bound(data: SensorData, values: Mapping[str, Any], period: float) -> list[str]:
+def _without_bound(data: Struct, values: Mapping[str, Any], period: float) -> list[str]:
     """Return the effects of sensors of the rigid states, estimator, actuators and links for which no bound is known."""
     limits = np.isfinite(np.r_[data.minimum[:N_RIGID], data.maximum[:N_RIGID]])
     changed = {p.name: bool(values.get(p.name)) for p in ACTUATOR_PARAMETERS if isinstance(p.default, list)}

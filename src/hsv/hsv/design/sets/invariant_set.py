@@ -136,7 +136,7 @@ class InvariantSet:
             raise DesignError(f"invariant set of kind {report['kind']!r}: expected an ellipsoid")
         centre, Q, multipliers = (np.array(report[name]) for name in ("centre", "Q", "multipliers"))
         star = StarNorms.from_report(report["star_norms"], problem) if "star_norms" in report else None
-        solver = SolverReport(**report["solver"], time=0.0)
+        solver = SolverReport(**report["solver"])
         return cls(problem, centre, Q, report["contraction"], multipliers, solver, star)
 
 

@@ -47,10 +47,6 @@ class Cantilever:
         scale = (b / self.length) ** derivative / np.sqrt(self.mass_per_length * self.length)
         return np.asarray(scale * (even - ratio * odd))
 
-    def bending_stiffness(self, natural_frequency: float) -> float:
-        """Return the bending stiffness EI (N m^2) that gives the first mode this frequency (rad/s)."""
-        return self.mass_per_length * (natural_frequency * (self.length / EIGENVALUE) ** 2) ** 2
-
 
 FORE_SEGMENTS = 5
 """Rigid segments of the fore body ahead of the inlet; one more reaches from the inlet to the centre of gravity."""
@@ -115,11 +111,6 @@ class Airframe:
     def tail(self) -> Point:
         """Position (x, z) of the tail (m)."""
         return -self.aft_body, float(self.upper(-self.aft_body))
-
-    @property
-    def nozzle_ramp_angle(self) -> float:
-        """Angle (rad) between nozzle ramp and upper surface, at which they meet at the tail."""
-        return math.atan2(self.tail[1] - self.engine_roof, self.nozzle_ramp) - self.upper_surface_angle
 
     def upper(self, x: float | np.ndarray) -> Any:
         """Return the height of the upper surface at a station ``x`` (m, any shape)."""

@@ -8,7 +8,6 @@ segment has its origin at the segment's inner end, towards the centre of gravity
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -54,17 +53,6 @@ class Transform:
         """Rotation as a quaternion (x, y, z, w)."""
         return 0.0, -math.sin(0.5 * self.pitch), 0.0, math.cos(0.5 * self.pitch)
 
-    def after(self, outer: Transform) -> Transform:
-        """Return this frame in the parent of ``outer``; ``outer`` is the transform of this frame's parent."""
-        cos, sin = math.cos(outer.pitch), math.sin(outer.pitch)
-        return Transform(
-            outer.parent,
-            self.child,
-            outer.x + self.x * cos - self.z * sin,
-            outer.z + self.x * sin + self.z * cos,
-            outer.pitch + self.pitch,
-        )
-
 
 def transforms(sample: Sample, exaggeration: float | None = None) -> list[Transform]:
     """Return the transforms of all frames, parents first.
@@ -92,15 +80,6 @@ def transforms(sample: Sample, exaggeration: float | None = None) -> list[Transf
     found += [
         Transform(ENGINE, name, -share * number * frame.engine, 0.0) for number, name in enumerate(FLAMES, start=1)
     ]
-    return found
-
-
-def composed(chain: Sequence[Transform], root: str = LEVEL) -> Mapping[str, Transform]:
-    """Return the transforms of all frames below ``root`` relative to ``root``; ``chain`` lists parents first."""
-    found = {root: Transform(root, root)}
-    for transform in chain:
-        if transform.parent in found:
-            found[transform.child] = transform.after(found[transform.parent])
     return found
 
 

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from hsv.base.errors import ParameterError, one_of
-from hsv.base.parameters import Parameter, validate
+from hsv.base.parameters import Parameter, check_lengths, validate
 from hsv.core import Struct, doubles, lib
 from hsv.core.arithmetic import SEED_PARAMETER
-from hsv.model.faults.schedule import ActiveFault, FaultRows, ScheduledFault, fault_rows
+from hsv.model.faults.schedule import ActiveFault, ScheduledFault, fault_rows
 from hsv.model.faults.table import CHANNELS, COMMAND, FAULT_KINDS, SENSOR, Fault
-from hsv.model.links import COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER, LinkData, command_link, link_state
+from hsv.model.links import COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER, command_link, link_state
 from hsv.model.signals import N_INPUTS, NEVER, first_step
 from hsv.model.trim import INITIAL_PARAMETERS, initial_trim
 from hsv.model.vehicle import VEHICLE_PARAMETERS
@@ -59,7 +59,7 @@ class FaultInjector:
         scheduled: Sequence[ScheduledFault] = (),
         period: float = 0.02,
         seed: int = 0,
-        link: LinkData | None = None,
+        link: Struct | None = None,
         before: np.ndarray | None = None,
     ) -> None:
         """Take the faults of a schedule.
@@ -84,31 +84,21 @@ class FaultInjector:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
-        """Build from :data:`FAULT_PARAMETERS` and :data:`LINK_PARAMETERS`; a link also needs the initial trim.
-
-        Raises:
-            ParameterError, TrimError: A wrong value, named, or arrays of different lengths.
-        """
+        """Build from :data:`FAULT_PARAMETERS` and :data:`LINK_PARAMETERS`; a link also needs the initial trim."""
         v = validate(FAULT_PARAMETERS, values)
         period, seed = v["period"], v[SEED_PARAMETER.name]
         link = command_link(values, period)
         flown = (period, seed, link, None if link.ideal else initial_trim(values)[1].input)
-        names = ("channels", "types", "parameters", "starts", "stops")
-        columns = [v[f"fault.{name}"] for name in names]
-        if columns[0] == ["none"]:
+        if v["fault.channels"] == ["none"]:
             return cls((), *flown)
-        columns[-1] = list(columns[-1]) or [NEVER_TIME] * len(columns[0])
-        for name, column in zip(names, columns, strict=True):
-            if len(column) != len(columns[0]):
-                raise ParameterError(
-                    f"parameter fault.{name}: {len(column)} values, "
-                    f"expected as many as fault.channels, {len(columns[0])}"
-                )
+        v["fault.stops"] = v["fault.stops"] or [NEVER_TIME] * len(v["fault.channels"])
+        names = [f"fault.{name}" for name in ("channels", "types", "parameters", "starts", "stops")]
+        check_lengths(v, *names)
         scheduled = [
             ScheduledFault(
                 Fault.of(channel, kind, read_parameters(text)), first_step(start, period), first_step(stop, period)
             )
-            for channel, kind, text, start, stop in zip(*columns, strict=True)
+            for channel, kind, text, start, stop in zip(*(v[name] for name in names), strict=True)
         ]
         return cls(scheduled, *flown)
 
@@ -123,14 +113,14 @@ class FaultInjector:
         """Return to the schedule: everything injected or cleared in flight is discarded."""
         self.known = list(self.scheduled)
         self._next = 0
-        self._know(self.rows((COMMAND,)))
+        self._rows = self.rows((COMMAND,))
         self._link_state = self.link_state()
 
     def link_state(self) -> np.ndarray:
         """Return the state of the link with which a flight begins."""
         return link_state(self.link, N_INPUTS, self._before)
 
-    def rows(self, sides: Sequence[str], earlier: FaultRows | None = None) -> FaultRows:
+    def rows(self, sides: Sequence[str], earlier: Struct | None = None) -> Struct:
         """Return the known faults of some sides; those in ``earlier`` keep their memory."""
         return fault_rows(sides, self.known, self.period, earlier)
 
@@ -159,7 +149,7 @@ class FaultInjector:
         self.clear(fault.channel, fault.type)
         start = self._first(fault)
         self.known.append(ScheduledFault(fault, start, min(start + steps, NEVER)))
-        self._know(self.rows((COMMAND,), self._rows))
+        self._rows = self.rows((COMMAND,), self._rows)
         return start
 
     def clear(self, channel: str = "", kind: str = "") -> int:
@@ -180,7 +170,7 @@ class FaultInjector:
             if channel in ("", fault.channel) and kind in ("", fault.type) and start <= self._first(fault) < stop:
                 ended.append(self._first(fault))
                 self.known[i] = ScheduledFault(fault, start, ended[-1])
-        self._know(self.rows((COMMAND,), self._rows))
+        self._rows = self.rows((COMMAND,), self._rows)
         return min(ended, default=self._next)
 
     def step(self, step: int, command: np.ndarray) -> FaultResult:
@@ -188,7 +178,7 @@ class FaultInjector:
         actuator = np.array(command, float)
         link, payload = self.link.pointer, doubles(actuator)
         lib.hsv_receive(link, doubles(self._link_state), len(self._link_state), step, self.seed, payload, N_INPUTS)
-        lib.hsv_apply_command_faults(self._known.pointer, step, self.seed, payload)
+        lib.hsv_apply_command_faults(self._rows.pointer, step, self.seed, payload)
         self._next = step + 1
         return FaultResult(actuator, self.acting(step))
 
@@ -203,10 +193,6 @@ class FaultInjector:
     def _first(self, fault: Fault) -> int:
         """Return the first step in which a fault can still be begun or ended."""
         return self._next + 1 if fault.kind.side == SENSOR else self._next
-
-    def _know(self, rows: FaultRows) -> None:
-        self._rows = rows
-        self._known = Struct("hsv_faults", rows)
 
 
 def read_parameters(text: str) -> dict[str, float]:

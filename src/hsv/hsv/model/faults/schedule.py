@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsv.core import dtype, lib
+from hsv.core import Struct, dtype, lib
 from hsv.model.faults.table import REPLACING, Fault
 from hsv.model.signals import INPUT_NAMES, NEVER, STATE_NAMES
 
@@ -32,20 +31,12 @@ class ActiveFault(NamedTuple):
 _NOT_YET = -2.0
 
 
-class FaultRows(NamedTuple):
-    """Faults of a side: ``rows`` and ``memory`` (n) of structs of the core, and T, ``period`` (s)."""
-
-    rows: np.ndarray
-    memory: np.ndarray
-    period: float
-
-
 def fault_rows(
     sides: Sequence[str],
     scheduled: Sequence[tuple[Fault, int, int]],
     period: float,
-    earlier: FaultRows | None = None,
-) -> FaultRows:
+    earlier: Struct | None = None,
+) -> Struct:
     """Return the scheduled faults of the given ``sides`` in the order of composition.
 
     Args:
@@ -54,20 +45,6 @@ def fault_rows(
         period: T (s).
         earlier: The faults before a change in flight; the same faults keep their memory.
     """
-    rows = _sorted_rows(tuple(sides), tuple(scheduled), period).copy()
-    memory = fault_memory(len(rows))
-    kept: dict[Any, list[np.void]] = {}
-    for row, before in zip(*earlier[:2], strict=True) if earlier else ():
-        kept.setdefault(_identity(row), []).append(before)
-    for i, row in enumerate(rows) if kept else ():
-        # Each of several identical faults keeps its own memory.
-        if same := kept.get(_identity(row)):
-            memory[i] = same.pop(0)
-    return FaultRows(rows, memory, period)
-
-
-@lru_cache(maxsize=64)
-def _sorted_rows(sides: tuple[str, ...], scheduled: tuple[tuple[Fault, int, int], ...], period: float) -> np.ndarray:
     chosen = sorted((row for row in scheduled if row[0].kind.side in sides), key=_order)
     rows = np.zeros(len(chosen), dtype("hsv_fault"))
     for row, (fault, start, stop) in zip(rows, chosen, strict=True):
@@ -75,7 +52,15 @@ def _sorted_rows(sides: tuple[str, ...], scheduled: tuple[tuple[Fault, int, int]
         row["start"], row["stop"], row["channel"], row["code"] = start, stop, _place(fault.channel), fault.kind.code
         row["occurrence"], row["cycle"] = _occurrence(fault.values[own:], period)
         row["parameter"][:own] = fault.values[:own]
-    return rows
+    memory = fault_memory(len(rows))
+    kept: dict[Any, list[np.void]] = {}
+    for row, before in zip(earlier.rows, earlier.memory, strict=True) if earlier else ():
+        kept.setdefault(_identity(row), []).append(before)
+    for i, row in enumerate(rows) if kept else ():
+        # Each of several identical faults keeps its own memory.
+        if same := kept.get(_identity(row)):
+            memory[i] = same.pop(0)
+    return Struct("hsv_faults", rows=rows, memory=memory, period=period)
 
 
 def fault_memory(count: int) -> np.ndarray:

@@ -106,11 +106,12 @@ class FaultKind:
 
 
 _P = FaultParameter
-_EFFECTIVENESS = _P("effectiveness", "share of the command that remains", "", 0.0, 1.0)
 _WIDTH = _P("width", "total width", "{}", 0.0, 1.0)
-_AMPLITUDE = _P("amplitude", "amplitude", "{}", 0.0, 1.0)
-_FREQUENCY = _P("frequency", "frequency", "Hz", 1e-3, 100.0)
-_PHASE = _P("phase", "phase at the start of the fault", "rad", -10.0, 10.0, 0.0)
+_OSCILLATION = (
+    _P("amplitude", "amplitude", "{}", 0.0, 1.0),
+    _P("frequency", "frequency", "Hz", 1e-3, 100.0),
+    _P("phase", "phase at the start of the fault", "rad", -10.0, 10.0, 0.0),
+)
 _GROWING_OFFSET = (
     _P("rate", "rate of the offset; its sign is that of the offset", "{}/s", -10.0, 10.0),
     _P("limit", "largest offset", "{}", 0.0, 1.0),
@@ -132,188 +133,92 @@ _OUTSIDE = (
     _P("restart_time", "least time for which the inlet stays unstarted", "s", 0.0, 1e4, 0.0),
 )
 
-FAULT_KINDS = {
-    "loss_of_effectiveness": FaultKind(
-        lib.LOSS,
-        COMMAND,
-        INPUT_NAMES,
-        "the actuator receives effectiveness times the command (paper eq. 15); effectiveness may be lost over a ramp",
-        (_EFFECTIVENESS, _P("ramp_time", "time over which effectiveness is lost; 0: at once", "s", 0.0, 1e4, 0.0)),
-    ),
-    "reversal": FaultKind(
-        lib.REVERSAL,
-        COMMAND,
-        INPUT_NAMES,
-        "the command is multiplied by -1",
-        (
-            _P(
-                "about_start",
-                "0: the whole command is reversed, 1: only its change since the start of the fault",
-                "",
-                0.0,
-                1.0,
-                0.0,
-            ),
-        ),
-    ),
-    "delay": FaultKind(
-        lib.DELAY,
-        COMMAND,
-        INPUT_NAMES,
-        "the actuator receives the command with a delay; at first it receives the one at the start of the fault",
-        (_P("steps", "delay in control periods", "", 1.0, float(MAX_DELAY), whole=True),),
-    ),
-    "dead_zone": FaultKind(
-        lib.DEAD_ZONE,
-        COMMAND,
-        INPUT_NAMES,
-        "commands within a dead zone about the one at the start of the fault have no effect",
-        (_WIDTH,),
-    ),
-    "backlash": FaultKind(
-        lib.BACKLASH,
-        COMMAND,
-        INPUT_NAMES,
-        "there is play between command and actuator, centred at the start of the fault",
-        (_WIDTH,),
-    ),
-    "bandwidth": FaultKind(
-        lib.BANDWIDTH,
-        DYNAMICS,
-        INPUT_NAMES,
-        "the natural frequency is reduced; an ideal actuator becomes a first-order lag",
-        (_P("natural_frequency", "largest natural frequency", "rad/s", 0.1, 1e3),),
-    ),
-    "rate_limit": FaultKind(
-        lib.RATE_LIMIT,
-        DYNAMICS,
-        INPUT_NAMES,
-        "the rate of the actuator is limited",
-        (_P("rate", "largest rate", "{}/s", 1e-4, 100.0),),
-    ),
-    "stop_limit": FaultKind(
-        lib.STOP_LIMIT,
-        DYNAMICS,
-        INPUT_NAMES,
-        "the travel of the actuator is limited; from a position beyond the limits it returns at its largest rate",
-        (_P("lower", "least position", "{}", -1.0, 1.0), _P("upper", "largest position", "{}", -1.0, 1.0)),
-    ),
-    "effector_scale": FaultKind(
-        lib.SCALE,
-        EFFECTOR,
-        INPUT_NAMES,
-        "the position of the effector is a multiple of that of the actuator",
-        (_P("factor", "multiple", "", -1.0, 2.0),),
-    ),
-    "bias": FaultKind(
-        lib.BIAS,
-        EFFECTOR,
-        INPUT_NAMES,
-        "a constant offset is added to the position of the effector",
-        (_P("offset", "offset of the position", "{}", -1.0, 1.0),),
-    ),
-    "drift": FaultKind(
-        lib.DRIFT,
-        EFFECTOR,
-        INPUT_NAMES,
-        "an offset that grows at a constant rate up to a limit is added to the position of the effector",
-        _GROWING_OFFSET,
-    ),
-    "oscillation": FaultKind(
-        lib.OSCILLATION,
-        EFFECTOR,
-        INPUT_NAMES,
-        "an oscillation is added to the position of the effector (liquid failure)",
-        (_AMPLITUDE, _FREQUENCY, _PHASE),
-    ),
-    "lock_in_place": FaultKind(
-        lib.LOCK, EFFECTOR, INPUT_NAMES, "the effector stays at its position at the start of the fault"
-    ),
-    "lock_at": FaultKind(
-        lib.LOCK_AT,
-        EFFECTOR,
-        INPUT_NAMES,
-        "the effector stays at a given position",
-        (_P("position", "position", "{}", -1.0, 1.0),),
-    ),
-    "float": FaultKind(
-        lib.FLOAT,
-        EFFECTOR,
-        INPUT_NAMES[1:],
-        "the effector moves freely: no force at zero deflection, or along the flow",
-        (_P("alignment", "0: zero deflection, 1: minus the angle of attack", "", 0.0, 1.0, 0.0),),
-    ),
-    "hard_over": FaultKind(
-        lib.HARD_OVER,
-        EFFECTOR,
-        INPUT_NAMES,
-        "the effector moves to a stop and stays there",
-        (_P("rate", "rate of the motion; its sign selects the stop", "{}/s", -100.0, 100.0),),
-    ),
-    "solid_oscillation": FaultKind(
-        lib.SOLID_OSCILLATION,
-        EFFECTOR,
-        INPUT_NAMES,
-        "the effector oscillates about its position at the start of the fault, whatever the command (solid failure)",
-        (_AMPLITUDE, _FREQUENCY, _PHASE),
-    ),
-    "thrust_loss": FaultKind(
-        lib.THRUST_LOSS,
-        ENGINE_SIDE,
-        (ENGINE,),
-        "only a share of the thrust remains",
-        (_P("share", "share that remains", "", 0.0, 1.0),),
-    ),
-    "inlet_unstart": FaultKind(
-        lib.UNSTART, ENGINE_SIDE, (ENGINE,), "the inlet is unstarted: thrust, lift, drag and moment change", _UNSTART
-    ),
-    "inlet_unstart_outside": FaultKind(
-        lib.UNSTART_OUTSIDE,
-        ENGINE_SIDE,
-        (ENGINE,),
-        "the inlet unstarts where angle of attack and Mach number leave an ellipse, or fuel exceeds a limit",
-        (*_UNSTART, *_OUTSIDE),
-    ),
-    "sensor_scale": FaultKind(
-        lib.SENSOR_SCALE,
-        SENSOR,
-        STATE_NAMES,
-        "the output of the sensor is multiplied by a factor",
-        (_P("factor", "factor", "", -1.0, 2.0),),
-    ),
-    "sensor_noise": FaultKind(
-        lib.SENSOR_NOISE,
-        SENSOR,
-        STATE_NAMES,
-        "white noise is added to the output of the sensor",
-        (_P("standard_deviation", "standard deviation of the noise", "{}", 0.0, 1.0),),
-    ),
-    "sensor_bias": FaultKind(
-        lib.SENSOR_BIAS,
-        SENSOR,
-        STATE_NAMES,
-        "a constant offset is added to the output of the sensor",
-        (_P("offset", "offset, measurement minus truth", "{}", -1.0, 1.0),),
-    ),
-    "sensor_runaway": FaultKind(
-        lib.SENSOR_RUNAWAY,
-        SENSOR,
-        STATE_NAMES,
-        "an offset that grows at a constant rate up to a limit is added to the output of the sensor",
-        _GROWING_OFFSET,
-    ),
-    "sensor_drop_out": FaultKind(
-        lib.SENSOR_DROP_OUT,
-        SENSOR,
-        STATE_NAMES,
-        "samples are lost at random; the last one is held",
-        (_P("probability", "probability that a sample is lost", "", 0.0, 1.0),),
-    ),
-    "sensor_freeze": FaultKind(
-        lib.SENSOR_FREEZE, SENSOR, STATE_NAMES, "the output of the sensor stays at its value at the start of the fault"
-    ),
+_MEANINGS = {
+    COMMAND: {
+        "loss_of_effectiveness": "the actuator receives effectiveness times the command (paper eq. 15); effectiveness "
+        "may be lost over a ramp",
+        "reversal": "the command is multiplied by -1",
+        "delay": "the actuator receives the command with a delay; at first it receives the one at the start of the "
+        "fault",
+        "dead_zone": "commands within a dead zone about the one at the start of the fault have no effect",
+        "backlash": "there is play between command and actuator, centred at the start of the fault",
+    },
+    DYNAMICS: {
+        "bandwidth": "the natural frequency is reduced; an ideal actuator becomes a first-order lag",
+        "rate_limit": "the rate of the actuator is limited",
+        "stop_limit": "the travel of the actuator is limited; from a position beyond the limits it returns at its "
+        "largest rate",
+    },
+    EFFECTOR: {
+        "effector_scale": "the position of the effector is a multiple of that of the actuator",
+        "bias": "a constant offset is added to the position of the effector",
+        "drift": "an offset that grows at a constant rate up to a limit is added to the position of the effector",
+        "oscillation": "an oscillation is added to the position of the effector (liquid failure)",
+        "lock_in_place": "the effector stays at its position at the start of the fault",
+        "lock_at": "the effector stays at a given position",
+        "float": "the effector moves freely: no force at zero deflection, or along the flow",
+        "hard_over": "the effector moves to a stop and stays there",
+        "solid_oscillation": "the effector oscillates about its position at the start of the fault, whatever the "
+        "command (solid failure)",
+    },
+    ENGINE_SIDE: {
+        "thrust_loss": "only a share of the thrust remains",
+        "inlet_unstart": "the inlet is unstarted: thrust, lift, drag and moment change",
+        "inlet_unstart_outside": "the inlet unstarts where angle of attack and Mach number leave an ellipse, or fuel "
+        "exceeds a limit",
+    },
+    SENSOR: {
+        "sensor_scale": "the output of the sensor is multiplied by a factor",
+        "sensor_noise": "white noise is added to the output of the sensor",
+        "sensor_bias": "a constant offset is added to the output of the sensor",
+        "sensor_runaway": "an offset that grows at a constant rate up to a limit is added to the output of the sensor",
+        "sensor_drop_out": "samples are lost at random; the last one is held",
+        "sensor_freeze": "the output of the sensor stays at its value at the start of the fault",
+    },
 }
+"""Meaning of every kind of fault by its side, in the order of composition, which is that of the codes in core.h."""
+
+_ABOUT_START = "0: the whole command is reversed, 1: only its change since the start of the fault"
+_PARAMETERS = {
+    "loss_of_effectiveness": (
+        _P("effectiveness", "share of the command that remains", "", 0.0, 1.0),
+        _P("ramp_time", "time over which effectiveness is lost; 0: at once", "s", 0.0, 1e4, 0.0),
+    ),
+    "reversal": (_P("about_start", _ABOUT_START, "", 0.0, 1.0, 0.0),),
+    "delay": (_P("steps", "delay in control periods", "", 1.0, float(MAX_DELAY), whole=True),),
+    "dead_zone": (_WIDTH,),
+    "backlash": (_WIDTH,),
+    "bandwidth": (_P("natural_frequency", "largest natural frequency", "rad/s", 0.1, 1e3),),
+    "rate_limit": (_P("rate", "largest rate", "{}/s", 1e-4, 100.0),),
+    "stop_limit": (_P("lower", "least position", "{}", -1.0, 1.0), _P("upper", "largest position", "{}", -1.0, 1.0)),
+    "effector_scale": (_P("factor", "multiple", "", -1.0, 2.0),),
+    "bias": (_P("offset", "offset of the position", "{}", -1.0, 1.0),),
+    "drift": _GROWING_OFFSET,
+    "oscillation": _OSCILLATION,
+    "lock_at": (_P("position", "position", "{}", -1.0, 1.0),),
+    "float": (_P("alignment", "0: zero deflection, 1: minus the angle of attack", "", 0.0, 1.0, 0.0),),
+    "hard_over": (_P("rate", "rate of the motion; its sign selects the stop", "{}/s", -100.0, 100.0),),
+    "solid_oscillation": _OSCILLATION,
+    "thrust_loss": (_P("share", "share that remains", "", 0.0, 1.0),),
+    "inlet_unstart": _UNSTART,
+    "inlet_unstart_outside": (*_UNSTART, *_OUTSIDE),
+    "sensor_scale": (_P("factor", "factor", "", -1.0, 2.0),),
+    "sensor_noise": (_P("standard_deviation", "standard deviation of the noise", "{}", 0.0, 1.0),),
+    "sensor_bias": (_P("offset", "offset, measurement minus truth", "{}", -1.0, 1.0),),
+    "sensor_runaway": _GROWING_OFFSET,
+    "sensor_drop_out": (_P("probability", "probability that a sample is lost", "", 0.0, 1.0),),
+}
+
+_CHANNELS_OF = {ENGINE_SIDE: (ENGINE,), SENSOR: STATE_NAMES}
+
+FAULT_KINDS: dict[str, FaultKind] = {}
 """The vocabulary, in the order in which faults that act at once are composed."""
+
+for _side, _meanings in _MEANINGS.items():
+    for _name, _meaning in _meanings.items():
+        _channels = INPUT_NAMES[1:] if _name == "float" else _CHANNELS_OF.get(_side, INPUT_NAMES)
+        _parameters = _PARAMETERS.get(_name, ())
+        FAULT_KINDS[_name] = FaultKind(len(FAULT_KINDS), _side, _channels, _meaning, _parameters)
 
 OCCURRENCE_PARAMETERS = (
     _P("intermittent_period", "the fault comes and goes with this period; 0: it stays", "s", 0.0, 1e4, 0.0),
@@ -375,11 +280,7 @@ class Fault:
 
     @classmethod
     def of(cls, channel: str, kind: str, parameters: Mapping[str, float]) -> Self:
-        """Return the fault with these ``parameters`` of its kind, by name, SI; those with a default may be left out.
-
-        Raises:
-            ParameterError: As above, or a parameter is missing or not one of the kind.
-        """
+        """Return the fault with these ``parameters`` of its kind, by name, SI; those with a default may be left out."""
         table = fault_parameters(channel, kind)
         optional = {p.name: p.default for p in table if p.default is not None}
         due = [p.name for p in table if p.default is None]
@@ -427,11 +328,7 @@ class Fault:
 
 
 def read_fault(channel: str, kind: str, parameters: Sequence[str]) -> Fault:
-    """Return the fault whose ``parameters`` are written as ``name=quantity``, with units; a single one without name.
-
-    Raises:
-        ParameterError, QuantityError: As :meth:`Fault.of`, or a quantity is none.
-    """
+    """Return the fault whose ``parameters`` are written as ``name=quantity``, with units; a single one without name."""
     known = {parameter.name: parameter.of(channel) for parameter in fault_parameters(channel, kind)}
     due = [parameter.name for parameter in FAULT_KINDS[kind].parameters if parameter.default is None]
     given = {}

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.core import Data, doubles, lib, vector
+from hsv.core import Struct, doubles, lib, vector
 from hsv.model.actuators import ActuatorSet
 from hsv.model.lpv.linearisation import zero_order_hold
 from hsv.model.signals import INPUT_NAMES, N_INPUTS
@@ -45,37 +44,22 @@ def actuator_system(actuators: Sequence[ActuatorSet]) -> tuple[np.ndarray, np.nd
     return A, B, C, D
 
 
-@dataclass(frozen=True, eq=False)
-class SampledActuators(Data):
-    """Actuators sampled with held commands: the state a+ = A a + B c is exact, C a + D c is the mean position.
+def sampled_actuators(actuators: Sequence[ActuatorSet], period: float) -> Struct:
+    """Return ``actuators`` (see :func:`actuator_system`) sampled at ``period`` (s) with held commands.
 
-    A (a, a), B (a, 2), C (2, a), D (2, 2). A slow vehicle responds to the mean position over a period; with it as the
+    The state a+ = A a + B c is exact; C a + D c is the mean position, to which a slow vehicle responds. With it as the
     input, the vertices of the polytopic model stay unchanged.
     """
-
-    KIND = "hsv_sampled"
-    A: np.ndarray
-    B: np.ndarray
-    C: np.ndarray
-    D: np.ndarray
-
-
-def sampled_actuators(actuators: Sequence[ActuatorSet], period: float) -> SampledActuators:
-    """Return ``actuators`` (see :func:`actuator_system`) sampled at ``period`` (s)."""
     A, B, C, D = actuator_system(actuators)
     # Integrators of the positions give their means.
     whole = np.block([[A, np.zeros((len(A), N_INPUTS))], [C, np.zeros((N_INPUTS, N_INPUTS))]])
     transition, entering = zero_order_hold(whole, np.vstack((B, D)), period)
     a = len(A)
-    return SampledActuators(
-        *(
-            np.ascontiguousarray(block)
-            for block in (transition[:a, :a], entering[:a], transition[a:, :a] / period, entering[a:] / period)
-        )
-    )
+    A, B, C, D = transition[:a, :a].copy(), entering[:a], transition[a:, :a] / period, entering[a:] / period
+    return Struct("hsv_sampled", A=A, B=B, C=C, D=D)
 
 
-def respond(actuators: SampledActuators, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def respond(actuators: Struct, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the states (k, a) at the start of each period and the mean positions (k, 2) over it.
 
     Args:

@@ -11,7 +11,6 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.model.dynamics import VehicleParameters, derivative, jacobian
-from hsv.model.lpv.polytope import Polytope, axis_weights
 from hsv.model.signals import N_INPUTS, N_STATES, PITCH_RATE
 from hsv.model.trim import trim
 
@@ -157,25 +156,6 @@ def sample(
         for altitude in altitudes.tolist()
     ]
     return np.array([[A for A, _ in row] for row in rows]), np.array([[B for _, B in row] for row in rows])
-
-
-def grid_polytope(model: Linearised, altitudes: np.ndarray, velocities: np.ndarray, period: float) -> Polytope:
-    """Return the polytopic model with bilinear weights whose vertices are discretised linearisations on a grid.
-
-    Args:
-        model: Continuous-time A (n, n) and B (n, m) at an altitude (m) and a velocity (m/s).
-        altitudes: (n_h) m, increasing.
-        velocities: (n_v) m/s, increasing.
-        period: Sampling period (s).
-    """
-    A, B = sample(model, altitudes, velocities, period)
-    n, m = B.shape[2:]
-    return Polytope(
-        A.reshape(-1, n, n),
-        B.reshape(-1, n, m),
-        axis_weights(altitudes, np.eye(len(altitudes)), "linear"),
-        axis_weights(velocities, np.eye(len(velocities)), "linear"),
-    )
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from hsv.base.errors import DesignError, one_of
-from hsv.core import Data, lib
+from hsv.core import Struct, lib
 from hsv.core.arithmetic import solve
 
 INTERPOLATIONS = ("linear", "cubic")
@@ -17,19 +16,8 @@ BLOCK = lib.SUMS
 """Number of entries that the core sums at a time."""
 
 
-class AxisWeights(NamedTuple):
-    """Weights of r vertices along one scheduling variable, as piecewise cubic polynomials.
-
-    ``breakpoints`` (s) are values of the variable. ``coefficients`` (4, s - 1, r) belong to the powers 3 to 0 of the
-    distance from the left breakpoint of each piece.
-    """
-
-    breakpoints: np.ndarray
-    coefficients: np.ndarray
-
-
-def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: str) -> AxisWeights:
-    """Return the interpolated weights of one scheduling variable.
+def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: str) -> Struct:
+    """Return the interpolated weights of one scheduling variable, an ``hsv_axis``.
 
     Args:
         breakpoints: (s) increasing values of the scheduling variable, SI.
@@ -54,7 +42,7 @@ def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: st
         coefficients = _spline(breakpoints, samples)
     else:
         raise DesignError(f"interpolation = {interpolation!r}: expected {one_of(INTERPOLATIONS, interpolation)}")
-    return AxisWeights(breakpoints, np.ascontiguousarray(coefficients))
+    return Struct("hsv_axis", breakpoints=breakpoints, coefficients=np.ascontiguousarray(coefficients))
 
 
 def _spline(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -87,31 +75,14 @@ def _spline(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.stack((bend / step[:, None], (secant - slope[:-1]) / step[:, None] - bend, slope[:-1], y[:-1]))
 
 
-def evaluate(weights: AxisWeights, values: np.ndarray) -> np.ndarray:
+def evaluate(weights: Struct, values: np.ndarray) -> np.ndarray:
     """Return the weights (n, r) at ``values`` (n) of the variable, which are clamped to the breakpoints."""
-    breakpoints, coefficients = weights
+    breakpoints, coefficients = weights.breakpoints, weights.coefficients
     clamped = np.clip(values, breakpoints[0], breakpoints[-1])
     piece = np.clip(np.searchsorted(breakpoints, clamped, side="right") - 1, 0, len(breakpoints) - 2)
     local = (clamped - breakpoints[piece])[:, None]
     c = coefficients[:, piece]
     return np.asarray(((c[0] * local + c[1]) * local + c[2]) * local + c[3])
-
-
-@dataclass(frozen=True, eq=False)
-class PolytopeData(Data):
-    """A polytopic model in the layout of the core.
-
-    ``S`` (r, e) contains, row by row, the entries of [A_i, B_i] that are non-zero in some vertex, padded with zeros to
-    a multiple of :data:`BLOCK`. ``entries`` are their indices in the flattened [A_i, B_i]. ``starts`` (2 n + 1) are the
-    indices in ``entries`` at which the rows of A and B begin, alternately.
-    """
-
-    KIND = "hsv_polytope"
-    S: np.ndarray
-    entries: np.ndarray
-    starts: np.ndarray
-    altitude: AxisWeights
-    velocity: AxisWeights
 
 
 @dataclass(frozen=True)
@@ -124,8 +95,8 @@ class Polytope:
 
     A: np.ndarray
     B: np.ndarray
-    altitude: AxisWeights
-    velocity: AxisWeights
+    altitude: Struct
+    velocity: Struct
 
     def __post_init__(self) -> None:
         r = self.altitude.coefficients.shape[2] * self.velocity.coefficients.shape[2]
@@ -133,8 +104,8 @@ class Polytope:
         if self.A.shape != (r, n, n) or self.B.ndim != 3 or self.B.shape[:2] != (r, n):
             raise DesignError(f"vertices A {self.A.shape}, B {self.B.shape}: expected {r} matrices of matching size")
 
-    def data(self) -> PolytopeData:
-        """Return the model in the layout of the core."""
+    def data(self) -> Struct:
+        """Return the model in the layout of the core, row by row, padded with zeros to a multiple of :data:`BLOCK`."""
         n, m = self.B.shape[1:]
         S = np.concatenate((self.A, self.B), axis=2).reshape(len(self.A), -1)
         entries = np.flatnonzero(S.any(axis=0))
@@ -142,7 +113,9 @@ class Polytope:
         packed[:, : len(entries)] = S[:, entries]
         firsts = [row * (n + m) + column for row in range(n) for column in (0, n)]
         starts = np.searchsorted(entries, [*firsts, n * (n + m)])
-        return PolytopeData(packed, entries, starts, self.altitude, self.velocity)
+        return Struct(
+            "hsv_polytope", S=packed, entries=entries, starts=starts, altitude=self.altitude, velocity=self.velocity
+        )
 
     def at(self, altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
         """Return A (n, n) and B (n, m) at ``altitude`` (m) and ``velocity`` (m/s)."""

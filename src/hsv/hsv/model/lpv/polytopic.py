@@ -5,27 +5,31 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 
 import numpy as np
 
-from hsv.model.lpv.accuracy import ModelAccuracy, model_accuracy, off_grid
 from hsv.model.lpv.linearisation import (
     Filter,
     Linearised,
+    bode_difference,
+    frequency_response,
     from_true_rate,
-    grid_polytope,
     linearise,
     linearise_extended,
     sample,
     zero_order_hold,
 )
-from hsv.model.lpv.polytope import Polytope
+from hsv.model.lpv.polytope import Polytope, axis_weights, evaluate
 from hsv.model.lpv.tensor_product import tensor_product
 from hsv.model.signals import N_STATES
 from hsv.model.vehicle import Vehicle
 
 _POINTS = 46
 """Altitudes, and velocities, at which the model is compared with the vehicle."""
+
+_BODE_POINTS = 6
+"""Altitudes, and velocities, at which Bode plots are compared."""
 
 _FREQUENCIES = np.logspace(-2.0, 2.0, 200)
 """rad/s, those of the paper's figure 2; those above the Nyquist frequency are left out."""
@@ -49,16 +53,52 @@ class PolytopicModel:
     samples: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
     singular_values: Sequence[np.ndarray]
 
-    def accuracy(self, judged: Polytope, scales: tuple[np.ndarray, np.ndarray]) -> ModelAccuracy:
-        """Return the accuracy of the vertices ``judged``, between the samples; ``scales`` of states and inputs."""
+    def accuracy(self, judged: Polytope, scales: tuple[np.ndarray, np.ndarray]) -> dict[str, float]:
+        """Return the largest deviations of ``judged`` from the linearised vehicle between the samples, for JSON.
+
+        The error of the scaled [A - I, B] is relative to its Frobenius norm. Bode plots of all states to all inputs are
+        compared at the point of the largest error, and at some altitudes and velocities, the outermost included.
+
+        Args:
+            judged: Polytopic model.
+            scales: Of states (n) and inputs (m), SI.
+        """
 
         def exact(altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
             return zero_order_hold(*self.exact(altitude, velocity), self.period)
 
-        altitudes, velocities = self.vehicle.altitude_range, self.vehicle.velocity_range
-        points = off_grid(*altitudes, _POINTS), off_grid(*velocities, _POINTS)
+        ranges = self.vehicle.altitude_range, self.vehicle.velocity_range
+        # Inside the intervals, off the samples.
+        altitudes, velocities = (
+            (low + (high - low) * (np.arange(_POINTS) + 0.5) / _POINTS).tolist() for low, high in ranges
+        )
+        weights = evaluate(judged.altitude, np.array(altitudes)), evaluate(judged.velocity, np.array(velocities))
+        n, m = (len(scale) for scale in scales)
+        vertices = np.concatenate((judged.A, judged.B), axis=2)
+        vertices = vertices.reshape(weights[0].shape[1], weights[1].shape[1], n, n + m)
+        approximate = np.einsum("hi,vj,ijab->hvab", *weights, vertices)
+        scale, identity = np.concatenate(scales) / scales[0][:, None], np.eye(n, n + m)
+        largest, at = -1.0, (0.0, 0.0)
+        for (i, altitude), (j, velocity) in product(enumerate(altitudes), enumerate(velocities)):
+            S = np.hstack(exact(altitude, velocity))
+            error = float(np.linalg.norm((approximate[i, j] - S) * scale) / np.linalg.norm((S - identity) * scale))
+            if error > largest:
+                largest, at = error, (altitude, velocity)
         frequencies = _FREQUENCIES[: np.searchsorted(_FREQUENCIES, 0.99 * np.pi / self.period)]
-        return model_accuracy(judged, exact, *points, *scales, frequencies, self.period)
+        few = np.linspace(0, _POINTS - 1, _BODE_POINTS).round().astype(int)
+        magnitude = phase = 0.0
+        for point in (at, *product((altitudes[i] for i in few), (velocities[i] for i in few))):
+            responses = [frequency_response(*model(*point), frequencies, self.period) for model in (judged.at, exact)]
+            decibel, degree = bode_difference(*responses)
+            magnitude, phase = max(magnitude, float(decibel.max())), max(phase, float(degree.max()))
+        return {
+            "points": _POINTS * _POINTS,
+            "relative_frobenius_error": largest,
+            "bode_magnitude_error_db": magnitude,
+            "bode_phase_error_deg": phase,
+            "smallest_weight": float(min(w.min() for w in weights)),
+            "weight_sum_error": float(max(np.abs(w.sum(axis=1) - 1.0).max() for w in weights)),
+        }
 
 
 def polytopic_model(
@@ -89,14 +129,16 @@ def polytopic_model(
         np.linspace(*vehicle.altitude_range, counts[0]),
         np.linspace(*vehicle.velocity_range, counts[1]),
     )
+    A, B = sample(exact, altitudes, velocities, period)
     values: Sequence[np.ndarray] = ()
     if tensor is None:
-        whole, interpolation = grid_polytope(exact, altitudes, velocities, period), "linear"
+        interpolation = "linear"
         samples = (altitudes, np.eye(len(altitudes))), (velocities, np.eye(len(velocities)))
+        axes = [axis_weights(*own, interpolation) for own in samples]
+        whole = Polytope(A.reshape(-1, *A.shape[2:]), B.reshape(-1, *B.shape[2:]), *axes)
     else:
-        found = tensor_product(*sample(exact, altitudes, velocities, period), altitudes, velocities, *scales, *tensor)
-        whole, interpolation, values = found.polytope, "cubic", found.singular_values
-        samples = found.altitude_samples, found.velocity_samples
+        interpolation = "cubic"
+        whole, samples, values = tensor_product(A, B, altitudes, velocities, *scales, *tensor)
     polytope = whole
     if notch:
         # x' = T x: with the true pitch rate in the state, no state of the filter acts on the vehicle.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
@@ -14,19 +12,8 @@ from hsv.model.lpv.polytope import Polytope, axis_weights
 FUNCTIONS = ("singular", "polynomial")
 
 
-@dataclass(frozen=True)
-class TensorProduct:
-    """A polytopic model computed from samples.
-
-    ``altitude_samples`` and ``velocity_samples`` are breakpoints (s) and weights (s, r) of the two variables, with
-    cubic splines between them. ``singular_values`` are those of the unfolding along each variable, relative to the
-    largest.
-    """
-
-    polytope: Polytope
-    altitude_samples: tuple[np.ndarray, np.ndarray]
-    velocity_samples: tuple[np.ndarray, np.ndarray]
-    singular_values: tuple[np.ndarray, np.ndarray]
+Samples = tuple[np.ndarray, np.ndarray]
+"""Breakpoints (s) and weights (s, r) of a scheduling variable, with cubic splines between them."""
 
 
 def tensor_product(
@@ -38,8 +25,11 @@ def tensor_product(
     input_scale: np.ndarray,
     tolerance: float,
     functions: str = "singular",
-) -> TensorProduct:
+) -> tuple[Polytope, tuple[Samples, Samples], list[np.ndarray]]:
     """Return the polytopic model of discrete-time samples on a grid (paper eq. 11), with a tight hull.
+
+    With it come the samples of the weights, and the singular values of the unfolding along each variable, relative to
+    the largest.
 
     The higher-order singular value decomposition is applied to the scaled [A - I, B]; with A in place of A - I the
     ranks would depend on the sampling period.
@@ -57,16 +47,11 @@ def tensor_product(
             error more evenly over small and large entries.
 
     Raises:
-        DesignError: Shapes that do not match, unknown functions, too few samples for the rank, or no hull.
+        DesignError: Unknown functions, too few samples for the rank, or no hull.
     """
     if functions not in FUNCTIONS:
         raise DesignError(f"tensor_product.functions = {functions!r}: expected {one_of(FUNCTIONS, functions)}")
     n, m = B.shape[2:]
-    shape = (len(altitudes), len(velocities))
-    if A.shape != (*shape, n, n) or B.shape != (*shape, n, m):
-        raise DesignError(f"samples A {A.shape}, B {B.shape}: expected {shape} matrices of matching size")
-    if state_scale.shape != (n,) or input_scale.shape != (m,):
-        raise DesignError(f"scales {state_scale.shape} and {input_scale.shape}: expected ({n},) and ({m},)")
     columns = np.concatenate((state_scale, input_scale))
     samples = np.concatenate((A - np.eye(n), B), axis=3) * columns / state_scale[:, None]
 
@@ -95,9 +80,7 @@ def tensor_product(
         axis_weights(altitudes, weights[0], "cubic"),
         axis_weights(velocities, weights[1], "cubic"),
     )
-    return TensorProduct(
-        polytope, (altitudes, weights[0]), (velocities, weights[1]), (singular_values[0], singular_values[1])
-    )
+    return polytope, ((altitudes, weights[0]), (velocities, weights[1])), singular_values
 
 
 _SUBDIVISION = 16
