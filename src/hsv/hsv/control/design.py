@@ -199,14 +199,6 @@ NO_DESIGN = "none"
 """Name of the design in the parameters of a node that flies without one: nodes have a default."""
 
 
-def brings_design(values: Mapping[str, Any]) -> bool:
-    """Tell whether there is a design in the flat parameters of a flight."""
-    if values.get("design.name") == NO_DESIGN:
-        return False
-    flown_with_any = {parameter.name for parameter in (*DESIGN_NOTCH_PARAMETERS, TAU)}
-    return any(parameter.name in values for parameter in DESIGN_PARAMETERS if parameter.name not in flown_with_any)
-
-
 def digest(values: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a design's flat parameters.
 
@@ -434,7 +426,11 @@ _POSITIVE = ("nominal_state_scale", "nominal_input_scale", "nominal_input_bound"
 
 def design_of(values: Mapping[str, Any]) -> ControlDesign | None:
     """Return the design in the flat parameters of a flight, or ``None``."""
-    return ControlDesign.from_parameters(values) if brings_design(values) else None
+    flown_with_any = {parameter.name for parameter in (*DESIGN_NOTCH_PARAMETERS, TAU)}
+    known = [parameter.name for parameter in DESIGN_PARAMETERS if parameter.name not in flown_with_any]
+    if values.get("design.name") == NO_DESIGN or not any(name in values for name in known):
+        return None
+    return ControlDesign.from_parameters(values)
 
 
 def _tube(values: Mapping[str, Any], n: int) -> TubeSet | None:

@@ -320,7 +320,7 @@ class LibraryClass:
 
 def _inputs(filter_states: int) -> tuple[SignalType, ...]:
     """Return the inputs of a controller that flies with ``filter_states`` states of the notch filter."""
-    return (*CONTROLLER_INPUTS[:-1], CONTROLLER_INPUTS[-1].of_size(filter_states))
+    return (*CONTROLLER_INPUTS[:-1], CONTROLLER_INPUTS[-1]._replace(size=filter_states))
 
 
 def _check_signals(field: str, found: tuple[SignalType, ...], expected: tuple[SignalType, ...]) -> None:

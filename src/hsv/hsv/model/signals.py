@@ -44,10 +44,6 @@ class SignalType(NamedTuple):
     """SI, "1" without one; several, separated by commas, are repeated number by number; empty: no plain numbers"""
     size: int
 
-    def of_size(self, size: int) -> SignalType:
-        """Return the signal type with another size."""
-        return self._replace(size=size)
-
 
 def _state(name: str) -> SignalType:
     return SignalType(name, ", ".join(STATE_UNITS), N_STATES)

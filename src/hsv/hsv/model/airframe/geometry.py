@@ -48,11 +48,6 @@ class Cantilever:
         return np.asarray(scale * (even - ratio * odd))
 
 
-FORE_SEGMENTS = 5
-"""Rigid segments of the fore body ahead of the inlet; one more reaches from the inlet to the centre of gravity."""
-AFT_SEGMENTS = 4
-"""Rigid segments of the aft body behind the nozzle; one more reaches from the nozzle to the centre of gravity."""
-
 Point = tuple[float, float]
 
 
@@ -136,16 +131,6 @@ class Airframe:
     def cantilevers(self) -> tuple[Cantilever, Cantilever]:
         """Fore and aft body as cantilevers clamped at the centre of gravity."""
         return Cantilever(self.fore_body, self.mass_per_length), Cantilever(self.aft_body, self.mass_per_length)
-
-    @cached_property
-    def fore_stations(self) -> np.ndarray:
-        """Ends of the rigid segments of the fore body: stations (m) from the centre of gravity to the nose."""
-        return np.array([0.0, *np.linspace(self.inlet, self.fore_body, FORE_SEGMENTS + 1)])
-
-    @cached_property
-    def aft_stations(self) -> np.ndarray:
-        """Ends of the rigid segments of the aft body: stations (m) from the centre of gravity to the tail."""
-        return np.array([0.0, *np.linspace(self.nozzle, -self.aft_body, AFT_SEGMENTS + 1)])
 
     def mode(self, x: float) -> int:
         """Return the index of the mode that bends the body at station ``x`` (m): 0 for the fore body, 1 for the aft."""

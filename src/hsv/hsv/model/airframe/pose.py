@@ -23,6 +23,9 @@ ELEVATOR = "elevator"
 FLAMES = ("flame_1", "flame_2", "flame_3")
 """Frames of the three parts of the flame, which slide out of the engine by one, two and three times the same length."""
 
+FORE_SEGMENTS, AFT_SEGMENTS = 5, 4
+"""Rigid segments ahead of the inlet and behind the nozzle; two more reach from there to the centre of gravity."""
+
 STEEPEST = 0.9
 """Largest sine of a segment's rotation: a diverging flight has elastic coordinates that no chain can show."""
 
@@ -85,7 +88,10 @@ def transforms(sample: Sample, exaggeration: float | None = None) -> list[Transf
 
 def segments(frame: Airframe) -> dict[str, np.ndarray]:
     """Return the stations of the segment ends, from the centre of gravity outward, by the stem of the frame names."""
-    return {"fore_body": frame.fore_stations, "aft_body": frame.aft_stations}
+    return {
+        "fore_body": np.array([0.0, *np.linspace(frame.inlet, frame.fore_body, FORE_SEGMENTS + 1)]),
+        "aft_body": np.array([0.0, *np.linspace(frame.nozzle, -frame.aft_body, AFT_SEGMENTS + 1)]),
+    }
 
 
 def segment_at(frame: Airframe, x: float) -> tuple[str, float]:
