@@ -227,11 +227,7 @@ def _flat_values(
 
 
 def _entries_of(name: str, entry: object, known: Iterable[str]) -> Mapping[str, Any]:
-    """Return the entries of the table ``name`` of parameters.
-
-    Raises:
-        ParameterError: There is no such table, or ``entry`` is not one.
-    """
+    """Return the entries of the table ``name``; refuse an unknown key, and an entry that is no table."""
     depth = name.count(".") + 1
     within, _, own = name.rpartition(".")
     inside = [other.split(".")[depth] for other in known if other.startswith(f"{name}.")]

@@ -245,11 +245,7 @@ class Governor:
         return ""
 
     def _planned(self, corners: Sequence[Corner], beginning: Beginning) -> tuple[np.ndarray, np.ndarray, bool]:
-        """Return u_r + u_n (k, 2), x_n (k, 9), and whether x_n stayed in the family.
-
-        Raises:
-            TrimError: A point of the reference without an equilibrium.
-        """
+        """Return u_r + u_n (k, 2), x_n (k, 9), and whether x_n stayed in the family."""
         rows = self._steps(corners[-1].time + corners[-1].blend + AFTERWARDS) - beginning.step
         plan, deviation = np.empty((rows, N_INPUTS)), np.empty((rows, N_STATES))
         reference = self.trajectory(corners).data

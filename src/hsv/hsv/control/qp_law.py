@@ -130,18 +130,10 @@ class QpLaw(FamilyLaw):
 def _predicted(
     closed: np.ndarray, B: np.ndarray, K: np.ndarray, rate: np.ndarray, block: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the matrices that map x_n and all c to the bounded quantities, at each position where bounds are imposed.
+    """Return the maps from x_n (rows, n) and all c (rows, m blocks) to the quantities at each position with bounds.
 
-    Args:
-        closed: (n, n) closed loop A + B K.
-        B: (n, m) input matrix.
-        K: (m, n) gain.
-        rate: (n + m) row that gives the pitch acceleration from [x; u].
-        block: Steps per block.
-
-    Returns:
-        State map (rows, n), map of c (rows, m blocks), and a mask (rows) of the bounded rows: at each position both
-        inputs, and in near blocks the pitch acceleration.
+    The third result (rows) marks the bounded ones: both inputs, and in near blocks the pitch acceleration, which the
+    row ``rate`` (n + m) gives from [x; u]. ``closed`` is A + B K; a block has ``block`` steps.
     """
     n, m = B.shape
     power, forced = [np.eye(n)], [np.zeros((n, m))]

@@ -201,11 +201,7 @@ def _commands(times: Sequence[float], altitudes: Sequence[float], velocities: Se
 
 
 def _blends(times: Sequence[float], blend: float | Sequence[float]) -> np.ndarray:
-    """Return the half-width of the blend of each corner (b), s.
-
-    Raises:
-        ParameterError: A wrong number of blends, a blend at a step, or a blend that begins before the flight.
-    """
+    """Return the half-width of the blend of each corner (b), s; refuse wrong ones."""
     if isinstance(blend, Sequence) and len(blend) != len(times):
         raise ParameterError(
             f"parameter reference.blends: {len(blend)} values, expected as many as reference.times, {len(times)}"
@@ -232,17 +228,7 @@ def _blend(
     slope: np.ndarray,
     bend: np.ndarray,
 ) -> None:
-    """Blend the commands at every corner, in place.
-
-    Args:
-        instants: (b) times of the corners, steps.
-        commands: (b, 2) altitude (m) and velocity (m/s) at the corners.
-        steps: (r) steps of the rows.
-        half: (b) half-width of the blend, steps.
-        command: (r, 2) commands, changed in place.
-        slope: (r, 2) change of the commands per step, changed in place.
-        bend: (r) change of the climb rate, m per step squared, added to in place.
-    """
+    """Blend ``command`` and its ``slope`` (r, 2) and ``bend`` (r), all per step, at every corner in place."""
     before = np.zeros(commands.shape[1])
     for index in range(len(instants)):
         after = np.zeros_like(before)

@@ -285,11 +285,7 @@ def _copy_array(target: Any, declared: Any, value: np.ndarray) -> None:
 
 
 def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: dict[str, int]) -> None:
-    """Note the counts that follow from the shape of an array.
-
-    Raises:
-        ValueError: It has another shape than declared.
-    """
+    """Note the counts that follow from the shape of an array; refuse another shape than declared."""
     fits = len(found) == len(declared)
     for size, dimension in zip(found, declared, strict=False):
         count = size - dimension.more

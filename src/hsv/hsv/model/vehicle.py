@@ -106,11 +106,7 @@ class Vehicle:
     """Relative bounds of the uncertain coefficients (paper section 5.1)"""
 
     def __post_init__(self) -> None:
-        """Check the values.
-
-        Raises:
-            QuantityError: Names the value and what was expected.
-        """
+        """Check the values; a QuantityError names the wrong one."""
         p = self.decoupled
         units = {**COEFFICIENT_UNITS, "angle_limit": "rad"}
         for name in (name for name in (*POSITIVE, "angle_limit", *_DAMPING) if name in (*p.form.names, "angle_limit")):

@@ -104,12 +104,7 @@ def _flame(frame: Airframe, name: str, height: float, colour: Colour) -> Solid:
 
 
 def _prism(section: Sequence[Point], sides: Callable[[float], tuple[float, float]]) -> np.ndarray:
-    """Return the triangles (n, 3, 3) of a prism.
-
-    Args:
-        section: Corners (x, z) of the convex section, counter-clockwise when seen from the right.
-        sides: Lateral coordinates y of the right and the left side at a station x.
-    """
+    """Return the triangles (n, 3, 3) of a prism: a convex section, counter-clockwise from the right, between sides."""
     right = [np.array([x, sides(x)[0], z]) for x, z in section]
     left = [np.array([x, sides(x)[1], z]) for x, z in section]
     found = []

@@ -148,10 +148,9 @@ def _start(basis: np.ndarray) -> np.ndarray:
 
 
 def _smallest_simplex(basis: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Return the matrix Q (r, r) that maximises log |det Q| subject to basis Q >= 0 and Q 1 = e_1.
+    """Return Q (r, r) that maximises log |det Q| subject to basis Q >= 0 and Q 1 = e_1.
 
-    The vertices are the rows of Q^-1, so that a large determinant means a small simplex. With Q 1 = e_1 the weights
-    sum to one, and the last column of Q follows from the others.
+    The vertices are the rows of Q^-1; the last column of Q follows from the others.
     """
     points, r = basis.shape
 
