@@ -101,12 +101,9 @@ def continuous(sections: Sequence[NotchSection]) -> Struct:
 def _in_series(sections: Sequence[NotchSection], found: Sequence[tuple[Any, ...]]) -> Struct:
     """Return sections A, B, C, D with their equilibria for unit input, which the bilinear rule does not change."""
     n = len(sections)
-    columns = ([np.array(row[k], float) for row in found] for k in range(4))
-    A, B, C, D = (
-        np.reshape(column, (n, *shape)) for column, shape in zip(columns, ((2, 2), (2,), (2,), ()), strict=True)
-    )
+    A, B, C, D = (np.array([row[k] for row in found], float) for k in range(4))
     G = np.array([[0.0, 1.0 / (section.pole_frequency * section.pole_frequency)] for section in sections])
-    return Struct("hsv_notch", A=A, B=B, C=C, D=D, G=G.reshape(n, 2))
+    return Struct("hsv_notch", A=A.reshape(n, 2, 2), B=B.reshape(n, 2), C=C.reshape(n, 2), D=D, G=G.reshape(n, 2))
 
 
 def notch_response(sections: Sequence[NotchSection], frequencies: np.ndarray) -> np.ndarray:
