@@ -42,25 +42,16 @@ class ActuatorSet:
 
 IDEAL = "ideal"
 
-_FUEL, _ELEVATOR = INPUT_NAMES
+FUEL, ELEVATOR = INPUT_NAMES
 
 ACTUATOR_SETS = {
     name: ActuatorSet(channel, order, frequency, damping, math.radians(stop), math.radians(rate), source)
     for name, channel, order, frequency, damping, stop, rate, source in (
-        ("elevator_50", _ELEVATOR, 2, 50.0, 0.7, 20.0, 400.0, "Zipfel, GHAME hypersonic vehicle, CADAC GHAME6"),
-        ("elevator_150", _ELEVATOR, 2, 150.0, 0.7, 30.0, 100.0, "Wiese, generic hypersonic vehicle, MIT thesis 2013"),
-        ("elevator_20", _ELEVATOR, 2, 20.0, 0.7, 30.0, inf, "NASA, Generic Urban Air Mobility simulation"),
-        (
-            "elevator_first_order_20",
-            _ELEVATOR,
-            1,
-            20.0,
-            1.0,
-            inf,
-            inf,
-            "scramjet vehicle trade studies, AIAA 2009-7287",
-        ),
-        ("fuel_10", _FUEL, 1, 10.0, 1.0, inf, inf, "Wiese, generic hypersonic vehicle, MIT thesis 2013: fuel delivery"),
+        ("elevator_50", ELEVATOR, 2, 50.0, 0.7, 20.0, 400.0, "Zipfel, GHAME hypersonic vehicle, CADAC GHAME6"),
+        ("elevator_150", ELEVATOR, 2, 150.0, 0.7, 30.0, 100.0, "Wiese, generic hypersonic vehicle, MIT thesis 2013"),
+        ("elevator_20", ELEVATOR, 2, 20.0, 0.7, 30.0, inf, "NASA, Generic Urban Air Mobility simulation"),
+        ("elevator_first_order_20", ELEVATOR, 1, 20.0, 1.0, inf, inf, "scramjet vehicle trade studies, AIAA 2009-7287"),
+        ("fuel_10", FUEL, 1, 10.0, 1.0, inf, inf, "Wiese, generic hypersonic vehicle, MIT thesis 2013: fuel delivery"),
     )
 }
 """Actuator sets that a scenario can name; in this table with stops in degrees and rates in degrees per second."""
