@@ -19,7 +19,6 @@ import pytest
 
 from hsv.control.design import find_design, read_design
 from hsv.control.effectiveness import effectiveness_data
-from hsv.control.estimator import steady_gain
 from hsv.control.nominal_law import level
 from hsv.control.nominal_trajectory import nominal_data
 from hsv.control.notch_filter import NotchSection, discretise
@@ -342,7 +341,8 @@ def filters(z: Golden) -> None:
         )
         A, B = jacobian(start, held, VEHICLES[i])
         z.check(f"estimator.{i}.transition", calls.written(lib.hsv_transition, 121, A, B, period).reshape(11, 11))
-        gain, needed = steady_gain(A, B, period, process, noise)
+        gain, given = np.empty((11, 5)), [doubles(vector(each)) for each in (A, B, process, noise)]
+        needed = lib.hsv_steady_gain(*given[:2], period, *given[2:], 100_000, 1e-12, doubles(gain))
         z.check(f"estimator.{i}.gain", gain)
         assert needed == iterations
         own = {"vehicle": vehicle_struct(VEHICLES[i]), "period": period, "substeps": 2}

@@ -96,7 +96,9 @@ def estimator_data(
         )
     process = np.array([v[p.name] for p in PROCESS_PARAMETERS])
     A, B = jacobian(start.state, start.input, vehicle)
-    gain, iterations = steady_gain(A, B, period, process * np.sqrt(period), deviations)
+    gain = np.empty((N_ESTIMATED, N_RIGID))
+    given = [doubles(vector(each)) for each in (A, B, process * np.sqrt(period), deviations)]
+    iterations = lib.hsv_steady_gain(*given[:2], period, *given[2:], _MAX_ITERATIONS, _SETTLED, doubles(gain))
     if iterations >= _MAX_ITERATIONS or not np.isfinite(gain).all():
         raise DesignError(f"estimator: no steady gain after {iterations} iterations, expected other noise")
     return Struct(
@@ -107,24 +109,6 @@ def estimator_data(
         period=period,
         substeps=2,
     )
-
-
-def steady_gain(
-    A: np.ndarray, B: np.ndarray, period: float, process: np.ndarray, noise: np.ndarray
-) -> tuple[np.ndarray, int]:
-    """Return the steady Kalman gain (11, 5) of states and input offsets, and the iterations that it took.
-
-    Args:
-        A: (9, 9) of the vehicle, continuous time.
-        B: (9, 2).
-        period: T (s).
-        process: Standard deviations (11) of the noise that a period adds to states and offsets.
-        noise: Standard deviations (5) of the measurement of the rigid states.
-    """
-    gain = np.empty((N_ESTIMATED, N_RIGID))
-    given = [doubles(vector(each)) for each in (A, B, process, noise)]
-    iterations = lib.hsv_steady_gain(*given[:2], period, *given[2:], _MAX_ITERATIONS, _SETTLED, doubles(gain))
-    return gain, int(iterations)
 
 
 class Estimator:
