@@ -30,7 +30,7 @@ from hsv.bags.metadata import (
     read_metadata,
 )
 from hsv.bags.roles import TYPES, namespace_of, roles
-from hsv.bags.scan import Damage, Scan
+from hsv.bags.scan import Scan
 from hsv.bags.topic import Qos, Topic
 from hsv.bags.typestore import message_types
 from hsv.bags.units import Units, units_of
@@ -51,7 +51,8 @@ class Loss:
 
     files: list[str] = field(default_factory=list)
     """Names of the missing files."""
-    damages: list[tuple[Path, Damage]] = field(default_factory=list)
+    damages: list[tuple[Path, int, str]] = field(default_factory=list)
+    """File, offset and description of each damage."""
     messages: int = 0
     """Number of recorded messages that cannot be read."""
     attachments: int = 0
@@ -244,15 +245,10 @@ class Bag:
         for file in self.files:
             unpacker = Unpacker(file)
             scan = Scan(unpacker)
-            # In a bag of several files an unreadable file is a damage, not an error.
-            if len(self.files) == 1 and not unpacker.data:
-                raise RecordingError(f"{file}: is empty, expected an MCAP file")
-            if len(self.files) == 1 and not scan.is_mcap:
-                raise RecordingError(f"{file}: is not an MCAP file (starts with {unpacker.data[:8].hex(' ')})")
             found, orphans, attachments, rosbag2 = self._read_file(scan, unpacker)
             recorded_by = rosbag2 or recorded_by
             self.complete &= scan.closed
-            self.loss.damages += [(file, damage) for damage in scan.damages]
+            self.loss.damages += [(file, *damage) for damage in scan.damages]
             statistics = scan.statistics
             stated = counts.get(file.name)
             expected = statistics.message_count if statistics else stated
@@ -345,8 +341,10 @@ class Bag:
 
     def _check(self) -> None:
         if not self.topics and self.loss.damages:
-            file, damage = self.loss.damages[0]
-            raise RecordingError(f"{file}: is damaged, and nothing of it can be read ({damage})")
+            file, offset, what = self.loss.damages[0]
+            if not offset:
+                raise RecordingError(f"{file}: is not an MCAP file")
+            raise RecordingError(f"{file}: is damaged, and nothing of it can be read ({what} at byte {offset})")
         if not self.topics and not self.complete:
             raise RecordingError(f"{self.path}: is truncated before its first messages")
         if RUN in self.roles and (found := self.constants(RUN).get("INTERFACE_VERSION", 1)) != INTERFACE_VERSION:

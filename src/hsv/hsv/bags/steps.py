@@ -176,7 +176,7 @@ def loss_in_words(loss: Loss) -> list[str]:
     if (more := len(loss.files) - _NAMED) > 0:
         words.append(f"lacks {more} more of its files")
     if loss.damages:
-        places = "; ".join(f"{path.name}: {damage}" for path, damage in loss.damages[:_NAMED])
+        places = "; ".join(f"{path.name}: {what} at byte {offset}" for path, offset, what in loss.damages[:_NAMED])
         more = len(loss.damages) - _NAMED
         words.append(f"damaged ({places}{f'; and {more} more places' if more > 0 else ''})")
     lost = [f"{n} {what}" for n, what in ((loss.messages, "messages"), (loss.attachments, "attachments")) if n]
