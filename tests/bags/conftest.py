@@ -7,11 +7,11 @@ import pytest
 from recorded_flight import MESSAGES, message_types
 
 from hsv.bags.definitions import definition, type_hash
-from hsv.bags.topic import Qos, Topic
+from hsv.bags.topic import Topic, usual_qos
 from hsv.bags.typestore import fields_of
 
 TYPES = [f"hsv_msgs/msg/{path.stem}" for path in sorted(MESSAGES.glob("*.msg"))]
-LATCHED = Qos(depth=1, durability="transient_local")
+LATCHED = usual_qos(1, latched=True)
 
 
 @pytest.fixture(scope="session")
@@ -20,7 +20,7 @@ def store():
 
 
 def topic(name, message_type, qos=None):
-    return Topic(name, message_type, definition(message_type), type_hash(message_type), qos or Qos())
+    return Topic(name, message_type, definition(message_type), type_hash(message_type), qos or usual_qos())
 
 
 class Messages:

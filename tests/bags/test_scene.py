@@ -1,6 +1,4 @@
-"""The copy of a bag with pictures: what was recorded, a scene, the frames it moves in and the sums that plots need."""
-
-import json
+"""The copy of a bag with pictures: what was recorded, a scene and the frames it moves in."""
 
 import numpy as np
 import pytest
@@ -8,12 +6,12 @@ from bag_readers import by_foxglove
 from mcap.reader import make_reader
 from recorded_flight import record_flight
 
-from hsv.bags.scene import OVERVIEW_TOPIC, write_scene
+from hsv.bags.scene import write_scene
 from hsv.model.airframe.pose import BODY, LEVEL, Sample, transforms
 from hsv.model.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC
 from hsv.model.airframe.solids import solids
 
-ADDED = {SCENE_TOPIC, TRANSFORMS_TOPIC, OVERVIEW_TOPIC}
+ADDED = {SCENE_TOPIC, TRANSFORMS_TOPIC}
 
 
 @pytest.fixture(scope="module")
@@ -45,30 +43,6 @@ def test_everything_recorded_is_in_it_byte_by_byte(case1_bag, written):
     with written.open("rb") as stream:
         attached = {each.name: each.data for each in make_reader(stream).iter_attachments()}
     assert attached == case1_bag.attachments
-
-
-def test_edges_of_the_tube_are_those_about_the_nominal_state(case1_bag, written):
-    [state, nominal, status] = (case1_bag.columns(topic) for topic in ("hsv/state", "hsv/nominal", "hsv/tube_status"))
-    for row, (*_, message) in enumerate(messages(written, OVERVIEW_TOPIC)):
-        told = json.loads(message.data)
-        for index, name in enumerate(("altitude", "velocity", "angle_of_attack", "pitch_angle", "pitch_rate")):
-            # The true state is the nominal one and the error, whose set has this centre and these half-widths.
-            error = state[name][row] - told["nominal"][name]
-            assert error == pytest.approx(status["error"][row, index], abs=1e-9 * max(1.0, abs(state[name][row])))
-            half = status["tube_half_width"][row, index]
-            width = told["upper"][name] - told["lower"][name]
-            assert width == pytest.approx(2.0 * half, abs=1e-14 * abs(state[name][row]))
-            if status["inside"][row]:
-                assert told["lower"][name] <= state[name][row] <= told["upper"][name]
-    assert len(nominal["step"]) == row + 1
-
-
-def test_faults_are_told_while_they_act(case1_bag, written):
-    told = {message.log_time: json.loads(message.data)["faults"] for *_, message in messages(written, OVERVIEW_TOPIC)}
-    active = [bool(fault) for fault in case1_bag.columns("hsv/actuator")["active"]]
-    assert any(active) and not all(active)
-    assert [words != "none" for words in told.values()] == active
-    assert set(told.values()) == {"none", "elevator_deflection: loss_of_effectiveness"}
 
 
 @pytest.mark.viewer

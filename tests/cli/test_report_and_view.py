@@ -48,7 +48,7 @@ def asked(monkeypatch, tmp_path):
 def test_view_opens_the_viewer_that_is_installed(hsv, bag, asked):
     arguments = asked("plotjuggler")
     assert hsv("view", str(bag.path.parent)).code == 0
-    assert f"--datafile {bag.path}" in arguments() and "plotjuggler.xml" in arguments()
+    assert arguments() == f"--datafile {bag.path}\n"
 
 
 def test_view_with_3d_opens_a_copy_with_pictures_that_is_made_once(hsv, bag, asked):

@@ -8,6 +8,7 @@ import pytest
 from marking import long
 from mcap.writer import CompressionType
 from rosbag2_bags import converted, numbered, out_of_order, recorded
+from rosbags.interfaces import QosDurability
 from rosbags.rosbag2 import CompressionMode
 
 from hsv.bags.description import ROSOUT, TRANSIENT_LOCAL, resolved
@@ -87,7 +88,7 @@ def test_wall_clock_log_times_change_nothing(hsv, tmp_path, form):
     assert bag.complete
     for topic in original.topics:
         latched = topic in map(resolved, TRANSIENT_LOCAL)
-        assert (bag.topics[topic].qos.durability == "transient_local") == latched or topic == ROSOUT, topic
+        assert (bag.topics[topic].qos.durability is QosDurability.TRANSIENT_LOCAL) == latched or topic == ROSOUT, topic
         # What has no stamp of its own counts for the step before, which may be one of another topic of that step.
         assert np.abs(bag.times(topic) - original.times(topic)).max(initial=0) <= 20_000_000, topic
 

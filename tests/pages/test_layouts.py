@@ -1,18 +1,16 @@
-"""The layouts for viewers name what is recorded, and nothing else."""
+"""The layout for viewers names what is recorded, and nothing else."""
 
 import json
 import re
-import xml.etree.ElementTree as ElementTree
 
 import pytest
 from recorded_flight import message_types
 
 from hsv.bags.description import MARKERS, TOPICS, resolved
-from hsv.bags.scene import OVERVIEW_TOPIC
 from hsv.bags.typestore import fields_of
 from hsv.model.airframe.pose import Sample, transforms
 from hsv.model.airframe.scene import SCENE_TOPIC
-from hsv.pages.layouts import foxglove_layout, plotjuggler_layout
+from hsv.pages.layouts import foxglove_layout
 
 RECORDED = {resolved(role): kind for role, kind in TOPICS.items()} | {
     "/rosout": "rcl_interfaces/msg/Log",
@@ -41,25 +39,11 @@ def paths_of_foxglove(kind):
             yield topic, field.split("."), panel.get("title")
 
 
-def curves_of_foxglove():
-    """Yield the curves of plots that draw recorded topics alone: the others need what a scene adds."""
-    beside = {title for topic, _, title in paths_of_foxglove("Plot") if topic == OVERVIEW_TOPIC}
-    return (curve for curve in paths_of_foxglove("Plot") if curve[2] not in beside)
-
-
-def curves_of_plotjuggler():
-    root = ElementTree.fromstring(plotjuggler_layout(resolved))
-    for area in root.iter("DockArea"):
-        for curve in area.iter("curve"):
-            name = curve.attrib["name"]
-            topic = next(topic for topic in sorted(RECORDED, key=len, reverse=True) if name.startswith(f"{topic}/"))
-            yield topic, name.removeprefix(f"{topic}/").split("/"), area.attrib["name"]
-
-
 def test_curves_are_numbers_of_recorded_messages(types):
-    found = list(curves_of_foxglove())
+    found = list(paths_of_foxglove("Plot"))
     assert len(found) > 30
-    for topic, path, _ in found:
+    for topic, path, title in found:
+        assert UNIT.search(title)
         kind = RECORDED[topic]
         for depth, part in enumerate(path):
             name, _, index = part.partition("[")
@@ -79,9 +63,3 @@ def test_the_vehicle_is_drawn_in_the_frames_and_on_the_topics_that_there_are():
     assert panel["followTf"] in frames and panel["followMode"] in ("follow-pose", "follow-position", "follow-none")
     assert all(layer["frameId"] in frames for layer in panel["layers"].values())
     assert set(panel["topics"]) == {SCENE_TOPIC, resolved(MARKERS)}
-
-
-def test_both_layouts_show_the_same_in_plots_that_name_the_unit():
-    curves = sorted(curves_of_foxglove())
-    assert curves == sorted(curves_of_plotjuggler())
-    assert all(UNIT.search(title) for *_, title in curves)

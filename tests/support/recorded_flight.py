@@ -10,7 +10,7 @@ from hsv.bags.description import STATE, TOPICS, resolved
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.replay.engine import fly
-from hsv.bags.topic import Qos, Topic
+from hsv.bags.topic import Topic, usual_qos
 from hsv.bags.typestore import blank
 from hsv.bags.writer import BagWriter
 from hsv.control.design import find_file
@@ -51,7 +51,7 @@ def record_flight(directory, scenario="case1", duration=20.0, fault=8.0, log=(),
     values = flight_parameters(flown) | changed
     types = message_types()
     kinds = {resolved(role): kind for role, kind in TOPICS.items()} | {"/rosout": LOG, "/diagnostics": DIAGNOSTICS}
-    topics = [Topic(name, kind, definition(kind), type_hash(kind), Qos()) for name, kind in kinds.items()]
+    topics = [Topic(name, kind, definition(kind), type_hash(kind), usual_qos()) for name, kind in kinds.items()]
     custom = {"run_id": "1f" * 16, "scenario": flown.name, "title": flown.title, "commit": "ab" * 20}
     writer = BagWriter(directory, topics, custom | {"design": flown.design, "seed": "none"})
     design = {name: value for name, value in values.items() if name not in flown.parameters()}

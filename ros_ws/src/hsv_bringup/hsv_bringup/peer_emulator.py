@@ -18,7 +18,7 @@ from hsv.bags.infrastructure_parameters import PEER_EMULATOR_PARAMETERS
 from hsv.bags.messages import stamp_in
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import broken_off, complete_steps
-from hsv.bags.topic import Qos, Topic
+from hsv.bags.topic import Topic, usual_qos
 from hsv.bags.writer import BagWriter
 from hsv.graph.standstill import Standstill
 from hsv_node.lockstep import LockstepNode
@@ -51,7 +51,7 @@ class PeerEmulatorNode(LockstepNode):
         for topic in me.publishes:
             kind = description.TOPICS[topic]
             name = self.resolve_topic_name(topic)
-            self._output.add_topic(Topic(name, kind, definition(kind), type_hash(kind), Qos(depth=STEP.depth)))
+            self._output.add_topic(Topic(name, kind, definition(kind), type_hash(kind), usual_qos(STEP.depth)))
             answer: Callable[[bytes], None] = partial(self._on_answer, topic, name)
             self.create_subscription(message_class(kind), topic, answer, STEP, raw=True)
         self._run = next((message for _, message in bag.decode(description.RUN)), None)

@@ -13,11 +13,11 @@ from typing import Any
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
+from rosbags.interfaces import Qos, QosDurability, QosReliability
 from std_srvs.srv import Trigger
 
 from hsv.bags.description import CLOCK, PLANT, RECORDER, TOPICS
 from hsv.bags.reader import Bag
-from hsv.bags.topic import Qos
 from hsv.base.errors import ParameterError, RecordingError
 from hsv_node.lockstep import LOG_INTERVAL
 from hsv_node.main import run_node
@@ -164,7 +164,7 @@ def _message_class(bag: Bag, topic: str) -> Any:
 
 
 def _profile(qos: Qos) -> QoSProfile:
-    reliable, latched = qos.reliability == "reliable", qos.durability == "transient_local"
+    reliable, latched = qos.reliability is QosReliability.RELIABLE, qos.durability is QosDurability.TRANSIENT_LOCAL
     return QoSProfile(
         depth=max(qos.depth, LATCHED.depth if latched else 1),  # rosbag2 records 0 where it was not known
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,

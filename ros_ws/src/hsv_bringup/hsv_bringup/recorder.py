@@ -37,7 +37,7 @@ from hsv.bags.description import (
 from hsv.bags.infrastructure_parameters import RECORDER_PARAMETERS
 from hsv.bags.messages import StepMessages, stamp_in
 from hsv.bags.roles import naming
-from hsv.bags.topic import Qos, Topic
+from hsv.bags.topic import Topic, usual_qos
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import ParameterError
 from hsv.flight.blocks import Signals
@@ -112,7 +112,7 @@ class RecorderNode(PeerNode):
             self._attach(path.name, path.read_bytes())
         for topic, kind in self._kinds.items():
             latched = topic in TRANSIENT_LOCAL
-            qos = Qos(depth=LATCHED.depth, durability="transient_local") if latched else Qos(depth=STEP.depth)
+            qos = usual_qos(LATCHED.depth if latched else STEP.depth, latched=latched)
             self.bag.add_topic(Topic(self._names[topic], kind, definition(kind), type_hash(kind), qos))
         self.get_logger().info(f"recording to {self.bag.directory}")
 

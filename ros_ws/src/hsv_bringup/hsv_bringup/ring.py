@@ -20,7 +20,7 @@ from rclpy.node import Node
 
 from hsv.bags import description
 from hsv.bags.definitions import definition, type_hash
-from hsv.bags.topic import Qos, Topic
+from hsv.bags.topic import Topic, usual_qos
 from hsv.bags.writer import BagWriter
 from hsv_node.middleware import STEP, message_class
 
@@ -58,7 +58,7 @@ class RingNode:
             self._inputs[topic] = self.ros.create_subscription(kinds[topic], topic, callback, STEP, raw=raw)
             if self._bag:
                 kind = description.TOPICS[topic]
-                self._bag.add_topic(Topic(topic, kind, definition(kind), type_hash(kind), Qos(depth=STEP.depth)))
+                self._bag.add_topic(Topic(topic, kind, definition(kind), type_hash(kind), usual_qos(STEP.depth)))
 
     def matched(self) -> bool:
         """Return whether all links of the graph description are connected."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from rosbags.rosbag2.metadata import dump_qos_v9
 
 from hsv.bags.topic import Topic
 from hsv.base.errors import DocumentError
@@ -67,7 +68,7 @@ def information(
                     "name": topic.name,
                     "type": topic.type,
                     "serialization_format": topic.encoding,
-                    "offered_qos_profiles": [topic.qos.as_dict()],
+                    "offered_qos_profiles": dump_qos_v9([topic.qos]),
                     "type_description_hash": _Quoted(topic.type_hash),
                 },
                 "message_count": topic.count,

@@ -31,7 +31,7 @@ from hsv.bags.metadata import (
 )
 from hsv.bags.roles import TYPES, namespace_of, roles
 from hsv.bags.scan import Scan
-from hsv.bags.topic import Qos, Topic
+from hsv.bags.topic import Topic, recorded_qos, usual_qos
 from hsv.bags.typestore import message_types
 from hsv.bags.units import Units, units_of
 from hsv.base.errors import RecordingError
@@ -270,8 +270,7 @@ class Bag:
         latched = set(map(self.name_of, TRANSIENT_LOCAL))
         for topics in (self.topics, self.undecodable):
             for name, topic in topics.items():
-                usual = Qos(durability="transient_local" if name in latched else "volatile")
-                qos = Qos.from_yaml(self._profiles[name], usual)
+                qos = recorded_qos(self._profiles[name], latched=name in latched)
                 topics[name] = replace(topic, qos=qos, count=len(self._messages[name]))
 
     def _read_file(self, scan: Scan, unpacker: Unpacker) -> tuple[int, int, int, dict[str, Any]]:
@@ -330,7 +329,7 @@ class Bag:
             schema.name,
             text.replace("\r\n", "\n") if decodable else text,
             channel.metadata.get("topic_type_hash", ""),
-            Qos(),  # depends on the roles of all topics
+            usual_qos(),  # depends on the roles of all topics
             schema_encoding=schema.encoding,
             encoding=channel.message_encoding,
         )

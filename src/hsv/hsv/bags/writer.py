@@ -9,7 +9,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import yaml
 from mcap.writer import CompressionType, Writer
+from rosbags.rosbag2.metadata import dump_qos_v9
 
 from hsv.bags.files import locked
 from hsv.bags.metadata import CUSTOM_DATA, DISTRO, EMPTY_SPAN, ROSBAG2, information, record, write_metadata
@@ -35,7 +37,10 @@ def register(writer: Writer, topic: Topic, schemas: Schemas) -> int:
     key = topic.type, topic.schema_encoding, topic.definition
     if key not in schemas:
         schemas[key] = writer.register_schema(*key[:2], topic.definition.encode(errors="surrogateescape"))
-    metadata = {"offered_qos_profiles": topic.qos.as_yaml(), "topic_type_hash": topic.type_hash}
+    metadata = {
+        "offered_qos_profiles": yaml.safe_dump(dump_qos_v9([topic.qos]), sort_keys=False),
+        "topic_type_hash": topic.type_hash,
+    }
     return writer.register_channel(topic.name, topic.encoding, schemas[key], metadata)
 
 

@@ -125,14 +125,13 @@ def view(
         raise RecordingError(
             f"{mcap}: no viewer is installed, expected one of these ({sources}); "
             f"or drop the file into a browser at https://app.foxglove.dev and import "
-            f"{layout_for(opened, 'foxglove.json')} there, or use: hsv report {bag}"
+            f"{layout_for(opened)} there, or use: hsv report {bag}"
         )
-    made = layout_for(opened, viewer.layout) if viewer.layout else None
+    layout = str(layout_for(opened)) if viewer.scene else None
     if viewer.scene:
         mcap = scene_of(opened).absolute()
-    command = [str(viewer.program()), *(word.format(mcap=mcap, layout=made) for word in viewer.arguments)]
+    command = [str(viewer.program()), *viewer.options, str(mcap)]
     subprocess.Popen(command, start_new_session=True, stdin=subprocess.DEVNULL)
-    layout = str(made) if viewer.imports else None
     if json:
         output.print_json({"path": str(mcap), "viewer": viewer.name, "command": command, "layout_to_import": layout})
     else:
