@@ -94,7 +94,7 @@ def test_numbers_come_back_bit_for_bit():
 def test_it_opens_with_the_verdict_and_a_picture_before_any_table(page, quiet):
     assert page.index('class="lead') < page.index('class="picture"') < page.index("<table")
     (run,) = reported_runs([quiet])
-    said = happened([run], [])
+    said = happened(run)
     assert said.startswith("Loss of effectiveness of the elevator deflection from 8 s; ")
     level = quiet.columns("/hsv/tube_status")["level"].max()
     assert f"the error stayed in the invariant set, largest level {level:.3g}." in said

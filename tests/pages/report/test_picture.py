@@ -5,9 +5,16 @@ import re
 import numpy as np
 import pytest
 
-from hsv.pages.picture import HEIGHT, WIDTH, Line, drawing, picture
+from hsv.pages.engine import Numbers, Plot
+from hsv.pages.picture import HEIGHT, WIDTH, picture
 
 TIME = np.linspace(0.0, 200.0, 10_001)
+
+
+def pictured(y, shades=()):
+    numbers = Numbers()
+    curve = {"kind": "actual", "run": 0, "x": numbers.add(TIME), "y": numbers.add(y)}
+    return picture([Plot("y", "y", "m", "", [curve])], numbers, 200.0, shades)
 
 
 def points(path):
@@ -17,7 +24,7 @@ def points(path):
 def test_no_peak_of_a_single_step_is_lost():
     y = np.sin(TIME)
     y[4321] = 5.0
-    (path,) = drawing("y", "m", 200.0, [Line("run0", TIME, y)]).paths
+    ((_, [path], _),) = pictured(y).drawings
     drawn = points(path)
     highest = drawn[np.argmin(drawn[:, 1])]
     assert highest[0] == pytest.approx(WIDTH * TIME[4321] / 200.0, rel=1e-3)
@@ -26,6 +33,6 @@ def test_no_peak_of_a_single_step_is_lost():
 
 
 def test_faults_are_shaded_where_they_act():
-    shown = picture([drawing("y", "1", 200.0, [Line("run0", TIME, TIME)])], 200.0, [(100.0, 150.0)])
+    shown = pictured(TIME, [(100.0, 150.0)])
     assert shown.shades == [(50.0, 25.0)]
     assert [text for text, _ in shown.ticks][:2] == ["0", "25"]

@@ -54,9 +54,6 @@ from hsv_node.roles import full_name, node_in_role, services
 RATE = 20.0
 """Polls per second, Hz: rows of the page, and batches for Foxglove."""
 
-AT_ONCE = 100
-"""Maximum number of steps decoded per poll, when a page is opened during a flight."""
-
 DEPTH = 1000
 """Depth of the queue of a topic, messages: 20 s in real time; at full speed messages may be lost."""
 
@@ -129,8 +126,6 @@ class LiveNode(ProcessNode):
         """Sample the messages that have arrived, and continue with the commands."""
         self._next_poll = max(self._next_poll + 1.0 / RATE, time.monotonic())
         self.hub.sample()
-        if self.page.watched:
-            self.hub.decode(AT_ONCE)
         while not self.page.commands.empty():
             self._execute(*self.page.commands.get())
         for request in list(self._requests):
@@ -152,9 +147,7 @@ class LiveNode(ProcessNode):
         if isinstance(self.executor, LiveExecutor):
             self.executor.drain()
         self._check_plant()
-        if self.page.watched:
-            self.hub.sample()
-            self.hub.decode()
+        self.hub.sample()
         self.page.close()
         self.foxglove.close()
 

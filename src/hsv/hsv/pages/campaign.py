@@ -30,7 +30,7 @@ from hsv.flight.flight import Flight
 from hsv.flight.metrics import METRICS, Group, in_words, is_share
 from hsv.model.plant import Plant
 from hsv.pages.engine import Numbers, Plot, render, write_page
-from hsv.pages.picture import Line, Picture, drawing, picture
+from hsv.pages.picture import Picture, picture
 from hsv.pages.text import capitalised, quantity, units_of
 
 POINTS = 2000
@@ -75,10 +75,14 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
     drawn = np.arange(0, results.campaign.samples, -(-results.campaign.samples // POINTS))
     end = _windows(results)[-1]
     failed = most_failed(judged)
+    envelopes = _envelopes(results, flights, numbers)
+    pictured = [plot for name in PICTURED for plot in envelopes if plot.name == f"envelope_{name}"]
+    starts = [fault.start for fault in results.campaign.scenario.fault]
+    shades = [(start, end) for start in starts if start < end]
     return render(
         "campaign.html.j2",
         plots=[
-            *_envelopes(results, flights, numbers),
+            *envelopes,
             *(_histogram(results, d, numbers) for found in grouped.values() for d in found),
             *(_scatter(results, factor, drawn, numbers) for factor in results.campaign.factors if differing),
         ],
@@ -100,8 +104,8 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
         sections={name: heading for name, heading in SECTIONS.items() if differing or name != "scatter"},
         sentence=sentence(results),
         failed=failed and in_words(failed.name),
-        sorted=failed and _sorted(results, failed),
-        picture=_picture(results, flights),
+        sorted=failed and _sorted(results, failed, numbers),
+        picture=picture(pictured, numbers, end, shades),
         result=results.path.name,
         shares=judged,
         within_all=within_all(results),
@@ -138,14 +142,16 @@ def most_failed(judged: Sequence[Share]) -> Share | None:
     return over if over is not None and over.within < over.flights else None
 
 
-def _sorted(results: Results, failed: Share) -> Picture:
+def _sorted(results: Results, failed: Share, numbers: Numbers) -> Picture:
     """Return the picture of the metric that fails most: the sorted magnitudes of all flights, and the limit."""
     values = np.sort(np.abs(results.column(failed.name)))  # flights that do not define the metric come last, as NaN
     across = 100.0 * (np.arange(len(values)) + 0.5) / len(values)
-    lines = [Line("bound", np.array([0.0, 100.0]), np.full(2, failed.limit)), Line("run0", across, values)]
+    limit = {"kind": "bound", "run": None, "x": np.array([0.0, 100.0]), "y": np.full(2, failed.limit)}
+    flights = {"kind": "actual", "run": 0, "x": across, "y": values}
+    curves = [curve | {axis: numbers.add(curve[axis]) for axis in "xy"} for curve in (limit, flights)]
     title = f"{capitalised(in_words(failed.name))}, magnitude"
-    plot = drawing(title, OUTCOMES[failed.name], 100.0, lines, share=is_share(failed.name))
-    return picture([plot], 100.0, axis="flights, in order of magnitude [%]")
+    plot = Plot("sorted", title, OUTCOMES[failed.name], "", curves, share=is_share(failed.name))
+    return picture([plot], numbers, 100.0, axis="flights, in order of magnitude [%]")
 
 
 def _grouped(shown: Sequence[Distribution]) -> dict[str, list[Distribution]]:
@@ -267,22 +273,6 @@ def _limits(results: Results, shown: Distribution) -> list[float]:
     """Return the limits of a metric inside the range of the data; others would compress the plot."""
     limit = limits(results).get(shown.name)
     return [] if limit is None else [end for end in (-limit, limit) if shown.minimum <= end <= shown.maximum]
-
-
-def _picture(results: Results, flights: Mapping[str, Flight]) -> Picture:
-    """Return the picture of all flights."""
-    windows, time, reached, end = _windows(results)
-    envelope, drawings = results.envelope, []
-    for index, signal in enumerate(SIGNALS):
-        if signal.name in PICTURED:
-            low, high, mean = (edge[reached, index] for edge in (envelope.low, envelope.high, envelope.mean))
-            lines = [Line("band", time[reached], low, high=high), Line("mean", time[reached], mean)]
-            for run, flight in enumerate(flights.values()):
-                curve = _curve(flight, windows, index)
-                lines.append(Line(f"run{run} {'nominal' if run else ''}", time[: len(curve)], curve, run))
-            drawings.append(drawing(capitalised(in_words(signal.name)), signal.unit, end, lines))
-    starts = [fault.start for fault in results.campaign.scenario.fault]
-    return picture(drawings, end, [(start, end) for start in starts if start < end])
 
 
 def _curve(flight: Flight, windows: np.ndarray, index: int) -> np.ndarray:

@@ -83,6 +83,10 @@ class Numbers:
             self.lengths.append(len(values))
         return self.blocks[block]
 
+    def array(self, index: int) -> np.ndarray:
+        """Return an array by its number."""
+        return np.frombuffer(list(self.blocks)[index], "<f4").astype(float)
+
     def packed(self) -> Markup:
         """Return all arrays, compressed.
 

@@ -1,90 +1,85 @@
-"""The picture that a page opens with: a few curves as SVG, visible before any script has run."""
+"""The picture that a page opens with: a few of its plots as SVG, visible before any script has run."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from hsv.base.units import UnitSystem, in_system
+from hsv.pages.engine import Numbers, Plot
 from hsv.pages.text import number
 
 STRETCHES = 400
 """Number of intervals of the axis; a curve keeps its minimum and maximum in each, so that no peak is lost."""
 
 WIDTH, HEIGHT = 1000.0, 100.0
-"""Size of the drawing; the page scales it."""
+"""Size of a drawing; the page scales it."""
+
+DRAWN = ("high", "bound", "reference", "mean", "nominal", "actual")
+"""Kinds of the curves that are drawn, from below; ``high`` is the area between it and the curve ``low``."""
 
 Tick = tuple[str, float]
 """Label, and place along the axis in percent of its length."""
 
 
-@dataclass(frozen=True)
-class Line:
-    """A curve y(x), both (n), in SI; y may contain NaN. With ``high`` (n) it is the area between the two."""
+class Drawing(NamedTuple):
+    """A plot over the axis of a picture."""
 
-    look: str
-    """Classes of the stylesheet: ``run0``, ``nominal``, ``reference``, ``bound``, ``mean``, ``band``."""
-    x: np.ndarray
-    y: np.ndarray
-    run: int | None = None
-    """The flight with which it is hidden."""
-    high: np.ndarray | None = None
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """A quantity over the axis of a picture; a path has its look, its SVG data and its run."""
-
-    title: str
-    unit: str
-    share: bool
+    plot: Plot
     paths: list[tuple[str, str, int | None]]
+    """Classes of the stylesheet, SVG data, and the run with which the path is hidden."""
     ticks: dict[str, list[Tick]]
     """Ticks by system of units, from below."""
 
 
-@dataclass(frozen=True)
-class Picture:
+class Picture(NamedTuple):
     """Drawings over one axis; a shade has its start and its width in percent."""
 
-    drawings: Sequence[Drawing]
+    drawings: list[Drawing]
     axis: str
     ticks: list[Tick]
-    shades: Sequence[tuple[float, float]] = ()
+    shades: list[tuple[float, float]]
 
 
 def picture(
-    drawings: Sequence[Drawing], end: float, shades: Sequence[tuple[float, float]] = (), axis: str = "time [s]"
+    plots: Sequence[Plot],
+    numbers: Numbers,
+    end: float,
+    shades: Sequence[tuple[float, float]] = (),
+    axis: str = "time [s]",
+    kinds: Sequence[str] = DRAWN,
 ) -> Picture:
-    """Return the picture of ``drawings``, all over 0 ... ``end``, with stretches of the axis shaded."""
+    """Return the picture of ``plots``, all over 0 ... ``end``, with stretches of the axis shaded."""
     marked = [(100.0 * start / end, 100.0 * (stop - start) / end) for start, stop in shades]
+    drawings = [_drawing(plot, numbers, end, kinds) for plot in plots]
     return Picture(drawings, axis, _ticks(0.0, end, 1.0, 8), marked)
 
 
-def drawing(title: str, unit: str, end: float, lines: Sequence[Line], *, share: bool = False) -> Drawing:
-    """Return a quantity of an SI ``unit`` over 0 ... ``end``; its axis holds all finite values."""
-    edges = [edge for line in lines for edge in (line.y, line.high) if edge is not None]
-    finite = np.concatenate([edge[np.isfinite(edge)] for edge in edges])
+def _drawing(plot: Plot, numbers: Numbers, end: float, kinds: Sequence[str]) -> Drawing:
+    curves = {kind: [curve for curve in plot.curves if curve["kind"] == kind] for kind in ("low", *kinds)}
+    y = np.concatenate([numbers.array(curve["y"]) for found in curves.values() for curve in found])
+    finite = y[np.isfinite(y)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     margin = 0.06 * (high - low) or 1e-3 * abs(high) or 1e-6
     low, high = low - margin, high + margin
-
-    def path(x: np.ndarray, y: np.ndarray) -> str:
-        return _path(WIDTH * x / end, HEIGHT * (high - y) / (high - low))
-
     paths = []
-    for line in lines:
-        if line.high is None:
-            d = path(*_thinned(line.x, line.y))
-        else:
-            d = path(np.r_[line.x, line.x[::-1]], np.r_[line.y, line.high[::-1]]) + "Z"
-        paths.append((line.look, d, line.run))
-    scales = {str(system): in_system(1.0, unit, system, share=share)[0] for system in UnitSystem}
-    ticks = {system: _ticks(low, high, scale, 4) for system, scale in scales.items()}
-    return Drawing(title, unit, share, paths, ticks)
+    for kind in kinds:
+        for curve in curves[kind]:
+            x, y = numbers.array(curve["x"]), numbers.array(curve["y"])
+            look, run = kind, curve["run"]
+            if kind == "high":
+                look, x = "band", np.append(x, x[::-1])
+                y = np.append(y, numbers.array(curves["low"][0]["y"])[::-1])
+            elif run is not None:
+                look = f"run{run % 6} {kind}"
+            if kind != "high":
+                x, y = _thinned(x, y)
+            paths.append((look, _path(WIDTH * x / end, HEIGHT * (high - y) / (high - low)), run))
+    scales = {str(system): in_system(1.0, plot.unit, system, share=plot.share)[0] for system in UnitSystem}
+    return Drawing(plot, paths, {system: _ticks(low, high, scale, 4) for system, scale in scales.items()})
 
 
 def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +22,9 @@ from hsv.pages.engine import Numbers, Plot, render, write_page
 from hsv.pages.events import Event
 from hsv.pages.flights import DrawnCurve, ReportedRun, reported_runs
 from hsv.pages.panels import GROUPS, Kind, Panel
-from hsv.pages.picture import Drawing, Line, Picture, drawing, picture
+from hsv.pages.picture import DRAWN, Picture, picture
 from hsv.pages.side_view import geometry
-from hsv.pages.text import capitalised, number, percent, quantity, switched
+from hsv.pages.text import capitalised, number, quantity, switched
 
 DECLARED = {p.name: p for table in (LOCKSTEP_PARAMETERS, *NODE_PARAMETERS.values()) for p in table}
 """Declarations of all parameters of the nodes by name."""
@@ -35,13 +34,6 @@ EVENTS_SHOWN = 200
 
 PICTURED = ("altitude", "velocity", "angle_of_attack", "level")
 """Panels of the picture at the top of the page."""
-
-COMPARED = ("trajectory", "attitude", "elastic", "inputs", "tube")
-"""Groups of panels whose differences are plotted, without errors in the tube, which repeat those of the state."""
-
-NEARLY = 0.01
-"""Largest difference of flights that nearly agree, as a share of the range of a quantity."""
-
 
 def write_report(bags: Sequence[Bag], out: Path, *, units: UnitSystem = UnitSystem.metric) -> None:
     """Write the report of ``bags``, with common plots, to the HTML file ``out``.
@@ -59,14 +51,11 @@ def write_report(bags: Sequence[Bag], out: Path, *, units: UnitSystem = UnitSyst
 
 def report_page(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.metric) -> str:
     """Return the HTML page of the report."""
-    numbers, differences = Numbers(), flight_differences(runs)
+    numbers = Numbers()
     plots = [_plot(panel, runs, numbers) for panel in all_panels(runs)]
-    plots += [_difference_plot(found, runs, numbers) for found in differences if any(d.largest for d in found)]
     drawn = {plot.group for plot in plots}
     groups = {key: heading for key, heading in GROUPS.items() if key in drawn}
     sections = {"summary": "Summary", "metrics": "Metrics", "events": "Events", "vehicle": "Vehicle"}
-    if differences:
-        sections["differences"] = "Differences"
     sections |= groups | {"parameters": "Parameters", "certificate": "Certificate", "repeat": "Repeat"}
     faults = [_faults(run) for run in runs]
     return render(
@@ -85,12 +74,11 @@ def report_page(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.m
         sections=sections,
         groups=groups,
         sentence=sentence(runs),
-        happened=happened(runs, differences),
+        happened=happened(runs[0]) if len(runs) == 1 else "",
         verdict=verdict,
         step_times=step_times_in_words,
-        picture=_picture(runs),
+        picture=_picture(runs, plots, numbers),
         effectors=any(curve.kind is Kind.effector for run in runs for c in run.curves.curves.values() for curve in c),
-        equal=[found[0].panel.title for found in differences if not any(d.largest for d in found)],
         criteria=CRITERIA,
         metrics=_grouped(runs),
         differing={name for name in METRICS if len({run.metrics.get(name) for run in runs}) > 1},
@@ -143,11 +131,8 @@ def _one(run: ReportedRun, limits: str) -> str:
     return "; ".join(parts)
 
 
-def happened(runs: Sequence[ReportedRun], differences: Sequence[Sequence[Difference]]) -> str:
-    """Return a summary of the events of one flight, or of the agreement of several; empty without common curves."""
-    if len(runs) > 1:
-        return f"{capitalised(text)}." if (text := _agreement(differences)) else ""
-    (run,) = runs
+def happened(run: ReportedRun) -> str:
+    """Return a summary of the events of a flight."""
     faults, tube = run.description["faults"] or (), run.description["tube"]
     text = "no fault"
     if faults:
@@ -159,78 +144,6 @@ def happened(runs: Sequence[ReportedRun], differences: Sequence[Sequence[Differe
         where = f"left the invariant set in {outside} of {checked} steps" if outside else "stayed in the invariant set"
         text += f"; the error {where}, largest level {number(tube['largest_level'], 3)}"
     return f"{capitalised(text)}."
-
-
-def _agreement(differences: Sequence[Sequence[Difference]]) -> str:
-    if not differences:
-        return ""
-    most = max((difference for found in differences for difference in found), key=lambda d: d.share)
-    title = most.panel.title[0].lower() + most.panel.title[1:]
-    if not any(difference.largest for found in differences for difference in found):
-        return "states and commands are the same, bit for bit"
-    if most.share <= NEARLY:
-        return f"the flights nearly agree: no quantity differs by more than {percent(most.share)} of its range"
-    if not np.isfinite(most.share):
-        return f"the flights differ most in {title}"
-    return f"the flights differ most in {title}, by {percent(most.share)} of its range"
-
-
-@dataclass(frozen=True)
-class Difference:
-    """The difference ``y`` (n; SI) of a run from the first one over their common ``time`` (n; s)."""
-
-    panel: Panel
-    run: int
-    time: np.ndarray
-    y: np.ndarray
-    range: float
-    """Range from the smallest to the largest value of the first run."""
-
-    @property
-    def largest(self) -> float:
-        """Largest magnitude of the difference."""
-        return float(np.nanmax(np.abs(self.y)))
-
-    @property
-    def share(self) -> float:
-        """Largest magnitude relative to the range; infinite if the first run is constant."""
-        return 0.0 if not self.largest else self.largest / self.range if self.range else np.inf
-
-
-def flight_differences(runs: Sequence[ReportedRun]) -> list[list[Difference]]:
-    """Return the differences of all other runs from the first one, by panel, in double precision."""
-    found = []
-    for panel in runs[0].curves.panels.values():
-        if panel.group in COMPARED and not panel.name.startswith("error_"):
-            each = [_difference(panel, runs[0], index, run) for index, run in enumerate(runs[1:], 1)]
-            found.append([difference for difference in each if difference is not None])
-    return [each for each in found if each]
-
-
-def _difference(panel: Panel, first: ReportedRun, index: int, run: ReportedRun) -> Difference | None:
-    ours, theirs = first.curves.actual(panel.name), run.curves.actual(panel.name)
-    if ours is None or theirs is None:
-        return None
-    clock, other_clock = (np.round(each.curves.time * 1e9).astype(np.int64) for each in (first, run))
-    _, rows, other_rows = np.intersect1d(clock, other_clock, assume_unique=True, return_indices=True)
-    y = theirs[other_rows] - ours[rows]
-    if not np.isfinite(y).any():
-        return None
-    return Difference(panel, index, first.curves.time[rows], y, float(np.ptp(ours[np.isfinite(ours)])))
-
-
-def _difference_plot(found: Sequence[Difference], runs: Sequence[ReportedRun], numbers: Numbers) -> Plot:
-    panel, curves, notes = found[0].panel, [], []
-    for each in sorted(found, key=lambda difference: difference.largest, reverse=True):
-        x, y = numbers.add(each.time), numbers.add(each.y)
-        curves.append({"kind": Kind.actual, "label": f"less {runs[0].label}", "run": each.run, "x": x, "y": y})
-    for each in found:
-        text = quantity(each.largest, panel.unit, 3)
-        text += f" at {number(float(each.time[np.nanargmax(np.abs(each.y))]), 6)} s"
-        text += f" ({percent(each.share)})" if each.range else ""
-        notes.append(Markup('<span class="swatch run{}"></span> {}').format(each.run % 6, text))
-    shades = [shade for shade in _shades(panel, runs) if shade["kind"] == "fault"]
-    return Plot(f"difference_{panel.name}", panel.title, panel.unit, "differences", curves, shades=shades, notes=notes)
 
 
 def _plot(panel: Panel, runs: Sequence[ReportedRun], numbers: Numbers) -> Plot:
@@ -292,29 +205,14 @@ def _belongs(event: Event, panel: Panel) -> bool:
     return event.kind == "fault" or (event.kind == "tube" and panel.shading == "tube")
 
 
-def _picture(runs: Sequence[ReportedRun]) -> Picture:
+def _picture(runs: Sequence[ReportedRun], plots: Sequence[Plot], numbers: Numbers) -> Picture:
+    """Return the picture of the flights; only a single flight shows its nominal trajectory."""
     end = max(run.duration for run in runs) or 1.0
     faults = [event for run in runs for event in run.events if event.kind == "fault"]
     shades = sorted({(event.start, end if event.end is None else event.end) for event in faults})
-    panels = {panel.name: panel for panel in all_panels(runs)}
-    return picture([_drawing(panels[name], end, runs) for name in PICTURED if name in panels], end, shades)
-
-
-def _drawing(panel: Panel, end: float, runs: Sequence[ReportedRun]) -> Drawing:
-    """Return a panel of the picture with the flights on top; only a single flight shows its nominal trajectory."""
-    kinds = [Kind.bound, Kind.reference, Kind.nominal, Kind.actual]
-    if len(runs) > 1:
-        kinds.remove(Kind.nominal)
-    lines: list[Line] = []
-    for kind in kinds:
-        for index, run in enumerate(runs):
-            for curve in run.curves.curves.get(panel.name, ()):
-                known = kind is not Kind.actual and any(np.array_equal(curve.y, line.y) for line in lines)
-                if curve.kind is kind and not known:
-                    own = kind in (Kind.actual, Kind.nominal)
-                    look = f"run{index % 6} {kind}" if own else str(kind)
-                    lines.append(Line(look, run.curves.over(curve), curve.y, index if own else None))
-    return drawing(panel.title, panel.unit, end, lines)
+    pictured = sorted((plot for plot in plots if plot.name in PICTURED), key=lambda plot: PICTURED.index(plot.name))
+    kinds = DRAWN if len(runs) == 1 else [kind for kind in DRAWN if kind != Kind.nominal]
+    return picture(pictured, numbers, end, shades, kinds=kinds)
 
 
 def _grouped(runs: Sequence[ReportedRun]) -> dict[Group, dict[str, Metric]]:

@@ -20,8 +20,6 @@ from hsv.pages.panels import LIVE_CURVES
 MAX_ROWS = 20_000
 """Maximum number of rows of the history; when it is reached, every second row is dropped."""
 
-_FIRST_ROWS = 1024
-
 _KEPT = 16
 """Number of messages kept per topic, enough to find the newest complete step."""
 
@@ -59,7 +57,6 @@ class Hub:
         self._status: dict[str, Any] = {"run": None, "settings": {}, "limits": {}}
         self.version = 0
         """Number of changes of :meth:`status`."""
-        self._waiting: list[dict[str, bytes]] = []
         self._reset()
 
     def start_run(self, run_id: str, period: float, last_step: int) -> None:
@@ -90,33 +87,31 @@ class Hub:
         with self._lock:
             self._note(words, round(self.time * 1e-9 / self._period) if step is None else step, warning)
 
-    def sample(self) -> bool:
-        """Store the newest complete step if it is new; return whether it is."""
-        step = self._newest_step()
-        if step is None:
-            return False
-        self._sampled = step[0]
-        self._waiting.append(step[1])
-        if len(self._waiting) > MAX_ROWS:
-            self._waiting = self._waiting[::2]
-        return True
-
-    def decode(self, limit: int = MAX_ROWS) -> None:
-        """Decode stored steps into rows of the history, at most ``limit`` of them, oldest first."""
-        waiting, self._waiting = self._waiting[:limit], self._waiting[limit:]
-        for serialized in waiting:
-            messages = {topic: self._decode(topic, data) for topic, data in serialized.items()}
-            stamp = messages[STATE].header.stamp
-            values = [stamp.sec + 1e-9 * stamp.nanosec]
-            for _, curve in LIVE_CURVES:
-                message = messages.get(curve.topic)
-                values.append(np.nan if message is None else curve.value(partial(_field, message)))
-            with self._lock:
-                if self._count == len(self._rows):
-                    self._make_room()
-                self._rows[self._count] = values
-                self._count += 1
-                self._update(self._status_of(messages))
+    def sample(self) -> None:
+        """Add a row to the history if a new step is complete; the newest is taken."""
+        kept = {topic: self._latest[topic] for topic in self._topics if self._latest[topic]}
+        if not kept.keys() >= self._steady:
+            return
+        # The messages of a step arrive one after the other: some topics may already have later messages.
+        time = min(messages[-1][0] for messages in kept.values())
+        step = {topic: next((data for at, data in messages if at == time), b"") for topic, messages in kept.items()}
+        if time <= self._sampled or b"" in step.values():
+            return
+        self._sampled = time
+        messages = {topic: self._decode(topic, data) for topic, data in step.items()}
+        values = [time * 1e-9]
+        for _, curve in LIVE_CURVES:
+            message = messages.get(curve.topic)
+            values.append(np.nan if message is None else curve.value(partial(_field, message)))
+        with self._lock:
+            if self._count == len(self._rows):
+                thinned = self._rows[::2].copy()
+                self._count = len(thinned)
+                self._rows[: self._count] = thinned
+                self._generation += 1
+            self._rows[self._count] = values
+            self._count += 1
+            self._update(self._status_of(messages))
 
     def history(self, generation: int, first: int) -> History:
         """Return the rows from ``first`` on for a reader of this ``generation``, or all rows if it is outdated."""
@@ -142,11 +137,9 @@ class Hub:
     def _reset(self) -> None:
         self._generation += 1
         self._latest: dict[str, deque[tuple[int, bytes]]] = defaultdict(lambda: deque(maxlen=_KEPT))
-        self._rows = np.empty((_FIRST_ROWS, 1 + len(LIVE_CURVES)), np.float32)
+        self._rows = np.empty((MAX_ROWS, 1 + len(LIVE_CURVES)), np.float32)
         self._count = 0
         self._sampled = -1
-        self._waiting = []
-        self._faults: dict[tuple[Any, ...], str] = {}
         self._period = 0.0
         self._status |= {"faults": [], "diagnostics": {}, "events": [], "ending": None, "tau": None}
         self._status |= {"tube_status": None, "nominal_status": 0}
@@ -155,10 +148,15 @@ class Hub:
         """Return the entries of the status from the messages of a step."""
         actuator = messages[ACTUATOR]
         faults = [
-            {"words": self._words(fault), "channel": fault.channel, "type": fault.type, "since": int(since)}
+            {"words": str(fault_in(fault)), "channel": fault.channel, "type": fault.type, "since": int(since)}
             for fault, since in zip(actuator.active, actuator.since, strict=True)
         ]
-        self._note_faults(faults, int(messages[STATE].step))
+        # The faults that have started or ended, scheduled or injected, are events.
+        before = self._status["faults"]
+        for fault in (fault for fault in faults if fault not in before):
+            self._note(f"{fault['words']} begins", fault["since"], True)
+        for fault in (fault for fault in before if fault not in faults):
+            self._note(f"{fault['words']} has ended", int(messages[STATE].step), False)
         status = {"faults": faults, "nominal_status": messages[NOMINAL].status}
         if TUBE_STATUS in messages:
             tube = messages[TUBE_STATUS]
@@ -169,48 +167,10 @@ class Hub:
         event = {"time": round(step * self._period, 9), "step": step, "words": words, "warning": warning}
         self._update({"events": [*self._status["events"], event][-_EVENTS:]})
 
-    def _note_faults(self, faults: list[dict[str, Any]], step: int) -> None:
-        """Add events for the faults that have started or ended, scheduled or injected."""
-        before = self._status["faults"]
-        for fault in (fault for fault in faults if fault not in before):
-            self._note(f"{fault['words']} begins", fault["since"], True)
-        for fault in (fault for fault in before if fault not in faults):
-            self._note(f"{fault['words']} has ended", step, False)
-
-    def _words(self, fault: Any) -> str:
-        """Return the description of a fault; it is cached, because it is slow to compute."""
-        key = fault.channel, fault.type, *fault.parameter_names, *fault.parameter_values
-        if key not in self._faults:
-            self._faults[key] = str(fault_in(fault))
-        return self._faults[key]
-
     def _update(self, values: Mapping[str, Any]) -> None:
         changed = {name: value for name, value in values.items() if self._status.get(name) != value}
         self._status |= changed
         self.version += bool(changed)
-
-    def _make_room(self) -> None:
-        if self._count < MAX_ROWS:
-            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
-        else:
-            self._generation += 1
-            thinned = self._rows[: self._count : 2].copy()
-            self._count = len(thinned)
-            self._rows[: self._count] = thinned
-
-    def _newest_step(self) -> tuple[int, dict[str, bytes]] | None:
-        kept = {topic: self._latest[topic] for topic in self._topics if self._latest[topic]}
-        if not kept.keys() >= self._steady:
-            return None
-        # The messages of a step arrive one after the other: some topics may already have later messages.
-        time = min(messages[-1][0] for messages in kept.values())
-        if time <= self._sampled:
-            return None
-        step = {
-            topic: next((data for stamp, data in reversed(messages) if stamp == time), b"")
-            for topic, messages in kept.items()
-        }
-        return (time, step) if all(step.values()) else None
 
 
 def _field(message: Any, path: str) -> Any:

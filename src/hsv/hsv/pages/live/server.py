@@ -84,11 +84,6 @@ class PageServer:
         """URL of the layout for Foxglove and Lichtblick."""
         return f"http://{HOST}:{self.port}{LAYOUT}"
 
-    @property
-    def watched(self) -> bool:
-        """Whether a page is open."""
-        return bool(self._changed)
-
     def publish(self) -> None:
         """Send new data of the hub to every client, as soon as the client is ready."""
         if self._changed:
