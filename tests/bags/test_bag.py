@@ -147,7 +147,7 @@ def test_a_bag_of_others_is_refused(kit, tmp_path):
 
 @pytest.mark.parametrize(
     ("data", "word"),
-    [(None, "holds no file"), (b"", "is empty"), (b"SQLite format 3\0", "not an MCAP"), (MCAP0_MAGIC, "truncated")],
+    [(None, "holds no file"), (b"", "truncated"), (b"SQLite format 3\0", "not an MCAP"), (MCAP0_MAGIC, "truncated")],
     ids=["empty directory", "empty file", "other format", "magic only"],
 )
 def test_unusable_input_is_one_clear_line(data, word, tmp_path):

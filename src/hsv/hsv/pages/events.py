@@ -47,18 +47,34 @@ class Event:
 
 def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
     """Return the events of ``bag``, whose ``description`` is that of :func:`hsv.bags.info.describe`."""
-    events = [
-        *_faults(description),
-        *_excursions(description),
-        *_uncertified(description),
-        *_saturation(bag),
-        *_ending(bag, description),
-    ]
+    tube = description["tube"] or {"excursions": ()}
+    outside = [Event(e["start_s"], e["end_s"], "tube", "error outside the invariant set") for e in tube["excursions"]]
+    events = [*_faults(description), *_joined(outside), *_saturation(bag)]
+    # These are properties of vehicle and hardware, not of a moment: one event at the start.
+    for steps, text in (
+        ("uncertified_steps", "vehicle outside the set that the tube is certified for"),
+        ("uncertified_hardware_steps", "hardware or air that the tube is not certified for"),
+    ):
+        if tube.get(steps):
+            events.append(_instant(description["start_s"], "warning", text, "tube_mpc"))
+    if text := _FAILURES.get(description["ending"]):
+        last = float(bag.columns(STATE)["header.stamp"][-1]) * 1e-9
+        events.append(_instant(last, "error", text, "plant"))
     with expecting_fields(bag.path):
         # Nodes report some things both in the log and in their diagnostics.
         reported = sorted([*_diagnostics(bag), *_log(bag)], key=lambda event: event.start)
         events += [*_joined(reported, within=1.5 * DIAGNOSTICS_PERIOD), *_parameter_changes(bag)]
     return sorted(events, key=lambda event: event.start)
+
+
+def _instant(time: float, kind: str, text: str, subject: str) -> Event:
+    return Event(time, time, kind, text, subject)
+
+
+def _messages(bag: Bag, topic: str) -> Iterator[tuple[float, Any]]:
+    """Yield time (s) and message of each message of a topic that the bag may have."""
+    for time, message in bag.decode(topic) if topic in bag.roles else ():
+        yield time * 1e-9, message
 
 
 def _faults(description: dict[str, Any]) -> Iterator[Event]:
@@ -71,22 +87,6 @@ def _faults(description: dict[str, Any]) -> Iterator[Event]:
         yield Event(fault["start_s"], fault["end_s"], "fault", text, fault["channel"])
 
 
-def _excursions(description: dict[str, Any]) -> list[Event]:
-    excursions = description["tube"]["excursions"] if description["tube"] else ()
-    return _joined(Event(e["start_s"], e["end_s"], "tube", "error outside the invariant set") for e in excursions)
-
-
-def _uncertified(description: dict[str, Any]) -> Iterator[Event]:
-    # These are properties of vehicle and hardware, not of a moment: one event at the start.
-    start, tube = description["start_s"], description["tube"] or {}
-    for steps, text in (
-        ("uncertified_steps", "vehicle outside the set that the tube is certified for"),
-        ("uncertified_hardware_steps", "hardware or air that the tube is not certified for"),
-    ):
-        if tube.get(steps):
-            yield Event(start, start, "warning", text, "tube_mpc")
-
-
 def _saturation(bag: Bag) -> Iterator[Event]:
     if COMMAND not in bag.roles:
         return
@@ -97,43 +97,30 @@ def _saturation(bag: Bag) -> Iterator[Event]:
         yield from _joined(Event(each["start_s"], each["end_s"], "saturation", text, name) for each in limited)
 
 
-def _ending(bag: Bag, description: dict[str, Any]) -> Iterator[Event]:
-    if text := _FAILURES.get(description["ending"]):
-        last = float(bag.columns(STATE)["header.stamp"][-1]) * 1e-9
-        yield Event(last, last, "error", text, "plant")
-
-
 def _diagnostics(bag: Bag) -> Iterator[Event]:
-    if DIAGNOSTICS not in bag.roles:
-        return
-    for time, message in bag.decode(DIAGNOSTICS):
+    for time, message in _messages(bag, DIAGNOSTICS):
         for status in message.status:
-            if status.level in _DIAGNOSTIC_LEVELS:
-                kind = _DIAGNOSTIC_LEVELS[status.level]
+            if kind := _DIAGNOSTIC_LEVELS.get(status.level):
                 node = status.name.partition(": ")[0]  # "node: task"
-                yield Event(time * 1e-9, time * 1e-9, kind, f"{node}: {status.message}", node)
+                yield _instant(time, kind, f"{node}: {status.message}", node)
 
 
 def _log(bag: Bag) -> Iterator[Event]:
     """Yield the warnings of this graph; another graph in the domain logs to the same topic."""
-    if ROSOUT not in bag.roles:
-        return
-    for time, message in bag.decode(ROSOUT):
+    for time, message in _messages(bag, ROSOUT):
         # A logger has the name of its node with dots for slashes.
         space, _, node = message.name.rpartition(".")
         if message.level >= LOG_WARNING and space == bag.namespace.strip("/").replace("/", "."):
             kind = "warning" if message.level == LOG_WARNING else "error"
-            yield Event(time * 1e-9, time * 1e-9, kind, f"{node}: {message.msg}", node)
+            yield _instant(time, kind, f"{node}: {message.msg}", node)
 
 
 def _parameter_changes(bag: Bag) -> Iterator[Event]:
-    if PARAMETER_EVENTS not in bag.roles:
-        return
-    for time, message in bag.decode(PARAMETER_EVENTS):
+    for time, message in _messages(bag, PARAMETER_EVENTS):
         names = ", ".join(parameter.name for parameter in message.changed_parameters)
         space, _, _ = message.node.rpartition("/")
-        if names and time > 0 and space == bag.namespace.rstrip("/"):
-            yield Event(time * 1e-9, time * 1e-9, "change", f"{message.node}: {names} changed", message.node)
+        if names and time > 0.0 and space == bag.namespace.rstrip("/"):
+            yield _instant(time, "change", f"{message.node}: {names} changed", message.node)
 
 
 def _joined(events: Iterable[Event], within: float = JOIN_WITHIN) -> list[Event]:

@@ -35,6 +35,7 @@ EVENTS_SHOWN = 200
 PICTURED = ("altitude", "velocity", "angle_of_attack", "level")
 """Panels of the picture at the top of the page."""
 
+
 def write_report(bags: Sequence[Bag], out: Path, *, units: UnitSystem = UnitSystem.metric) -> None:
     """Write the report of ``bags``, with common plots, to the HTML file ``out``.
 

@@ -56,11 +56,6 @@ def number(value: float, digits: int = 5) -> str:
     return f"{value:.{digits}g}".replace("-", "−")
 
 
-def percent(share: float) -> str:
-    """Return a share in percent with two significant digits; of large ones all digits before the point."""
-    return f"{number(float(f'{100.0 * share:.2g}'), 15)} %"
-
-
 def capitalised(text: str) -> str:
     """Return a text with its first letter in upper case, as a sentence begins."""
     return text[:1].upper() + text[1:]
