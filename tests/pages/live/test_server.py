@@ -29,7 +29,6 @@ def fly(hub, server, messages):
         hub.offer(*message)
         if number % A_STEP == 0:
             hub.sample()
-            server.publish()
 
 
 def rows(client, hub, count):

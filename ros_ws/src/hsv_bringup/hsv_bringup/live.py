@@ -136,7 +136,6 @@ class LiveNode(ProcessNode):
         if time.monotonic() >= self._next_plant_check:
             self._next_plant_check = time.monotonic() + _PLANT_CHECK
             self._check_plant()
-        self.page.publish()
 
     def wait_timeout(self) -> float:
         """Return the time (s) to the next poll."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -58,7 +57,7 @@ class Comparison:
         )
 
 
-def compare(expected: Track, actual: Track, ignored: Sequence[str] = (), tolerance: float = 0.0) -> Comparison:
+def compare(expected: Track, actual: Track, tolerance: float = 0.0) -> Comparison:
     """Compare two tracks of one topic, message by message at equal times.
 
     Floating-point numbers count as equal if |a - b| <= max(tolerance, tolerance max(|a|, |b|)), if both are NaN, or if
@@ -67,7 +66,6 @@ def compare(expected: Track, actual: Track, ignored: Sequence[str] = (), toleran
     Args:
         expected: Recorded messages.
         actual: Messages to compare with them.
-        ignored: Field paths to ignore.
         tolerance: Absolute and relative tolerance.
     """
     counts = len(expected.data), len(actual.data)
@@ -91,8 +89,6 @@ def compare(expected: Track, actual: Track, ignored: Sequence[str] = (), toleran
             found.append(Difference(expected.topic, step, time, name, a, b))
 
         for name in dict.fromkeys((*ours, *theirs)):
-            if name in ignored:
-                continue
             if name not in ours or name not in theirs:
                 note(0, name, name in ours, name in theirs)
             elif common:

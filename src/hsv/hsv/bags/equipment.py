@@ -24,11 +24,7 @@ def equipment_topics(bag: Bag) -> list[str]:
 
 
 def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the measurement error (n), SI, of each state with an error in any step.
-
-    Args:
-        topics: Columns of the topics of :func:`equipment_topics`, with equal steps row by row.
-    """
+    """Return the measurement error (n), SI, of each state with an error; ``topics`` have equal steps row by row."""
     if MEASUREMENT not in topics:
         return {}
     errors = state_columns(topics[MEASUREMENT], "state.") - state_columns(topics[STATE])
@@ -36,10 +32,7 @@ def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def held(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return masks (n) of the steps in which the link of measurement or command held its old payload.
-
-    A link without such steps is omitted; the argument is that of :func:`measurement_errors`.
-    """
+    """Return masks (n) of the steps in which a link held its old payload, for the links with such steps."""
     ends = {}
     if MEASUREMENT in topics:
         ends["measurement"] = state_columns(topics[STATE]), state_columns(topics[MEASUREMENT], "state.")
@@ -55,10 +48,7 @@ def _repeats(rows: np.ndarray) -> np.ndarray:
 
 
 def effectors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the positions (n), SI, over the period of each step, of the effectors that differ from their command.
-
-    The last position is NaN; the argument is that of :func:`measurement_errors`.
-    """
+    """Return the positions (n), SI, over the period of each step, the last NaN, of effectors that do not follow."""
     if ACTUATOR not in topics:
         return {}
     commanded = dict(zip(INPUT_NAMES, input_columns(topics[ACTUATOR]).T, strict=True))

@@ -71,16 +71,7 @@ class Structure:
     """
 
     def __init__(self, store: Typesdict, message_type: str, message: bytes) -> None:
-        """Determine the layout of ``message``.
-
-        Args:
-            store: Definitions of the type and its dependencies.
-            message_type: ``package/msg/Type``.
-            message: The message in CDR.
-
-        Raises:
-            MessageError: The message is not little-endian CDR, or is too short.
-        """
+        """Determine the layout of a ``message`` in CDR; refuse one that is not little-endian or too short."""
         if message[:2] != _LITTLE_ENDIAN:
             raise MessageError(
                 f"{message_type}: CDR that begins with {message[:2].hex()}, expected 0001, little-endian"
@@ -215,12 +206,7 @@ class StepMessages:
     """Conversion of the signals of a step to and from the messages of one topic."""
 
     def __init__(self, topic: str, store: Typestore | None = None) -> None:
-        """Prepare for a topic.
-
-        Args:
-            topic: A topic of :data:`hsv.bags.description.TOPICS`.
-            store: Definitions of the messages; None: the installed ones.
-        """
+        """Prepare for a topic of a step; ``store`` has the definitions of its messages, or the installed ones count."""
         self.type = TOPICS[topic]
         self._store = store or installed_types(self.type)
         carried = CARRIED.get(topic, {})
@@ -275,7 +261,6 @@ class StepMessages:
         return bytes(self._buffer)
 
     def _numbers(self, message: bytes) -> tuple[Any, ...]:
-        """Return seconds, nanoseconds, step and the needed signals of a message."""
         if self._received is None or not self._received.fits(message):
             structure = Structure(self._store.fielddefs, self.type, message)
             for signal, field in self._sequences.items():
@@ -326,11 +311,7 @@ def _size(signal: SignalType) -> int:
 
 @cache
 def installed_types(message_type: str) -> Typestore:
-    """Return the definitions of an installed type and its dependencies.
-
-    Raises:
-        RecordingError: The type is not installed.
-    """
+    """Return the definitions of an installed type and its dependencies."""
     return message_types([(message_type, definition(message_type))], message_type)
 
 

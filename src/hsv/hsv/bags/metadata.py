@@ -45,15 +45,7 @@ _Dumper.add_representer(
 def information(
     file: str, topics: Sequence[Topic], span: tuple[int, int], custom: Mapping[str, str], distro: str = DISTRO
 ) -> dict[str, Any]:
-    """Return the metadata of a bag with one file, with all keys that rosbag2 requires.
-
-    Args:
-        file: Name of the file.
-        topics: The topics with their numbers of messages.
-        span: First and last log time (ns); :data:`EMPTY_SPAN` without messages.
-        custom: Custom data.
-        distro: ROS 2 distribution of the recorder.
-    """
+    """Return the metadata of a bag with one file, with all keys that rosbag2 requires; ``span`` as EMPTY_SPAN."""
     start, duration = {"nanoseconds_since_epoch": span[0]}, {"nanoseconds": max(span[1] - span[0], 0)}
     count = sum(topic.count for topic in topics)
     return {

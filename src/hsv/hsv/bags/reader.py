@@ -17,7 +17,7 @@ from rosbags.interfaces.typing import ConstValue
 from rosbags.typesys.store import Typestore
 
 from hsv.bags.columns import Columns, Track
-from hsv.bags.description import INTERFACE_VERSION, ROOT, RUN, TOPICS, TRANSIENT_LOCAL, resolved
+from hsv.bags.description import INTERFACE_VERSION, LATCHED_TOPICS, ROOT, ROSOUT, RUN, TOPICS, resolved
 from hsv.bags.files import Unpacker, find_files
 from hsv.bags.metadata import (
     CUSTOM_DATA,
@@ -31,7 +31,7 @@ from hsv.bags.metadata import (
 )
 from hsv.bags.roles import TYPES, namespace_of, roles
 from hsv.bags.scan import Scan
-from hsv.bags.topic import Topic, recorded_qos, usual_qos
+from hsv.bags.topic import Topic, recorded_qos
 from hsv.bags.typestore import message_types
 from hsv.bags.units import Units, units_of
 from hsv.base.errors import RecordingError
@@ -107,7 +107,6 @@ class Bag:
         self.undecodable: dict[str, Topic] = {}
         """Topics of others that are not ROS 2 messages in CDR; only a recovery copies them."""
         self._messages: dict[str, list[Message]] = defaultdict(list)
-        self._profiles: dict[str, str] = {}
         self._columns: dict[str, Columns] = {}
         self._read()
         self._check()
@@ -267,11 +266,8 @@ class Bag:
         self.distro = str(recorded_by.get("ros_distro") or DISTRO)
         self.roles = roles({name: topic.type for name, topic in self.topics.items()}, self.custom_data, str(self.path))
         self.namespace = namespace_of(self.roles)
-        latched = set(map(self.name_of, TRANSIENT_LOCAL))
         for topics in (self.topics, self.undecodable):
-            for name, topic in topics.items():
-                qos = recorded_qos(self._profiles[name], latched=name in latched)
-                topics[name] = replace(topic, qos=qos, count=len(self._messages[name]))
+            topics.update((name, replace(topic, count=len(self._messages[name]))) for name, topic in topics.items())
 
     def _read_file(self, scan: Scan, unpacker: Unpacker) -> tuple[int, int, int, dict[str, Any]]:
         """Add the contents of a file; return the numbers of messages, orphans, attachments, and rosbag2's metadata."""
@@ -324,16 +320,16 @@ class Bag:
         if schema.name != (expected := _USUAL.get(name, schema.name)):
             raise RecordingError(f"{self.path}: topic {name} is {schema.name}, expected {expected}")
         text = schema.data.decode("utf-8-sig" if decodable else "utf-8", errors="surrogateescape")
+        latched = name == ROSOUT or schema.name in LATCHED_TOPICS.values()
         topic = Topic(
             name,
             schema.name,
             text.replace("\r\n", "\n") if decodable else text,
             channel.metadata.get("topic_type_hash", ""),
-            usual_qos(),  # depends on the roles of all topics
+            recorded_qos(channel.metadata.get("offered_qos_profiles", ""), latched=latched),
             schema_encoding=schema.encoding,
             encoding=channel.message_encoding,
         )
-        self._profiles.setdefault(name, channel.metadata.get("offered_qos_profiles", ""))
         first = (self.topics if decodable else self.undecodable).setdefault(name, topic)
         if (topic.type, topic.definition) != (first.type, first.definition):
             raise RecordingError(f"{self.path}: topic {name}: recorded with two definitions, expected one")

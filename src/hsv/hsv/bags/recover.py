@@ -21,16 +21,12 @@ RECOVERED = {"recovered": "true"}
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """Result of a recovery."""
+    """Result of a recovery of ``bag``: the directory of a new bag with so many messages, or its own if unchanged."""
 
     bag: Bag
-    """The original bag."""
     path: Path
-    """Directory of the new bag, or of the original if it was complete."""
     messages: int
-    """Number of messages in the result."""
     changed: bool
-    """Whether a new bag was written."""
 
 
 def recover(path: Path | str, target: Path | None = None) -> Recovery:

@@ -49,13 +49,7 @@ class Units:
 
 
 def units_of(definition: str, types: Typesdict, message_type: str) -> dict[str, Units]:
-    """Return the units of every field of a type, by field path as in :mod:`hsv.bags.columns`.
-
-    Args:
-        definition: Recorded definition with its dependencies.
-        types: Parsed definition.
-        message_type: ``package/msg/Type``.
-    """
+    """Return the units of every field of a type by field path, from its recorded and its parsed definition."""
     comments = _comments(definition, message_type)
     found: dict[str, Units] = {}
 

@@ -96,11 +96,7 @@ class BagWriter:
             self.add_topic(topic)
 
     def add_topic(self, topic: Topic) -> None:
-        """Add a topic at any time before its first message.
-
-        Raises:
-            RecordingError: The bag has a topic of this name.
-        """
+        """Add a topic before its first message; refuse a name that the bag has."""
         if topic.name in self._channels:
             raise RecordingError(f"topic {topic.name}: is in the bag already, expected a new name")
         self._channels[topic.name] = register(self._writer, topic, self._schemas)
@@ -108,17 +104,10 @@ class BagWriter:
         self._counts[topic.name] = 0
 
     def __contains__(self, topic: str) -> bool:
-        """Return whether the bag has this topic."""
         return topic in self._channels
 
     def write(self, topic: str, time_ns: int, data: bytes, publish_time: int | None = None) -> None:
-        """Write one message.
-
-        Args:
-            topic: Name of an added topic.
-            time_ns: Log time, simulated (ns).
-            data: The message in CDR with its header of four bytes.
-            publish_time: Publish time (ns); default: the log time.
+        """Write a message in CDR; its log time is simulated (ns), its publish time the same by default.
 
         Raises:
             RecordingError: The topic was not added, or the file cannot be written (no space left).
@@ -152,11 +141,7 @@ class BagWriter:
         self._pending = 0
 
     def close(self, custom_data: Mapping[str, str] | None = None) -> None:
-        """Finish the file and write metadata.yaml.
-
-        Args:
-            custom_data: Data known only at the end (outcome, wall time), added to the earlier ones.
-        """
+        """Finish the file and write metadata.yaml; ``custom_data`` known only at the end are added."""
         self.add_custom_data(custom_data or {})
         topics = [replace(topic, count=self._counts[name]) for name, topic in self._topics.items()]
         values = information(self.path.name, topics, self._span, self._custom_data, self._distro)

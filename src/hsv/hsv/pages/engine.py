@@ -107,14 +107,7 @@ def compressed(data: bytes) -> Markup:
 
 
 def render(template: str, *, plots: Sequence[Plot] = (), numbers: Numbers | None = None, **values: Any) -> str:
-    """Return a page.
-
-    Args:
-        template: File name of its template; one that ends in ``.html.j2`` escapes its values.
-        plots: The plots of the page.
-        numbers: The numbers that they draw, None where the page gets them otherwise, or has no plots.
-        values: What else the template names; ``described`` adds to the description for the script.
-    """
+    """Return a page of ``plots`` and their ``numbers``; ``described`` of the ``values`` is for the script, too."""
     environment = Environment(
         loader=PackageLoader("hsv.pages", "template"),
         autoescape=template.endswith(".html.j2"),
@@ -145,11 +138,7 @@ def _asset(name: str) -> Markup:
 
 
 def write_page(page: str, out: Path, error: type[HsvError]) -> None:
-    """Write a page to the HTML file ``out``.
-
-    Raises:
-        HsvError: The file cannot be written; of the type ``error``.
-    """
+    """Write a page to the HTML file ``out``; if that fails, raise the ``error``."""
     try:
         out.write_text(page, encoding="utf-8")
     except OSError as refused:

@@ -37,12 +37,7 @@ PICTURED = ("altitude", "velocity", "angle_of_attack", "level")
 
 
 def write_report(bags: Sequence[Bag], out: Path, *, units: UnitSystem = UnitSystem.metric) -> None:
-    """Write the report of ``bags``, with common plots, to the HTML file ``out``.
-
-    Args:
-        bags: One flight, or several flights to compare.
-        out: File to write.
-        units: Initial units of the page.
+    """Write the report of ``bags``, with common plots, to the HTML file ``out``; ``units`` are its initial units.
 
     Raises:
         RecordingError: A bag holds no flight, or the file cannot be written.

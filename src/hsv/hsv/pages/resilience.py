@@ -25,13 +25,7 @@ SECTIONS = {"map": "Map of survival", "controllers": "Controllers", "cells": "Nu
 def write_results(results: ResilienceResults, out: Path, command: str) -> list[Path]:
     """Write page, Markdown and the scenario of each cell's worst flight into ``out``; return page and Markdown.
 
-    Args:
-        results: Results of a resilience campaign.
-        out: Folder to write to.
-        command: Command that produces the results, printed on the page.
-
-    Raises:
-        CampaignError: A file cannot be written.
+    Both print the ``command`` that produces the results. A CampaignError says which file cannot be written.
     """
     folder = out / FLIGHTS
     try:

@@ -56,14 +56,7 @@ class _Replica:
         """Whether the plant has reported the end of the flight."""
 
     def step(self, inputs: Mapping[str, bytes]) -> dict[str, bytes]:
-        """Step the component, and return and keep its output messages by topic.
-
-        Args:
-            inputs: Input messages by topic, without those of a step before the first; none for the first state.
-
-        Raises:
-            RunError: A message cannot be used.
-        """
+        """Step the component with its inputs by topic, none for the first state; return and keep the outputs."""
         signals = Signals()
         for topic, message in inputs.items():
             self._inputs[topic].unpack(message, signals)
@@ -79,13 +72,7 @@ class _Replica:
 
 
 def replay(bag: Bag, process: Process, values: ParameterSections, progress: Progress) -> ProcessComparison:
-    """Feed ``process`` with its recorded inputs and compare its outputs.
-
-    Args:
-        bag: The recorded run.
-        process: The process under test.
-        values: Parameters of the nodes; the component under test takes its own.
-        progress: Called with the progress.
+    """Feed ``process`` with its recorded inputs, step it with its parameters in ``values``, and compare its outputs.
 
     Raises:
         RecordingError: A topic is missing or recorded with another definition.
@@ -100,17 +87,7 @@ def replay(bag: Bag, process: Process, values: ParameterSections, progress: Prog
 
 
 def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progress) -> list[ProcessComparison]:
-    """Repeat the whole loop in this process and compare every step topic.
-
-    Args:
-        bag: The recorded run.
-        controller: Name of the controller that closes the loop.
-        values: Parameters of the nodes.
-        progress: Called with the progress.
-
-    Raises:
-        As :func:`replay`.
-    """
+    """Repeat the whole loop with the named ``controller`` and compare every step topic; it raises as :func:`replay`."""
     require(bag, step_topics(controller))
     processes = processes_of(controller, estimated(values))
     known = any(COMMAND in process.outputs for process in processes.values())
@@ -136,7 +113,7 @@ def fly(
         controller: Name of the controller that closes the loop.
         values: Parameters of the nodes.
         progress: Called with the progress.
-        recorded: The recorded commands of a controller that is an external node.
+        recorded: Recorded commands of a controller that is an external node.
         limit: Number of steps of a run that was broken off; None: the flight ends as planned.
     """
     replicas = [_Replica(process, values, types) for process in processes_of(controller, estimated(values)).values()]

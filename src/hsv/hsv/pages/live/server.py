@@ -36,6 +36,9 @@ LONGEST_REQUEST = 10_000
 GOING_AWAY = 1001
 """WebSocket close code of a server that stops."""
 
+PERIOD = 0.05
+"""Time between two looks for new data, s."""
+
 CLOSE_TIMEOUT = 1.0
 """Time to wait for clients at the end, s."""
 
@@ -56,7 +59,8 @@ class PageServer:
         self._token = secrets.token_urlsafe(16)
         self.commands: SimpleQueue[tuple[Command, Answer]] = SimpleQueue()
         """Queue of valid commands with the functions that answer them."""
-        self._changed: set[asyncio.Event] = set()
+        self._senders: set[asyncio.Task[None]] = set()
+        self._ended = False
         self._loop = asyncio.new_event_loop()
         try:
             self._server = self._loop.run_until_complete(self._listen(port))
@@ -84,11 +88,6 @@ class PageServer:
         """URL of the layout for Foxglove and Lichtblick."""
         return f"http://{HOST}:{self.port}{LAYOUT}"
 
-    def publish(self) -> None:
-        """Send new data of the hub to every client, as soon as the client is ready."""
-        if self._changed:
-            self._loop.call_soon_threadsafe(self._wake)
-
     def close(self) -> None:
         """Send the last data and disconnect the clients."""
         asyncio.run_coroutine_threadsafe(self._leave(), self._loop).result()
@@ -97,9 +96,9 @@ class PageServer:
         self._loop.close()
 
     async def _leave(self) -> None:
-        self._wake()
-        with suppress(TimeoutError):
-            await asyncio.wait_for(self._sent(), CLOSE_TIMEOUT)
+        self._ended = True
+        if self._senders:
+            await asyncio.wait(self._senders, timeout=CLOSE_TIMEOUT)
         self._server.close(code=GOING_AWAY, reason="the live view has ended")
         with suppress(TimeoutError):
             await asyncio.wait_for(self._server.wait_closed(), CLOSE_TIMEOUT)
@@ -108,15 +107,6 @@ class PageServer:
         for task in unread:
             task.cancel()
         await asyncio.gather(*unread, return_exceptions=True)
-
-    async def _sent(self) -> None:
-        await asyncio.sleep(0)
-        while any(event.is_set() for event in self._changed):
-            await asyncio.sleep(0.01)
-
-    def _wake(self) -> None:
-        for changed in self._changed:
-            changed.set()
 
     async def _listen(self, port: int) -> Server:
         # Suppress messages about clients without a valid handshake.
@@ -153,25 +143,23 @@ class PageServer:
         return response
 
     async def _serve(self, connection: ServerConnection) -> None:
-        changed = asyncio.Event()
-        changed.set()
-        self._changed.add(changed)
-        sender = asyncio.create_task(self._send(connection, changed))
+        sender = asyncio.create_task(self._send(connection))
+        self._senders.add(sender)
         try:
             async for text in connection:
                 self._receive(connection, text)
         except ConnectionClosed:
             pass
         finally:
-            self._changed.discard(changed)
+            self._senders.discard(sender)
             sender.cancel()
 
-    async def _send(self, connection: ServerConnection, changed: asyncio.Event) -> None:
-        """Send changes of the hub, as fast as the client reads."""
-        generation, rows, version = 0, 0, -1
+    async def _send(self, connection: ServerConnection) -> None:
+        """Send changes of the hub, as fast as the client reads, and the last ones at the end."""
+        generation, rows, version, ended = 0, 0, -1, False
         with suppress(ConnectionClosed):
-            while True:
-                await changed.wait()
+            while not ended:
+                ended = self._ended
                 if self._hub.version != version:
                     version = self._hub.version
                     await connection.send(json_text({"kind": "status", **self._hub.status()}))
@@ -182,8 +170,7 @@ class PageServer:
                 rows = history.first + len(history.rows)
                 if len(history.rows):
                     await connection.send(history.rows.tobytes())
-                if self._hub.version == version:
-                    changed.clear()
+                await asyncio.sleep(PERIOD)
 
     def _receive(self, connection: ServerConnection, text: str | bytes) -> None:
         """Validate a request and queue its command; every request is answered."""
