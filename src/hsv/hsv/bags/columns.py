@@ -47,16 +47,10 @@ class Columns(dict[str, NDArray[Any]]):
 
 
 def read_at_once(types: Typesdict, message_type: str, messages: Sequence[bytes]) -> Read | None:
-    """Return a function that reads messages of one layout; ten thousand take milliseconds.
+    """Return a function that reads ``messages`` (at least one, CDR) of one layout at once.
 
-    Args:
-        types: Definitions of the type and its dependencies.
-        message_type: ``package/msg/Type``.
-        messages: At least one message in CDR with its header.
-
-    Returns:
-        The function, or None if the messages differ in layout, are big-endian, or have texts or messages in a sequence;
-        then use :func:`read_one_by_one`.
+    It is None if they differ in layout, are big-endian, or have texts or messages in a sequence; then use
+    :func:`read_one_by_one`.
     """
     try:
         structure = Structure(types, message_type, messages[0])
@@ -115,11 +109,7 @@ def _objects(values: Sequence[Any] | NDArray[Any]) -> NDArray[Any]:
 
 @contextmanager
 def expecting_fields(source: object) -> Iterator[None]:
-    """Convert errors of a message with a missing field or an invalid signal to RecordingErrors.
-
-    Raises:
-        RecordingError: The error with ``source``, the type or topic of the message, and the field.
-    """
+    """Convert errors of a message with a missing field or an invalid signal to RecordingErrors that name ``source``."""
     try:
         yield
     except AttributeError as error:
@@ -161,22 +151,14 @@ class Track:
         return Track(self.topic, self.type, self.types, times, data, self.source)
 
     def columns(self) -> Columns:
-        """Return all decoded messages, one array per field; see :mod:`hsv.bags.columns`.
-
-        Raises:
-            RecordingError: A message does not fit its definition.
-        """
+        """Return all decoded messages, one array per field; raise a RecordingError if one does not fit."""
         types = self.types.fielddefs
         read = read_at_once(types, self.type, self.data) if self.data else None
         read = read or read_one_by_one([message for _, message in self.decode()])
         return columns_of(types, self.type, read, f"{self.source}: topic {self.topic}")
 
     def decode(self) -> Iterator[tuple[int, Any]]:
-        """Yield time (ns) and deserialized message of each message.
-
-        Raises:
-            RecordingError: A message does not fit its definition.
-        """
+        """Yield time (ns) and deserialized message; raise a RecordingError if one does not fit its definition."""
         for time, message in zip(self.times, self.data, strict=True):
             try:
                 yield time, deserialized(self.types, message, self.type)

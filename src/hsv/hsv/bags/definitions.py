@@ -43,11 +43,7 @@ def definition(message_type: str) -> str:
 
 
 def type_hash(message_type: str) -> str:
-    """Return the hash of a type (``RIHS01_`` and 64 digits) from its installed description.
-
-    Raises:
-        RecordingError: The type is not installed.
-    """
+    """Return the hash of a type (``RIHS01_`` and 64 digits) from its installed description."""
     description = json.loads(_share_file(message_type, ".json").read_text(encoding="utf-8"))
     return next(str(row["hash_string"]) for row in description["type_hashes"] if row["type_name"] == message_type)
 

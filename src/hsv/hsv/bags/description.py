@@ -7,15 +7,13 @@ records the names of its topics by role.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import combinations
 from typing import Any
 
 from hsv.base.errors import ParameterError
 from hsv.control.controllers import NODE
 from hsv.flight import blocks
-from hsv.flight.blocks import LOOP, Block
+from hsv.flight.blocks import Block
 from hsv.model import signals
 from hsv.model.signals import SignalType
 
@@ -181,36 +179,32 @@ RECORDER = NodeDescription(
 )
 
 
-def _publisher(topic: str) -> Block:
-    """Return the block that publishes a topic: the last in the loop with an output among its signals."""
-    return next(block for block in reversed(LOOP) if set(block.outputs) & set(CARRIED[topic]))
+def _stepping(
+    block: Block, package: str, publishes: tuple[str, ...], subscribes: tuple[str, ...], **others: Any
+) -> NodeDescription:
+    own = {"known_by": TOPICS[publishes[0]], "block": block} | others
+    return NodeDescription(block.name, package, block.name, publishes, subscribes, **own)
 
 
-def _carrying(required: Iterable[SignalType]) -> tuple[str, ...]:
-    """Return the smallest set of topics that contains all ``required`` signals; the first one if there are several."""
-    choices = (chosen for count in range(len(CARRIED) + 1) for chosen in combinations(CARRIED, count))
-    return next(chosen for chosen in choices if set(required) <= {s for topic in chosen for s in CARRIED[topic]})
-
-
-def _stepping(block: Block, package: str, first: str, **others: Any) -> NodeDescription:
-    """Return the node that steps ``block``; the type of the topic ``first`` identifies it."""
-    publishes = tuple(topic for topic in CARRIED if _publisher(topic) is block)
-    needed = _carrying((*block.inputs, *block.delayed))
-    delayed = tuple(topic for topic in needed if not {*CARRIED[topic]} & {*block.inputs})
-    subscribes = (*delayed, *(topic for topic in needed if topic not in delayed))
-    return NodeDescription(
-        block.name, package, block.name, publishes, subscribes, TOPICS[first], block=block, delayed=delayed, **others
-    )
-
-
-ESTIMATOR = _stepping(blocks.NOTCH_FILTER, "hsv_ctrl", FILTERED_STATE)
+NOTCH_FILTER = _stepping(blocks.NOTCH_FILTER, "hsv_ctrl", (FILTERED_STATE,), (MEASUREMENT,))
+ESTIMATOR = replace(NOTCH_FILTER, subscribes=(COMMAND, MEASUREMENT), delayed=(COMMAND,))
 """The notch filter node with an estimator, which also subscribes to the commands."""
 
-NOTCH_FILTER = replace(ESTIMATOR, subscribes=_carrying(blocks.NOTCH_FILTER.inputs), delayed=())
-NOMINAL_TRAJECTORY = _stepping(blocks.NOMINAL_TRAJECTORY, "hsv_ctrl", NOMINAL, announces=(REFERENCE,))
-FAULT_INJECTOR = _stepping(blocks.FAULT_INJECTOR, "hsv_plant", ACTUATOR)
+NOMINAL_TRAJECTORY = _stepping(
+    blocks.NOMINAL_TRAJECTORY, "hsv_ctrl", (NOMINAL,), (MEASUREMENT,), announces=(REFERENCE,)
+)
+FAULT_INJECTOR = _stepping(blocks.FAULT_INJECTOR, "hsv_plant", (ACTUATOR,), (COMMAND,))
+PLANT = _stepping(
+    blocks.VEHICLE,
+    "hsv_plant",
+    (MEASUREMENT, STATE, FORCES, CLOCK),
+    (ACTUATOR,),
+    known_by=TOPICS[STATE],
+    announces=(RUN, LAST_STATE),
+    delayed=(ACTUATOR,),
+)
 
-_TUBE = _stepping(blocks.CONTROLLER, "hsv_ctrl", COMMAND)
+_TUBE = _stepping(blocks.CONTROLLER, "hsv_ctrl", (COMMAND, TUBE_STATUS), (FILTERED_STATE, NOMINAL))
 
 CONTROLLER = replace(_TUBE, publishes=(COMMAND,))
 """The node of a custom controller class, named by the parameter ``controller``."""
@@ -219,9 +213,6 @@ TUBE_MPC, ROBUST_MPC = (replace(_TUBE, name=name, executable=name) for name in (
 """Controllers with their own node, which publish diagnostics of the tube as well."""
 
 CONTROLLERS = {node.name: node for node in (TUBE_MPC, ROBUST_MPC)}
-
-PLANT = _stepping(blocks.VEHICLE, "hsv_plant", STATE, announces=(RUN, LAST_STATE))
-PLANT = replace(PLANT, publishes=(*PLANT.publishes, CLOCK))
 
 COMPOSED = NodeDescription("composed", "hsv_bringup", "composed", (), ())
 """All nodes of the graph in one process."""

@@ -46,11 +46,7 @@ def input_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarra
 
 
 def flight_data(bag: Bag) -> FlightData:
-    """Return the flight in ``bag`` for the steps contained in every topic.
-
-    Raises:
-        RecordingError: A topic is missing, or no step is complete.
-    """
+    """Return the flight in ``bag`` for the steps contained in every topic; raise a RecordingError without any."""
     rows = joined(bag, (STATE, NOMINAL, COMMAND))
     state, nominal, command = rows[STATE], rows[NOMINAL], rows[COMMAND]
     status = bag.columns(ACTUATOR)
@@ -69,11 +65,7 @@ def flight_data(bag: Bag) -> FlightData:
 
 
 def flight_fingerprint(bag: Bag) -> str | None:
-    """Return the fingerprint of the flight in ``bag``, or ``None`` if steps are missing.
-
-    Raises:
-        RecordingError: A topic is missing, or no step is complete.
-    """
+    """Return the fingerprint of the flight in ``bag``, or ``None`` if steps are missing."""
     topics = (STATE, FILTERED_STATE, NOMINAL, COMMAND, ACTUATOR)
     state, filtered, nominal, command, actuator = joined(bag, topics).values()
     every = np.arange(len(state["step"]))

@@ -110,14 +110,10 @@ class Structure:
         return body.view(self.dtype)[:, 0]
 
     def select(self, chosen: Mapping[str, tuple[str, int]]) -> np.dtype[Any]:
-        """Return a structured type of the same size with the chosen fields.
+        """Return a structured type of the same size with the chosen fields, paths and sizes by their new names.
 
-        Args:
-            chosen: Path and size of each field by its new name. The path leads to a number, a sequence of numbers or a
-                message of numbers; the size is the number of consecutive numbers, :data:`VARYING` for a sequence.
-
-        Raises:
-            MessageError: The definition has no such field.
+        A path leads to a number, a sequence of numbers (size :data:`VARYING`) or a message of so many numbers. A
+        MessageError names a field that the definition lacks.
         """
         names, formats, offsets = list(self._places), [], []
         for path, size in chosen.values():
@@ -233,12 +229,7 @@ class StepMessages:
         return int(self._numbers(message)[2])
 
     def unpack(self, message: bytes, signals: Signals) -> None:
-        """Set stamp, step and the needed signals from a message; on an error nothing is set.
-
-        Raises:
-            MessageError: The bytes are not a message of the type.
-            SignalError: A signal has an invalid size or value.
-        """
+        """Set stamp, step and the needed signals from a message; on a MessageError or SignalError nothing is set."""
         seconds, nanoseconds, step, *values = self._numbers(message)
         found = dict(zip(self._needed, values, strict=True))
         if self._has_faults:
@@ -321,11 +312,7 @@ def fault_fields(fault: Fault) -> tuple[str, str, list[str], NDArray[np.float64]
 
 
 def fault_in(message: Any) -> Fault:
-    """Return the fault in a message Fault.
-
-    Raises:
-        ParameterError: An unknown channel, type or parameter, or a value that is not admitted.
-    """
+    """Return the fault in a message Fault; a ParameterError names what is unknown or not admitted."""
     from hsv.model.faults.table import Fault  # imported here because most nodes need no faults
 
     names, values = message.parameter_names, message.parameter_values
@@ -335,11 +322,7 @@ def fault_in(message: Any) -> Fault:
 
 
 def active_faults(message: Any) -> tuple[ActiveFault, ...]:
-    """Return the faults in a message Actuator with their first steps.
-
-    Raises:
-        SignalError: A fault is invalid (see :func:`fault_in`), or the number or value of the first steps is wrong.
-    """
+    """Return the faults in a message Actuator with their first steps; a SignalError names what is wrong."""
     from hsv.model.faults.schedule import ActiveFault
 
     active, since = message.active, message.since

@@ -167,11 +167,7 @@ class Bag:
         return Track(found.name, found.type, self.types, times, data, str(self.path))
 
     def text(self, name: str) -> str:
-        """Return an attachment as text.
-
-        Raises:
-            RecordingError: The attachment is not in the bag or is not text.
-        """
+        """Return an attachment as text; a RecordingError says that it is not in the bag or no text."""
         if name not in self.attachments:
             raise RecordingError(f"{self.path}: no attachment {name}, expected a bag recorded by hsv run")
         try:
@@ -184,11 +180,7 @@ class Bag:
         return {name: value for name, _, value in self.types.fielddefs[self._topic(topic).type][0]}
 
     def constant(self, topic: str, name: str) -> ConstValue:
-        """Return a constant in the recorded definition of a topic's type.
-
-        Raises:
-            RecordingError: The definition has no constant of this name.
-        """
+        """Return a constant in the recorded definition of a topic's type, or raise a RecordingError without it."""
         found = self.constants(topic)
         if name not in found:
             raise RecordingError(f"{self.path}: definition of {self._topic(topic).type}: no constant {name}")
@@ -216,7 +208,6 @@ class Bag:
         return np.array([message.log_time for message in self._messages[name]], np.uint64)
 
     def _stamps(self, topic: str, messages: list[bytes]) -> NDArray[np.int64]:
-        """Return the stamps (n,) of the messages of a step topic, ns; they follow the header of the CDR."""
         if any(len(message) < _STAMP_END for message in messages):
             raise RecordingError(f"{self.path}: topic {topic}: a message of less than {_STAMP_END} bytes")
         order = ">" if messages and messages[0].startswith(_BIG_ENDIAN) else "<"

@@ -24,11 +24,7 @@ def cut_off(bag: Bag) -> bool:
 
 
 def joined(bag: Bag, topics: Sequence[str]) -> dict[str, Columns]:
-    """Return the columns of ``topics`` for the steps that all of them have, with equal steps row by row.
-
-    Raises:
-        RecordingError: A topic is missing or has no step numbers, or no step is in all topics.
-    """
+    """Return the columns of ``topics`` for the steps that all have, row by row; raise a RecordingError without any."""
     columns = {topic: bag.columns(topic) for topic in topics}
     steps = [found["step"] for found in columns.values()]
     common = steps[0]

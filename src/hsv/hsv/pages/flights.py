@@ -106,11 +106,7 @@ class ReportedRun:
 
 
 def reported_runs(bags: Sequence[Bag]) -> list[ReportedRun]:
-    """Return the runs for a report, one for each of ``bags``, with distinct labels.
-
-    Raises:
-        RecordingError: A bag holds no flight.
-    """
+    """Return the runs for a report, one for each of ``bags``, with distinct labels."""
     return [_reported_run(bag, label) for bag, label in zip(bags, labels(bags), strict=True)]
 
 
@@ -149,11 +145,7 @@ def _scenario(text: str, name: str) -> tuple[Scenario | None, str]:
 
 
 def flight_curves(bag: Bag) -> FlightCurves:
-    """Return the curves of ``bag`` at the steps contained in all their topics.
-
-    Raises:
-        RecordingError: A topic is missing, or no step is complete.
-    """
+    """Return the curves of ``bag`` at the steps contained in all their topics."""
     topics = dict.fromkeys(curve.topic for panel in PANELS for curve in panel.curves)
     topics |= dict.fromkeys(equipment_topics(bag))
     if TUBE_STATUS not in bag.roles:  # a custom controller has no tube

@@ -75,10 +75,6 @@ def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
         bag: Any bag of a flight.
         design: Parameter file of the design; where none is given, that of ``scenario``.
         scenario: Name of a shipped scenario, or path of a TOML file.
-
-    Raises:
-        ScenarioError: The scenario is not acceptable.
-        DesignError: The design is not acceptable.
     """
     files = {}
     if scenario is not None:
@@ -98,13 +94,7 @@ def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
 def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
     """Return the parameters of the nodes in a recorded run, with what was changed in flight: faults, tau, commands.
 
-    Args:
-        bag: A bag of our recorder, or one that :func:`supply` gave what it lacks.
-        design: Parameter file to put in place of the attached design.
-
-    Raises:
-        RecordingError: The bag carries no parameters, or none that are acceptable.
-        DesignError: ``design`` is not acceptable.
+    A ``design`` takes the place of the attached one. A RecordingError says that the parameters are missing or wrong.
     """
     for name in (DESIGN, SCENARIO):
         if name not in bag.attachments:
@@ -166,11 +156,7 @@ def broken_off(bag: Bag) -> bool:
 
 
 def refuse_vacuous(bag: Bag) -> None:
-    """Refuse a bag whose replay would be meaningless.
-
-    Raises:
-        RecordingError: The controller was active for less than ten seconds of simulated time, or there is no step.
-    """
+    """Refuse a bag whose replay would be meaningless, since its controller was active for less than ten seconds."""
     command, nominal = joined(bag, (COMMAND, NOMINAL)).values()
     deviation = input_columns(command) - input_columns(nominal, "reference_input.")
     active = np.abs(deviation).max(axis=1, initial=0.0) > ACTIVE_INPUT
