@@ -182,7 +182,7 @@ RECORDER = NodeDescription(
 def _stepping(
     block: Block, package: str, publishes: tuple[str, ...], subscribes: tuple[str, ...], **others: Any
 ) -> NodeDescription:
-    own = {"known_by": TOPICS[publishes[0]], "block": block} | others
+    own: dict[str, Any] = {"known_by": TOPICS[publishes[0]], "block": block} | others
     return NodeDescription(block.name, package, block.name, publishes, subscribes, **own)
 
 

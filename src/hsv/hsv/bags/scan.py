@@ -98,7 +98,8 @@ class Scan:
         data, whole = self._file.unpacked(chunk.data, chunk.compression)
         if not whole or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
             return [], "a chunk"
-        found, position = [], 0
+        found: list[kinds.McapRecord] = []
+        position = 0
         while position < len(data):
             record, position = _record(memoryview(data), position)
             if not position:

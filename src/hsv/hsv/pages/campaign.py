@@ -146,9 +146,9 @@ def _sorted(results: Results, failed: Share, numbers: Numbers) -> Picture:
     """Return the picture of the metric that fails most: the sorted magnitudes of all flights, and the limit."""
     values = np.sort(np.abs(results.column(failed.name)))  # flights that do not define the metric come last, as NaN
     across = 100.0 * (np.arange(len(values)) + 0.5) / len(values)
-    limit = {"kind": "bound", "run": None, "x": np.array([0.0, 100.0]), "y": np.full(2, failed.limit)}
-    flights = {"kind": "actual", "run": 0, "x": across, "y": values}
-    curves = [curve | {axis: numbers.add(curve[axis]) for axis in "xy"} for curve in (limit, flights)]
+    limit = "bound", None, np.array([0.0, 100.0]), np.full(2, failed.limit)
+    lines = (limit, ("actual", 0, across, values))
+    curves = [{"kind": kind, "run": run, "x": numbers.add(x), "y": numbers.add(y)} for kind, run, x, y in lines]
     title = f"{capitalised(in_words(failed.name))}, magnitude"
     plot = Plot("sorted", title, OUTCOMES[failed.name], "", curves, share=is_share(failed.name))
     return picture([plot], numbers, 100.0, axis="flights, in order of magnitude [%]")
