@@ -24,11 +24,10 @@ _FRAME = struct.Struct("<BQ")
 """Opcode and length at the start of a record."""
 # The start of a chunk, an attachment or an end of data with a length below 2^40.
 _CANDIDATE = re.compile(rb"(?=[\x06\x09\x0f].{5}\x00{3})", re.DOTALL)
+# What the package raises for wrong lengths and texts.
 _DAMAGE = (EndOfFile, struct.error, UnicodeDecodeError, OverflowError, MemoryError)
-"""Exceptions of the package for wrong lengths and texts."""
 _KINDS = {opcode: getattr(kinds, opcode.name.title().replace("_", "")) for opcode in Opcode}
-_PRIVATE = 0x80
-"""First opcode of the records of other programs."""
+_PRIVATE = 0x80  # the first opcode of the records of other programs
 
 
 class Scan:
@@ -49,8 +48,7 @@ class Scan:
     def records(self) -> Iterator[kinds.McapRecord]:
         """Yield every intact record of the data section; chunks are replaced by their records.
 
-        Data with a wrong checksum, or without a valid record, are skipped and added to :attr:`damages`. A record cut
-        off at the end of the file, as left by a killed writer, is skipped as well.
+        Damaged data are skipped and listed, a record cut off at the end, as left by a killed writer, is not listed.
         """
         data, position, chunks = self._data, len(MCAP0_MAGIC), set[int]()
         if not MCAP0_MAGIC.startswith(bytes(data[:position])):
@@ -64,10 +62,10 @@ class Scan:
                 case kinds.Chunk():
                     new = (digest := hash(record.data)) not in chunks  # a doubled chunk is read once
                     chunks.add(digest)
-                    found, what = self._unpacked(record) if new else ([], "")
+                    found, whole = self._unpacked(record) if new else ([], True)
                     yield from found
-                    if what:
-                        self.damages.append((position, what))
+                    if not whole:
+                        self.damages.append((position, "a chunk"))
                         end = min(end, self._next(position + 1))  # an intact chunk may begin inside
                 case kinds.MessageIndex():
                     self.indexed += new * len(record.records)
@@ -93,20 +91,17 @@ class Scan:
         candidates = (match.start() for match in _CANDIDATE.finditer(self._data, position))
         return next((at for at in candidates if _record(self._data, at)[1]), len(self._data))
 
-    def _unpacked(self, chunk: kinds.Chunk) -> tuple[list[kinds.McapRecord], str]:
-        """Return the records of a chunk, in one without a checksum those before its first damage, and its damage."""
+    def _unpacked(self, chunk: kinds.Chunk) -> tuple[list[kinds.McapRecord], bool]:
+        """Return the records of a chunk, up to a damage if it has no checksum, and whether it is whole."""
         data, whole = self._file.unpacked(chunk.data, chunk.compression)
-        if not whole or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
-            return [], "a chunk"
+        whole = whole and chunk.uncompressed_crc in (0, zlib.crc32(data))
         found: list[kinds.McapRecord] = []
         position = 0
-        while position < len(data):
+        while whole and position < len(data):
             record, position = _record(memoryview(data), position)
-            if not position:
-                return found, "part of a chunk"
-            if record:
-                found.append(record)
-        return found, ""
+            whole = position > 0
+            found += [record] if record else []
+        return found, whole
 
 
 def _record(data: memoryview, position: int) -> tuple[kinds.McapRecord | None, int]:
