@@ -1,8 +1,4 @@
-"""Scan of the records of an MCAP file that continues after damages.
-
-The readers of the ``mcap`` package, which parses the records, end at the first damage. This scan continues with the
-next chunk, attachment or end of data.
-"""
+"""Scan of an MCAP file that goes on after damages, at which the readers of the ``mcap`` package end."""
 
 from __future__ import annotations
 
@@ -27,7 +23,6 @@ _CANDIDATE = re.compile(rb"(?=[\x06\x09\x0f].{5}\x00{3})", re.DOTALL)
 # What the package raises for wrong lengths and texts.
 _DAMAGE = (EndOfFile, struct.error, UnicodeDecodeError, OverflowError, MemoryError)
 _KINDS = {opcode: getattr(kinds, opcode.name.title().replace("_", "")) for opcode in Opcode}
-_PRIVATE = 0x80  # the first opcode of the records of other programs
 
 
 class Scan:
@@ -110,7 +105,7 @@ def _record(data: memoryview, position: int) -> tuple[kinds.McapRecord | None, i
     opcode, length = _FRAME.unpack_from(data, position) if start <= len(data) else (0, 0)
     end = start + length
     if end > len(data) or opcode not in _KINDS:
-        return None, end if opcode >= _PRIVATE and end <= len(data) else 0
+        return None, end if opcode >= 0x80 and end <= len(data) else 0  # from there on they are of other programs
     stream = ReadDataStream(BytesIO(data[start:end]))
     try:
         record = _KINDS[opcode].read(stream, *([length] if opcode == Opcode.MESSAGE else []))

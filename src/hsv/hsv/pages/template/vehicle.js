@@ -120,13 +120,13 @@ class Vehicle {
     this.draw();
   }
 
-  /* The curves of a run by quantity; null unless all are there. */
+  /* The curves of a run by quantity, without elastic ones for a rigid vehicle; null unless all others are there. */
   series(run, kind) {
     const found = Object.fromEntries([...QUANTITIES, ...ELASTIC].map((name) => {
       const curves = this.charts.panels.find((panel) => panel.name === name)?.curves.filter((curve) => curve.run === run) || [];
       return [name, KINDS[kind].map((each) => curves.find((curve) => curve.kind === each)).find(Boolean)];
     }));
-    return Object.values(found).every(Boolean) ? found : null;
+    return QUANTITIES.every((name) => found[name]) ? found : null;
   }
 
   /* The last step that is not after the time; null before the first. */
@@ -139,7 +139,7 @@ class Vehicle {
       if (x[middle] <= this.time + 1e-6) low = middle;
       else high = middle - 1;
     }
-    const value = (name) => arrays[series[name].y][low];
+    const value = (name) => (series[name] ? arrays[series[name].y][low] : 0);
     return { time: x[low], faults: [], ...Object.fromEntries(QUANTITIES.map((name) => [name, value(name)])), elastic: ELASTIC.map(value) };
   }
 
