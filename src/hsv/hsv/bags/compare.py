@@ -27,7 +27,7 @@ class Difference:
     actual: Any
 
     def __str__(self) -> str:
-        return f"step {self.step} {self.topic} {self.field}: {_shown(self.expected)} became {_shown(self.actual)}"
+        return f"step {self.step} {self.topic} {self.field}: {self.expected!r} became {self.actual!r}"
 
 
 @dataclass(frozen=True)
@@ -137,21 +137,16 @@ def _compare_column(
         equal |= np.isnan(a) & np.isnan(b)
     if equal.all():
         return
-    difference = _absolute_difference(a, b)
-    largest[name] = float(np.max(np.where(equal, 0.0, difference)))
-    if a.dtype.kind == "f":
-        with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
+        difference = np.abs(a.astype(np.float64) - b.astype(np.float64))
+        largest[name] = float(np.max(np.where(equal, 0.0, difference)))
+        if a.dtype.kind == "f":
             limit = np.maximum(tolerance, tolerance * np.maximum(np.abs(a), np.abs(b)))
             equal |= np.isfinite(a) & np.isfinite(b) & (difference <= limit)
     if not equal.all():
         index = tuple(int(i) for i in np.argwhere(~equal)[0])
         suffix = "".join(f"[{i}]" for i in index[1:])
         note(index[0], name + suffix, a[index].item(), b[index].item())
-
-
-def _absolute_difference(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float64]:
-    with np.errstate(invalid="ignore", over="ignore"):
-        return np.abs(a.astype(np.float64) - b.astype(np.float64))
 
 
 def _alike(a: Any, b: Any, tolerance: float) -> bool:
@@ -168,7 +163,3 @@ def _alike(a: Any, b: Any, tolerance: float) -> bool:
 
 def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-
-
-def _shown(value: Any) -> str:
-    return f"{value!r}"

@@ -66,10 +66,7 @@ def _inject(fields: Mapping[str, Any]) -> Command:
 
 def _clear(fields: Mapping[str, Any]) -> Command:
     channel, kind = _text(fields, "channel", ""), _text(fields, "type", "")
-    return Clear(
-        channel and _choice(fields, "channel", CHANNELS),
-        kind and _choice(fields, "type", FAULT_KINDS),
-    )
+    return Clear(channel and _choice(fields, "channel", CHANNELS), kind and _choice(fields, "type", FAULT_KINDS))
 
 
 def _change(name: str, field: str) -> Callable[[Mapping[str, Any]], Command]:
