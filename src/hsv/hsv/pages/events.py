@@ -57,9 +57,9 @@ def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
     ):
         if tube.get(steps):
             events.append(_instant(description["start_s"], "warning", text, "tube_mpc"))
-    if text := _FAILURES.get(description["ending"]):
+    if failure := _FAILURES.get(description["ending"]):
         last = float(bag.columns(STATE)["header.stamp"][-1]) * 1e-9
-        events.append(_instant(last, "error", text, "plant"))
+        events.append(_instant(last, "error", failure, "plant"))
     with expecting_fields(bag.path):
         # Nodes report some things both in the log and in their diagnostics.
         reported = sorted([*_diagnostics(bag), *_log(bag)], key=lambda event: event.start)

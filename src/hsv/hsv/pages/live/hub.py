@@ -138,8 +138,8 @@ class Hub:
         self._generation += 1
         self._latest: dict[str, deque[tuple[int, bytes]]] = defaultdict(lambda: deque(maxlen=_KEPT))
         self._rows = np.empty((MAX_ROWS, 1 + len(LIVE_CURVES)), np.float32)
-        self._count = 0
-        self._sampled = -1
+        self._count: int = 0
+        self._sampled: int = -1
         self._period = 0.0
         self._status |= {"faults": [], "diagnostics": {}, "events": [], "ending": None, "tau": None}
         self._status |= {"tube_status": None, "nominal_status": 0}
