@@ -32,11 +32,7 @@ class ParameterSections:
 
     @classmethod
     def parse(cls, text: str, source: str) -> Self:
-        """Return the parameters in the ``text`` of a parameter file.
-
-        Raises:
-            DesignError: The text is not a parameter file; the message names ``source``.
-        """
+        """Return the parameters in the ``text`` of a parameter file; a DesignError names its ``source``."""
         sections = parse_sections(text, source)
         shared = sections.pop(_ALL, {})
         return cls(shared, {name.removeprefix("/"): flat for name, flat in sections.items()})

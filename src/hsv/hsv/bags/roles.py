@@ -26,18 +26,10 @@ def naming(names: Mapping[str, str], namespace: str) -> dict[str, str]:
 
 
 def roles(topics: Mapping[str, str], custom_data: Mapping[str, str], source: str) -> dict[str, str]:
-    """Return the names of a bag's topics by role.
+    """Return the names of a bag's topics by role, given their types by name; ``source`` is for error messages.
 
     If the bag does not record the names, a topic is identified by the end of its name and its type, and a remapped
-    topic by its type alone if no other topic has it.
-
-    Args:
-        topics: Types of the topics, ``package/msg/Type``, by name.
-        custom_data: Custom data of the bag.
-        source: Path of the bag, for error messages.
-
-    Raises:
-        RecordingError: A topic does not have the type of its role, or there are topics of two graphs.
+    topic by its type alone if no other topic has it. A wrong type and topics of two graphs are refused.
     """
     remapped = _remapped(custom_data)
     found = {role: name for role, name in remapped.items() if name in topics}
@@ -77,11 +69,7 @@ def _remapped(custom_data: Mapping[str, str]) -> dict[str, str]:
 
 
 def _namespace(topics: Mapping[str, str], source: str) -> str:
-    """Return the namespace of the graph whose topics are in the bag, from the names of the topics.
-
-    Raises:
-        RecordingError: There are topics of two graphs.
-    """
+    """Return the namespace of the graph from the names of its topics; refuse the topics of two graphs."""
     spaces: dict[str, set[str]] = {}
     for role in _OURS:
         for name, kind in topics.items():

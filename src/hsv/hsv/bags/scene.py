@@ -31,11 +31,7 @@ def scene_path(bag: Bag) -> Path:
 
 
 def scene_of(bag: Bag) -> Path:
-    """Return the viewer file of ``bag``; write it if it is missing or older than the bag.
-
-    Raises:
-        RecordingError: See :func:`write_scene`.
-    """
+    """Return the viewer file of ``bag``; write it if it is missing or older than the bag."""
     target = scene_path(bag)
     if not target.is_file() or target.stat().st_mtime < bag.path.stat().st_mtime:
         target.unlink(missing_ok=True)
@@ -46,13 +42,8 @@ def scene_of(bag: Bag) -> Path:
 def write_scene(bag: Bag, target: Path, exaggeration: float | None = None) -> None:
     """Write ``target`` with the messages and attachments of ``bag``, and the vehicle as a Foxglove scene with frames.
 
-    Args:
-        bag: A flight.
-        target: New MCAP file.
-        exaggeration: Factor on the bending; default: the value of the airframe.
-
-    Raises:
-        RecordingError: The bag holds no flight, or the file exists or cannot be written.
+    ``exaggeration`` is the factor on the bending; default: the value of the airframe. A RecordingError says that the
+    bag holds no flight, or that the file exists or cannot be written.
     """
     pictures = _pictures(bag, exaggeration)
     try:

@@ -144,11 +144,7 @@ def message_types(
 
 
 def deserialized(types: Typestore, message: bytes, message_type: str) -> Any:
-    """Return a deserialized message; rosbags alone admits three bytes behind it, this :data:`MAX_SURPLUS`.
-
-    Raises:
-        SerdeError: The message does not fit its definition.
-    """
+    """Return a deserialized message, or raise a SerdeError; bytes behind it are admitted up to :data:`MAX_SURPLUS`."""
     try:
         return types.deserialize_cdr(message, message_type)
     except SerdeError:

@@ -36,12 +36,7 @@ class Curve:
     column: int | None = None
 
     def value(self, read: Callable[[str], Any]) -> Any:
-        """Return the value; NaN if a field has too few columns.
-
-        Args:
-            read: Function that returns a field by its path: a number or sequence (m), or those of n messages, (n) or
-                (n, m).
-        """
+        """Return the value from the fields that ``read`` returns by their path; NaN if one has too few columns."""
         total: Any = 0.0
         for field in self.fields:
             part: Any = np.asarray(read(field.removeprefix("-")))

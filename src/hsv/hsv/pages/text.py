@@ -13,14 +13,9 @@ SYSTEMS = {UnitSystem.metric: "SI, degrees", UnitSystem.si: "strict SI", UnitSys
 
 
 def quantity(value: float | None, unit: str, digits: int = 5, *, signed: bool = False, share: bool = False) -> Markup:
-    """Return a value with its unit in all systems of units; a dash for None.
+    """Return a value (in its SI ``unit``) with its unit in all systems of units; a dash for None.
 
-    Args:
-        value: The number, in the SI unit.
-        unit: Its SI unit.
-        digits: Significant digits.
-        signed: Whether a positive number has a sign too.
-        share: Whether it is a share, which the metric system gives in percent.
+    A ``signed`` value has its sign if it is positive, too; the metric system gives a ``share`` in percent.
     """
     if value is None:
         return Markup("–")

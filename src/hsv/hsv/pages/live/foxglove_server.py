@@ -17,16 +17,9 @@ class FoxgloveServer(ServerListener):
     """A read-only server of topics for Foxglove and Lichtblick; a slow client misses messages and delays no others."""
 
     def __init__(self, port: int, topics: Mapping[str, str], latched: Iterable[str] = ()) -> None:
-        """Start the server.
+        """Serve ``topics``, types by full name, on ``port`` of this machine (0: any free one, else a ParameterError).
 
-        Args:
-            port: Port on this machine; 0: any free port.
-            topics: Types of the topics by full name.
-            latched: Topics of which a client that subscribes later receives the earlier messages, too.
-
-        Raises:
-            ParameterError: The port is in use.
-            RecordingError: A message type is not installed.
+        Of the ``latched`` topics a client that subscribes later receives the earlier messages, too.
         """
         # Suppress messages about clients that connect and disconnect.
         foxglove.set_log_level(logging.CRITICAL)

@@ -41,12 +41,7 @@ class Hub:
     """Collection of the data of the page, written by one thread and read by the server threads."""
 
     def __init__(self, decode: Callable[[str, bytes], Any], about: Mapping[str, str]) -> None:
-        """Start without data.
-
-        Args:
-            decode: Function that deserializes a message of a topic.
-            about: Further texts of the page: ``title``, and path of the ``bag``; empty if unknown.
-        """
+        """Start without data; ``decode`` deserializes a message of a topic, ``about`` has title and bag."""
         self._topics = tuple(dict.fromkeys(curve.topic for _, curve in LIVE_CURVES))
         self._steady = frozenset(self._topics) - {TUBE_STATUS}
         """Topics of every step; a custom controller does not publish the tube status."""

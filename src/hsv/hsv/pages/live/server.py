@@ -193,11 +193,7 @@ class PageServer:
 
 
 def _fields(text: str | bytes) -> dict[str, Any]:
-    """Return the fields of a request.
-
-    Raises:
-        ParameterError: The request is not a JSON object, is nested too deeply, or contains half a surrogate pair.
-    """
+    """Return the fields of a request; a ParameterError says why it is no JSON object."""
     try:
         fields = parse_json(text)
         json.dumps(fields, ensure_ascii=False).encode()
