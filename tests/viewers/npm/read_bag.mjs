@@ -46,9 +46,6 @@ function decoder(channel, schema) {
       const type = set.lookupType(schema.name);
       return (data) => type.toObject(type.decode(data), { longs: Number, defaults: true });
     }
-    case "jsonschema":
-      JSON.parse(text());
-      return (data) => JSON.parse(new TextDecoder().decode(data));
   }
   throw new Error(`${channel.topic}: schema encoding ${schema.encoding}`);
 }
