@@ -54,6 +54,16 @@ class Hub:
         """Number of changes of :meth:`status`."""
         self._reset()
 
+    def _reset(self) -> None:
+        self._generation += 1
+        self._latest: dict[str, deque[tuple[int, bytes]]] = defaultdict(lambda: deque(maxlen=_KEPT))
+        self._rows = np.empty((MAX_ROWS, 1 + len(LIVE_CURVES)), np.float32)
+        self._count = 0
+        self._sampled = -1
+        self._period = 0.0
+        self._status |= {"faults": [], "diagnostics": {}, "events": [], "ending": None, "tau": None}
+        self._status |= {"tube_status": None, "nominal_status": 0}
+
     def start_run(self, run_id: str, period: float, last_step: int) -> None:
         """Start a new run and discard the data of the previous one."""
         with self._lock:
@@ -128,16 +138,6 @@ class Hub:
         """Record the end of the run with the last ``status`` and ``step``; status running means broken off."""
         how = {FlightStatus.FINISHED: "finished", FlightStatus.DIVERGED: "diverged"}
         self.update(ending={"how": how.get(FlightStatus(status), "broken off"), "time": round(step * self._period, 9)})
-
-    def _reset(self) -> None:
-        self._generation += 1
-        self._latest: dict[str, deque[tuple[int, bytes]]] = defaultdict(lambda: deque(maxlen=_KEPT))
-        self._rows = np.empty((MAX_ROWS, 1 + len(LIVE_CURVES)), np.float32)
-        self._count: int = 0
-        self._sampled: int = -1
-        self._period = 0.0
-        self._status |= {"faults": [], "diagnostics": {}, "events": [], "ending": None, "tau": None}
-        self._status |= {"tube_status": None, "nominal_status": 0}
 
     def _status_of(self, messages: Mapping[str, Any]) -> dict[str, Any]:
         """Return the entries of the status from the messages of a step."""
