@@ -1,0 +1,26 @@
+"""Smoke test for colcon test of all packages of nodes: their modules and executables load, and they are documented.
+
+ament_pep257 belongs to a full ROS 2 installation. Style, types and imports are checked by make lint.
+"""
+
+from importlib import import_module
+from importlib.metadata import distribution
+from pathlib import Path
+from pkgutil import iter_modules
+
+import pytest
+
+SOURCES = sorted(path.parent for path in Path(__file__).parents[2].glob("hsv_*/hsv_*/__init__.py"))
+
+
+@pytest.mark.parametrize("folder", SOURCES, ids=lambda folder: folder.name)
+def test_modules_and_executables_load(folder):
+    for module in iter_modules([str(folder)]):
+        import_module(f"{folder.name}.{module.name}")
+    assert all(callable(script.load()) for script in distribution(folder.name).entry_points)
+
+
+def test_ament_pep257_finds_nothing():
+    pep257 = pytest.importorskip("ament_pep257.main")
+    ignored = ("D105", "D107", "D417")
+    assert pep257.main([*map(str, SOURCES), "--convention", "google", "--add-ignore", *ignored]) == 0
