@@ -11,25 +11,21 @@ PYTHON_SOURCES := src ros_ws/src tests tools
 PYTEST := source ./env.sh && python3 -m pytest
 INSTALL = source ./env.sh && python3 -m pip install --quiet --constraint constraints$$(grep -qs ^jazzy .venv/hsv-setup && echo -jazzy).txt
 NOT_IN_TEST := long or fuzz or full_ros or portability
+TESTS = $(PYTEST) -n auto --dist loadfile -m "not (graph or $(NOT_IN_TEST) $(1))" && \
+	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -m "graph and not (long $(1))" tests/graph
 
 help: ## list these commands
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 26
 
 setup: ## set everything up (PYTHON=/path/to/python3 chooses the interpreter)
-	@python="$${PYTHON:-python3}"; \
-	if ! command -v "$$python" > /dev/null; then \
-		echo "make setup: there is no $$python: sudo apt-get install python3 python3-venv python3-dev g++ cmake" >&2; \
-		exit 1; \
-	fi; \
+	@python="$$(command -v "$${PYTHON:-python3}")" || { echo "make setup: there is no $${PYTHON:-python3}" >&2; exit 1; }; \
 	exec "$$python" tools/setup.py
 
 run: setup ## set up, then fly a scenario over DDS (SCENARIO=case1, ARGS="...")
 	@source ./env.sh && exec hsv run $(SCENARIO) $(ARGS)
 
 test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
-	@if [ -n '$(ARGS)' ]; then $(PYTEST) $(ARGS); exit; fi; \
-	$(PYTEST) -n auto --dist loadfile -m "not (graph or $(NOT_IN_TEST))" && \
-	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -m "graph and not long" tests/graph
+	@if [ -n '$(ARGS)' ]; then $(PYTEST) $(ARGS); else $(TESTS); fi
 
 test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damaged" chooses)
 	@$(INSTALL) --requirement requirements-docs.txt
@@ -59,14 +55,14 @@ test-portability: setup ## set up, then fly on emulated processors, another Pyth
 	python3 -m pytest -n 2 -m portability $(ARGS) && exit "$$missing"
 
 # The packages that a flight is made of and those that record it, by their own tests; then gcov counts the lines of the
-# core's headers that the golden flights and vectors run.
+# core's headers that the golden flights run.
 coverage: setup ## set up, then measure how much of the flight's packages and core their own tests run; fails below the floor
 	@$(PYTEST) -n auto --cov --cov-report=term:skip-covered \
 		-m "not (graph or viewer or reference or $(NOT_IN_TEST))" tests/{base,core,model,control,flight,bags} $(ARGS)
 	@source ./env.sh && cd src/hsv && rm -rf build/coverage && HSV_CFLAGS="-O0 --coverage" \
 		python3 setup.py -q build --build-base build/coverage --build-lib build/coverage/library
 	@source ./env.sh && HSV_CORE=sse2 PYTHONPATH="$$PWD/src/hsv/build/coverage/library" python3 -m pytest -p no:cacheprovider \
-		-m "not (long or fuzz)" tests/core/test_vectors.py tests/core/test_binding.py tests/flight/test_golden_flights.py
+		-m "not (long or fuzz)" tests/core/test_binding.py tests/flight/test_golden_flights.py
 	@cd src/hsv && find build/coverage -name scalar.gcda -exec gcov -n {} + | grep -A 1 "'hsv/core/.*\.h'"
 
 lint: setup ## set up, then check style, types and the direction of imports
@@ -79,9 +75,7 @@ locks: setup ## set up, then write the exact versions of all requirements to con
 	@$(LOCK) --python-version 3.12 requirements{,-jazzy,-test,-viewers,-docs}.txt --output-file constraints-jazzy.txt $(ARGS)
 
 references: lint ## run all tests, then fly the reference bags of bags/reference anew: all or none
-	@$(PYTEST) -n auto --dist loadfile -m "not (graph or reference or $(NOT_IN_TEST))" && \
-	$(PYTEST) -n auto --dist loadfile --no-loadscope-reorder -m "graph and not (reference or long)" tests/graph && \
-	python3 tools/references.py
+	@$(call TESTS,or reference) && python3 tools/references.py
 
 bench: setup ## set up, then measure this machine (ARGS="--scale 0.5")
 	@source ./env.sh && exec hsv bench $(ARGS)

@@ -7,8 +7,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
 
-import reference_pages  # noqa: E402
-import repository_pages  # noqa: E402
+import site_pages  # noqa: E402
 from docutils import nodes  # noqa: E402
 from docutils.utils.math.latex2mathml import tex2mathml  # noqa: E402
 from pygments.lexers.special import TextLexer  # noqa: E402
@@ -41,12 +40,12 @@ autodoc_typehints_format = "short"
 autosummary_generate = True
 # Pages of modules that are gone would not build.
 shutil.rmtree(Path(__file__).parent / "reference" / "generated", ignore_errors=True)
-autosummary_context = {"modules_of": reference_pages.modules_of}
+autosummary_context = {"modules_of": site_pages.modules_of}
 napoleon_numpy_docstring = False
 python_use_unqualified_type_names = True
 
 # Pages whose text ends with what is generated.
-GENERATED = {"reference/commands": reference_pages.commands, "reference/messages": reference_pages.messages}
+GENERATED = {"reference/commands": site_pages.commands, "reference/messages": site_pages.messages}
 
 
 def math(display):
@@ -62,10 +61,10 @@ def math(display):
 def setup(app):
     """Let links that hold in the repository hold in the built pages, and generate the reference."""
     app.add_html_math_renderer("mathml", inline_renderers=math(False), block_renderers=math(True))
-    files = repository_pages.included()
+    files = site_pages.included()
 
     def read(app, docname, source):
-        source[0] = repository_pages.text_of(docname, source[0], files)
+        source[0] = site_pages.text_of(docname, source[0], files)
         if docname in GENERATED:
             source[0] += "\n" + GENERATED[docname]()
 

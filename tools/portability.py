@@ -165,30 +165,20 @@ def install(folder: Path, version: str, machine: str, constraints: str) -> str:
     return str(packages)
 
 
-def prepare(name: str) -> None:
-    """Prepare environment ``name`` anew.
-
-    Raises:
-        MissingError: The message says what is missing for it.
-    """
-    folder = CACHE / name
-    shutil.rmtree(folder, ignore_errors=True)
-    environment = ENVIRONMENTS[name](folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "environment.json").write_text(json.dumps(asdict(environment)) + "\n")
-
-
 def main() -> int:
-    """Prepare every environment; return 1 if one is missing."""
+    """Prepare every environment anew; return 1 if one is missing."""
     code = 0
-    for name in ENVIRONMENTS:
+    for name, prepare in ENVIRONMENTS.items():
+        shutil.rmtree(folder := CACHE / name, ignore_errors=True)
         try:
-            prepare(name)
+            environment = prepare(folder)
         except MissingError as missing:
             print(f"make test-portability: {name}: {missing}", file=sys.stderr, flush=True)
             code = 1
-        else:
-            print(f"{name}: prepared", flush=True)
+            continue
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "environment.json").write_text(json.dumps(asdict(environment)) + "\n")
+        print(f"{name}: prepared", flush=True)
     return code
 
 

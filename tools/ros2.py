@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import shlex
 import signal
 import sys
 from collections.abc import Sequence
@@ -55,11 +54,10 @@ def run(options: argparse.Namespace) -> None:
         sys.exit("No executable found")
     if len(paths) > 1:
         sys.exit("Multiple executables found:" + "".join(f"\n- {path}" for path in paths))
-    command = [*shlex.split(options.prefix or ""), str(paths[0]), *options.argv]
     try:
-        os.execvp(command[0], command)
+        os.execv(paths[0], [str(paths[0]), *options.argv])
     except OSError as error:
-        sys.exit(f"{command[0]}: {error.strerror}")
+        sys.exit(f"{paths[0]}: {error.strerror}")
 
 
 def list_packages(options: argparse.Namespace) -> None:
@@ -71,7 +69,7 @@ def list_executables(options: argparse.Namespace) -> None:
     """Print the executables of one package, or of all."""
     for name in [options.package_name] if options.package_name else sorted(prefixes()):
         for path in executables(name):
-            print(path if options.full_path else f"{name} {path.name}")
+            print(f"{name} {path.name}")
 
 
 def print_prefix(options: argparse.Namespace) -> None:
@@ -95,7 +93,6 @@ def main(arguments: Sequence[str]) -> int:
     parser.set_defaults(carry_out=lambda options: parser.print_help())
     commands = parser.add_subparsers(metavar="command")
     start = commands.add_parser("run", help="run a package's executable")
-    start.add_argument("--prefix", help="command that goes before the executable, e.g. 'gdb -ex run --args'")
     start.add_argument("package_name")
     start.add_argument("executable_name")
     start.add_argument("argv", nargs=argparse.REMAINDER, help="arguments of the executable")
@@ -104,7 +101,6 @@ def main(arguments: Sequence[str]) -> int:
     verbs.add_parser("list", help="list all packages").set_defaults(carry_out=list_packages)
     listing = verbs.add_parser("executables", help="list executables")
     listing.add_argument("package_name", nargs="?")
-    listing.add_argument("--full-path", action="store_true", help="print whole paths")
     listing.set_defaults(carry_out=list_executables)
     place = verbs.add_parser("prefix", help="print where a package is installed")
     place.add_argument("--share", action="store_true", help="print the share directory of the package")

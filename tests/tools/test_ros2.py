@@ -60,11 +60,6 @@ def test_run_is_replaced_by_the_executable(prefix):
     process.stdout.close()
 
 
-def test_run_with_a_prefix_command(prefix):
-    result = ros2(prefix, "run", "--prefix", "echo 'a b'", "alpha", "talk", "c")
-    assert result.stdout == f"a b {prefix}/lib/alpha/talk c\n"
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -92,7 +87,6 @@ def test_pkg_lists(prefix):
     assert ros2(prefix, "pkg", "list").stdout == "alpha\nbeta\n"
     assert ros2(prefix, "pkg", "executables").stdout == "alpha talk\nalpha wait\n"
     assert ros2(prefix, "pkg", "executables", "beta").stdout == ""
-    assert ros2(prefix, "pkg", "executables", "--full-path", "alpha").stdout.startswith(f"{prefix}/lib/alpha/talk\n")
     assert ros2(prefix, "pkg", "prefix", "beta").stdout == f"{prefix}\n"
     assert ros2(prefix, "pkg", "prefix", "--share", "beta").stdout == f"{prefix}/share/beta\n"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typer.main import get_command
 
 import hsv
-import reference_pages
+import site_pages
 from hsv.cli.entry import COMMANDS
 from hsv.cli.main import application
 
@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_every_command_has_a_section_with_all_its_options():
-    page = reference_pages.commands()
+    page = site_pages.commands()
     found = dict(re.findall(r"^#{2,4} `(hsv.*?)`$(.*?)(?=^#{2,4} |\Z)", page, re.DOTALL | re.MULTILINE))
 
     def check(name, command):
@@ -37,5 +37,5 @@ def test_every_package_and_module_of_the_library_is_on_its_page():
     # The package's own names have another page.
     there = {f"hsv.{module.name}" for module in pkgutil.iter_modules(hsv.__path__)} - {"hsv.api"}
     assert {*listed} == there and len(listed) == len(there)
-    assert "hsv.design.sets.invariant_set" in reference_pages.modules_of("hsv.design")
-    assert reference_pages.modules_of("hsv.base.units") == []
+    assert "hsv.design.sets.invariant_set" in site_pages.modules_of("hsv.design")
+    assert site_pages.modules_of("hsv.base.units") == []
