@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from frames import composed
 from node_processes import short_scenario
 from waiting import wait_until
 
@@ -12,7 +13,7 @@ from hsv.bags.reader import Bag
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario
-from hsv.model.airframe.pose import LEVEL, Sample, composed, transforms
+from hsv.model.airframe.pose import LEVEL, Sample
 from hsv.model.airframe.solids import solids
 
 pytestmark = pytest.mark.graph
@@ -49,6 +50,6 @@ def test_markers_follow_the_state_of_a_flight_that_is_not_changed(processes):
         assert [marker["ns"] for marker in markers] == [*(solid.name for solid in solids()), "label"]
         [row] = np.flatnonzero(state["header.stamp"] == markers[0]["header"]["stamp"])
         names = ("angle_of_attack", "pitch_angle", "elastic_coordinate_1", "elastic_coordinate_2")
-        frames = composed(transforms(Sample(*(float(state[name][row]) for name in names), 0.0, 0.0)))
+        frames = composed(Sample(*(float(state[name][row]) for name in names), 0.0, 0.0))
         [nose] = [marker["pose"]["position"] for marker in markers if marker["ns"] == SEGMENT]
         assert [nose["x"], nose["z"]] == pytest.approx([frames[SEGMENT].x, frames[SEGMENT].z], abs=1e-12)
