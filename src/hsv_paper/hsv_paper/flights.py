@@ -1,23 +1,17 @@
-"""The flights of the paper's study: single ones, and those of many vehicles with their measures, flown once and kept.
-
-A kept table has a digest of all it depends on in its name.
-"""
+"""The flights of the paper's study: single ones, and those of many vehicles with their measures."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from functools import cache
 from typing import Any
 
 import numpy as np
 
-from hsv.base.processes import Progress
 from hsv.flight.assembly import assemble, flight_parameters
 from hsv.flight.closed_loop import fly
 from hsv.flight.corners import Corner
-from hsv.flight.fingerprint import DIGITS, code_digest, digest_of, drop_older
 from hsv.flight.flight import Flight
 from hsv.flight.metrics import FlightData, flight_metrics
 from hsv.flight.scenario import load_scenario
@@ -49,56 +43,13 @@ class Point:
     over: Sequence[Corner]
 
 
-class Flights:
-    """Flies scenarios once, and keeps the tables of sweeps in a ``folder``."""
-
-    def __init__(self, folder: Path, progress: Progress = lambda what, done, total: None) -> None:
-        self._folder, self._progress = folder, progress
-        self._flown: dict[str, FlightData] = {}
-
-    def __getitem__(self, scenario: str) -> FlightData:
-        """Return the flight of a shipped scenario.
-
-        Raises:
-            ScenarioError, DesignError, ParameterError: A scenario or design is wrong; the message names it.
-        """
-        if scenario not in self._flown:
-            self._flown[scenario] = fly(assemble(flight_parameters(load_scenario(scenario)))).data()
-        return self._flown[scenario]
-
-    def tables(self, name: str, points: Sequence[Point], *, keep: bool = True) -> list[Table]:
-        """Return the measures of all flights at each point of a sweep, flown once.
-
-        Args:
-            name: Name of the sweep, in progress and file name.
-            points: What is flown.
-            keep: Keep the tables; not where flights depend on code outside this library.
-        """
-        asked = [[dict(point.values), [dict(corner) for corner in point.over]] for point in points]
-        text = json.dumps([asked, tube_of("baseline").half_width], sort_keys=True, default=np.ndarray.tolist)
-        digest = digest_of([text.encode(), code_digest().encode(), Path(__file__).read_bytes()])
-        path = self._folder / f"{name.replace(' ', '_')}_{digest[:DIGITS]}.npz"
-        if keep and path.is_file():
-            with np.load(path) as columns:
-                return [
-                    {key.split(" ")[1]: columns[key] for key in columns if key.startswith(f"{number} ")}
-                    for number in range(len(points))
-                ]
-        total, done, tables = sum(len(point.over) for point in points), 0, []
-        for point in points:
-            tables.append(fly_over(point, lambda n, before=done: self._progress(name, before + n, total)))
-            done += len(point.over)
-        if keep:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            new = path.with_name(f".{path.name}")
-            kept: Any = {f"{number} {key}": table[key] for number, table in enumerate(tables) for key in table}
-            np.savez_compressed(new, **kept)
-            new.rename(path)  # a file that is there is whole
-            drop_older(path)
-        return tables
+@cache
+def flight_of(scenario: str) -> FlightData:
+    """Return the flight of a shipped scenario."""
+    return fly(assemble(flight_parameters(load_scenario(scenario)))).data()
 
 
-def fly_over(point: Point, progress: Any = lambda done: None) -> Table:
+def fly_over(point: Point, progress: Callable[[int], None] = lambda done: None) -> Table:
     """Return the measures of the flights of all vehicles of a point, flown in as many threads as processors."""
     parts = assemble(dict(point.values))
     levels = TubeLevels(parts)
@@ -142,9 +93,8 @@ def flight_measures(flight: FlightData) -> dict[str, float]:
         values[f"elastic_rate_{mode}_ringing"] = float(np.ptp(flight.state[ringing, column + 1]))
     values["attitude_settling_time"] = _settling_time(since[after], flight.state[after, 2:4])
     values["pitch_rate_settling_time"] = _settling_time(since[after], flight.state[after, 4:5])
-    for name in ("elastic_rate_1", "elastic_rate_2", "elastic"):
-        decay = values[f"{name}_decay_time"]
-        values[f"{name}_settling_time"] = decay if decay < since[-1] - LAST else np.inf
+    decay = values["elastic_decay_time"]
+    values["elastic_settling_time"] = decay if decay < since[-1] - LAST else np.inf
     return values
 
 

@@ -191,21 +191,13 @@ def stability_limit(growth: Callable[[float], float], along: Sequence[float], to
     return float(along[0]) if growth(along[0]) >= 0.0 else next(crossings(growth, along, tolerance), None)
 
 
-@dataclass(frozen=True)
-class Margin:
-    """A crossing of unit gain: frequency (rad/s) and phase margin (rad, the angle to -1)."""
+def phase_margins(frequencies: np.ndarray, response: np.ndarray) -> np.ndarray:
+    """Return frequency (rad/s) and phase margin (rad, the angle to -1) (n, 2) at every crossing of unit gain of L (f).
 
-    frequency: float
-    phase: float
-
-
-def phase_margins(frequencies: np.ndarray, response: np.ndarray) -> list[Margin]:
-    """Return the phase margin at every crossing of unit gain of L (f), by linear interpolation of its logarithm."""
+    The logarithm of L is interpolated linearly.
+    """
     gain, phase = np.log(np.abs(response)), np.unwrap(np.angle(response))
-    margins = []
-    for i in np.flatnonzero(np.sign(gain[:-1]) != np.sign(gain[1:])):
-        share = gain[i] / (gain[i] - gain[i + 1])
-        angle = phase[i] + share * (phase[i + 1] - phase[i])
-        distance = np.abs(np.angle(np.exp(1j * (angle - np.pi))))
-        margins.append(Margin(float(frequencies[i] + share * (frequencies[i + 1] - frequencies[i])), float(distance)))
-    return margins
+    i = np.flatnonzero(np.sign(gain[:-1]) != np.sign(gain[1:]))
+    share = gain[i] / (gain[i] - gain[i + 1])
+    at, angle = (values[i] + share * (values[i + 1] - values[i]) for values in (frequencies, phase))
+    return np.stack((at, np.abs(np.angle(np.exp(1j * (angle - np.pi))))), axis=1)

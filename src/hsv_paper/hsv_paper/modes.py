@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import find_peaks
@@ -27,16 +27,14 @@ FREQUENCIES = np.geomspace(10.0, 25.0, 15001)
 """rad/s: about the elastic modes."""
 
 
-@dataclass(frozen=True)
-class Peak:
+class Peak(NamedTuple):
     """A local maximum of a response: frequency (rad/s) and magnitude (dB)."""
 
     frequency: float
     magnitude: float
 
 
-@dataclass(frozen=True)
-class PeakFall:
+class PeakFall(NamedTuple):
     """The peak of a mode without the filter and the remaining peak with it; ``None``: no local maximum remains.
 
     The peak lies beside the mode's natural frequency (rad/s), because the rest of the response adds to it.
@@ -87,12 +85,12 @@ def highest_peak(frequencies: np.ndarray, response: np.ndarray, low: float, high
     return None if top is None else Peak(float(frequencies[top]), float(magnitude[top]))
 
 
-def peak_falls(sections: Sequence[NotchSection], coupling: Coupling = "paper_like") -> dict[str, PeakFall]:
+def peak_falls(sections: Sequence[NotchSection]) -> dict[str, PeakFall]:
     """Return the effect of filter ``sections`` in series on the peak of each mode, elevator to filtered pitch rate."""
-    plain = pitch_rate_response(coupling, FREQUENCIES)
+    plain = pitch_rate_response("paper_like", FREQUENCIES)
     filtered = plain * notch_response(sections, FREQUENCIES)
     falls = {}
-    for name, mode in elastic_modes(coupling).items():
+    for name, mode in elastic_modes("paper_like").items():
         window = ((1.0 - WINDOW) * mode.natural_frequency, (1.0 + WINDOW) * mode.natural_frequency)
         before = highest_peak(FREQUENCIES, plain, *window)
         assert before is not None

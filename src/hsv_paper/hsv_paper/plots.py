@@ -67,13 +67,14 @@ def plain_log(axis: Axes) -> None:
     axis.yaxis.set_minor_formatter(NullFormatter())
 
 
-def save(figure: Figure, stem: Path) -> list[Path]:
-    """Write ``figure`` as vector PDF and as PNG; equal figures give equal files."""
-    paths = [stem.with_suffix(".pdf"), stem.with_suffix(".png")]
+def save(figure: Figure, stem: Path, page: str) -> list[Path]:
+    """Write ``figure`` as vector PDF and as PNG, with its page; equal figures give equal files."""
+    pdf, png, text = (stem.with_suffix(suffix) for suffix in (".pdf", ".png", ".md"))
     with matplotlib.rc_context(RC):
-        figure.savefig(paths[0], metadata={"CreationDate": None})
-        figure.savefig(paths[1], dpi=150, metadata={"Software": None})
-    return paths
+        figure.savefig(pdf, metadata={"CreationDate": None})
+        figure.savefig(png, dpi=150, metadata={"Software": None})
+    text.write_text(page, encoding="utf-8")
+    return [pdf, png, text]
 
 
 def bode_panels() -> tuple[Figure, Axes, Axes]:

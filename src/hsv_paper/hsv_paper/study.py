@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,36 +13,33 @@ from matplotlib.figure import Figure
 from hsv.base.processes import Progress
 from hsv.flight.corners import Corner, screening_corners
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.flights import Flights
 
 Rows = Sequence[Mapping[str, Any]]
 """A table: its rows, each with a cell (text, rounded number or ``None``) by column."""
 
 _PAGE = """# {kind}: {title}
-Made by `hsv-paper {command} --out docs/study`, including all numbers; [terms](index.md#terms).
+Made by `hsv-paper {command} --out docs/study`, including all numbers.
 
 ![{title}]({name}.png)
 
 {parts}
 """
 
+_TERMS = """## Terms
+- *Growth* is the largest real part (1/s) of the poles of the linear sampled loop, over both ends of Case 1's step,
+  before and after the fault. The loop is stable below zero; limits of stability are found by root finding.
+- Lines are solid for the nominal vehicle, and dashed for the worst of the corners of the parameter bounds. They end
+  where a flight is lost.
+- A flight counts as *saturated* if its inputs are at their limits for more than a second, or if it is lost.
+- *RMPC*, robust MPC, flies the fourth gain of the nominal family."""
+
 
 @dataclass(frozen=True)
 class Scope:
-    """How fine a study is (coarseness 1: as in the docs), the folder of its flights, and where it reports progress.
-
-    ``additional``: scenarios whose controllers are flown, too.
-    """
+    """How fine a study is (coarseness 1: as in the docs), and where it reports progress."""
 
     coarseness: float
-    folder: Path
     progress: Progress = lambda what, done, total: None
-    additional: Sequence[str] = ()
-
-    @cached_property
-    def flights(self) -> Flights:
-        """The flights of the study."""
-        return Flights(self.folder, self.progress)
 
     @property
     def every(self) -> int:
@@ -72,7 +68,6 @@ class Outcome:
     """Results of a study: its figure, and the parts of its page, text and tables, in their order."""
 
     def __init__(self, figure: Figure, *parts: str | Rows) -> None:
-        """Keep the figure and the parts."""
         self.figure, self.parts = figure, parts
 
     @property
@@ -83,23 +78,21 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Study:
-    """A study: its title, its function, and about how many minutes it takes on one processor.
-
-    ``flies_others``: it can fly the controllers of further scenarios.
-    """
+    """A study: its title, its function, and about how many minutes it takes on one processor."""
 
     name: str
     title: str
     run: Callable[[Scope], Outcome]
     minutes: float
     kind: str = "Sensitivity"
-    flies_others: bool = False
 
     def page(self, outcome: Outcome) -> str:
         """Return the page in Markdown."""
-        command = self.name if self.name == "limits" else f"sensitivity {self.name}"
-        parts = "\n\n".join(part if isinstance(part, str) else markdown(part) for part in outcome.parts)
-        return _PAGE.format(kind=self.kind, title=self.title, command=command, name=self.name, parts=parts)
+        limits = self.name == "limits"
+        command = self.name if limits else f"sensitivity {self.name}"
+        parts = [part if isinstance(part, str) else markdown(part) for part in outcome.parts]
+        text = "\n\n".join(parts if limits else [*parts, _TERMS])
+        return _PAGE.format(kind=self.kind, title=self.title, command=command, name=self.name, parts=text)
 
 
 def markdown(rows: Rows, right: Sequence[str] | None = None) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from hsv.flight.scenario import load_scenario
 from hsv.model.actuators import ACTUATOR_SETS, IDEAL
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.designs import certificate, design
-from hsv_paper.flights import Flights, Point, Table, fly_over
+from hsv_paper.flights import Point, Table, fly_over
 from hsv_paper.linear_loop import Feedback, Hardware
 
 ELEVATORS = {name: ACTUATOR_SETS[name] for name in ("elevator_150", "elevator_50", "elevator_20")}
@@ -31,51 +30,35 @@ class Evidence:
 
     def __init__(
         self,
-        folder: Path,
         progress: Progress = lambda what, done, total: None,
         over: Sequence[Corner] | None = None,
         elevator: str = IDEAL,
         loops: Sequence[Corner] | None = None,
     ) -> None:
-        """Keep tables in ``folder``.
+        """Prepare the evidence.
 
         Args:
-            folder: Folder of tables and flights.
-            progress: Called with the current measurement.
             over: Vehicles that are flown, the nominal one first; by default all corners.
             elevator: Elevator in loops and flights, ideal or of :data:`ELEVATORS`.
             loops: Vehicles of the linear loops; by default those that are flown.
         """
-        self._folder = folder
         self._progress = progress
         self.hardware = Hardware.of(elevator)
-        self._equipment = (
-            ()
-            if elevator == IDEAL
-            else (
-                ("actuator.fuel_equivalence_ratio.set", "fuel_10"),
-                ("actuator.elevator_deflection.set", elevator),
-            )
-        )
+        sets = {} if elevator == IDEAL else {"fuel_equivalence_ratio": "fuel_10", "elevator_deflection": elevator}
+        self._equipment = tuple((f"actuator.{channel}.set", name) for channel, name in sets.items())
         self.over = corners(load_vehicle().uncertainty) if over is None else over
         self._loops = self.over if loops is None else loops
-        self.flights = Flights(folder, progress)
         self.corners = cache(self._corners)
         self.changed = cache(self._changed)
         self.growth = cache(self._growth)
         self.behind = cache(self._behind)
-
-    @property
-    def vehicles(self) -> int:
-        """Number of vehicles in a table: the nominal one and those at corners."""
-        return len(self.over)
 
     def _behind(self, elevator: str) -> Evidence:
         """Return the evidence with this elevator: this one if it is ideal, else flights of at most 32 corners."""
         if elevator == IDEAL:
             return self
         over = [corner for corner in screening_corners(load_vehicle().uncertainty) if corner in self.over]
-        return Evidence(self._folder, self._progress, over, elevator, self._loops)
+        return Evidence(self._progress, over, elevator, self._loops)
 
     def _values(self, scenario: str, changes: Sequence[tuple[str, Any]]) -> dict[str, Any]:
         return {**flight_parameters(load_scenario(scenario)), **dict((*self._equipment, *changes))}
@@ -83,8 +66,8 @@ class Evidence:
     def _corners(self, scenario: str, *changes: tuple[str, Any]) -> Table:
         """Return the measurements of a scenario with the nominal vehicle (first) and at all corners."""
         what = " ".join((scenario, *(f"{name}={value}" for name, value in (*self._equipment, *changes))))
-        points = [Point(self._values(scenario, changes), self.over)]
-        return self.flights.tables(f"{self.vehicles} vehicles {what}", points)[0]
+        point = Point(self._values(scenario, changes), self.over)
+        return fly_over(point, lambda done: self._progress(what, done, len(self.over)))
 
     def _changed(self, scenario: str, *changes: tuple[str, Any]) -> dict[str, float]:
         """Return the measurements of the nominal flight of a scenario with other parameters."""

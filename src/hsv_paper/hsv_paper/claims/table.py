@@ -75,7 +75,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim with its readings, and the reasons for their results.
+    """A claim with its readings.
 
     The first ``leading`` readings are the statement itself under the paper's own conditions, one for each number in it;
     the others repeat it under further conditions.
@@ -83,7 +83,6 @@ class Finding:
 
     claim: Claim
     readings: tuple[Reading, ...]
-    why: str
     leading: int = 1
 
     @property
@@ -98,7 +97,7 @@ class Finding:
 class Row(BaseModel, frozen=True, extra="forbid"):
     """Quantity of a reading, its vehicles and its threshold; ``claims.yaml`` explains the fields."""
 
-    what: str = ""
+    what: str
     flight: str = ""
     measure: str = ""
     over: str = ""
@@ -123,17 +122,12 @@ class Claim(BaseModel, frozen=True, extra="forbid"):
     location: str
     why: str
     readings: tuple[Row, ...]
-    facts: dict[str, Row] = {}
     numbers: str = ""
     actuators: tuple[Actuators, ...] = ()
 
     def measure(self, evidence: Evidence) -> Finding:
-        """Return the readings, those of the statement itself first, and the explanation with its numbers."""
+        """Return the readings, those of the statement itself first."""
         measured = self._measured(evidence)
-        facts = {
-            name: _Fact(measured.value(row, row.vehicle or "nominal"), row.unit) for name, row in self.facts.items()
-        }
-        words = measured.numbers | facts | THRESHOLDS
         behind = {
             name: measured if name in _AS_PAPER else self._measured(evidence.behind(name))
             for name in {name for row in self.readings for name in self._actuators(row)}
@@ -145,18 +139,19 @@ class Claim(BaseModel, frozen=True, extra="forbid"):
             found = [
                 reading
                 for name in self._actuators(row)
-                for reading in behind[name].readings(row, row.what.format_map(words | behind[name].numbers), name)
+                for reading in behind[name].readings(row, row.what.format_map(behind[name].numbers), name)
             ]
             first += found[:lead]
             further += found[lead:]
-        return Finding(self, (*first, *further), self.why.format_map(words), sum(leads) or 1)
+        return Finding(self, (*first, *further), sum(leads) or 1)
 
     def _actuators(self, row: Row) -> tuple[str, ...]:
         return (self.actuators or ("",)) if row.actuators is None else row.actuators
 
     def _measured(self, evidence: Evidence) -> _Measured:
         found = getattr(numbers, self.numbers)(evidence) if self.numbers else {}
-        return _Measured(evidence, {"vehicles": evidence.vehicles, "corners": evidence.vehicles - 1, **found})
+        vehicles = len(evidence.over)
+        return _Measured(evidence, {"vehicles": vehicles, "corners": vehicles - 1, **found})
 
 
 @dataclass(frozen=True)
@@ -203,17 +198,6 @@ class _Measured:
     def _of_flights(self, row: Row, measured: Callable[..., Any]) -> Any:
         values = measured(row.flight, row.measure, *row.changes.items())
         return values / measured(row.over, row.measure) if row.over else values
-
-
-@dataclass(frozen=True)
-class _Fact:
-    """A number (SI) for a text: in the paper's unit, or formatted as its format specifies."""
-
-    value: float
-    unit: str
-
-    def __format__(self, spec: str) -> str:
-        return format(self.value, spec) if spec else shown(self.value, self.unit)
 
 
 GROUPS = {group: tuple(map(Claim.model_validate, claims)) for group, claims in _TABLE.items()}

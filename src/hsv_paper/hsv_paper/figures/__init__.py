@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from hsv_paper.figures import frequency, invariant_set, over_time
-from hsv_paper.figures.figure import DRAWN
 
-__all__ = ["FIGURES", "frequency", "invariant_set", "over_time"]
-
-FIGURES = dict(sorted(DRAWN.items()))
+FIGURES = {
+    figure.number: figure
+    for figure in sorted((*frequency.FIGURES, invariant_set.FIGURE, *over_time.FIGURES), key=lambda each: each.number)
+}
 """All figures by the paper's number."""

@@ -45,11 +45,6 @@ class Point:
     input: np.ndarray
     multipliers: np.ndarray
 
-    @classmethod
-    def guess(cls, scalar: float, state: np.ndarray, inputs: np.ndarray) -> Point:
-        """Return a first guess; ``state`` (N + 1, 9), ``inputs`` (N, 2)."""
-        return cls(scalar, state, inputs, np.zeros((len(inputs), N_STATES)))
-
     def finer(self, factor: int) -> Point:
         """Return the point on a mesh with each period divided in ``factor``: states interpolated, inputs repeated."""
         n = len(self.input)
@@ -62,7 +57,6 @@ class Point:
 class Problem:
     """Least scalar s, over s, the states before and after each of N periods, and the inputs held over them.
 
-    vehicle: Parameters.
     period, period_slope: (N) each: a period lasts period + s period_slope (s).
     substeps: (N) Runge-Kutta steps of each.
     inputs, inputs_slope: (2, N, 2) lower and upper bounds of the inputs: inputs + s inputs_slope; equal: given.
@@ -86,6 +80,10 @@ class Problem:
     def periods(self, scalar: float) -> np.ndarray:
         """Return the lengths (N) of the periods for a value of s."""
         return np.asarray(self.period + scalar * self.period_slope)
+
+    def times(self, scalar: float) -> np.ndarray:
+        """Return the times (N + 1), s, of the states for a value of s."""
+        return np.concatenate(([0.0], np.cumsum(self.periods(scalar))))
 
     def defects(self, point: Point) -> np.ndarray:
         """Return the scaled defects of the dynamics (9 N) and, for a final trim, of rest at the end (9 more)."""

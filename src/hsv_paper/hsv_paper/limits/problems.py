@@ -10,7 +10,6 @@ command. For a delay the command of the trim is kept, then any inputs within U a
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -25,29 +24,18 @@ from hsv.model.vehicle import Vehicle
 from hsv_paper.limits.optimum import Point, Problem
 from hsv_paper.linear_loop import START, TARGET
 
-SUBSTEP = 0.01
-"""Runge-Kutta step (s) of the flights."""
+PERIOD, SUBSTEPS = 0.02, 2
+"""T (s), and its Runge-Kutta steps, as flown."""
 
-MARGIN = np.array([100.0, 10.0])
-"""Altitude (m) and velocity (m/s)."""
-
-GRID_ERROR = 5e-4
-"""Relative margin for the rate between grid points: its curvature lets it exceed the largest rate at them by less."""
-
-LONGEST = 60.0
-"""Upper bound of the time (s)."""
+LONGEST, TYPICAL = 60.0, 12.0
+"""Upper bound of the time of a transfer (s), and the longest one with the Runge-Kutta steps of flights."""
 
 REST = 0.4
 """Time from settling to rest, as a share of the time to settling: a longer one changes nothing."""
 
-TYPICAL = 12.0
-"""Longest time (s) with the Runge-Kutta steps of flights; for longer times the steps are longer in proportion."""
-
-PERIOD = 0.02
-"""T (s), as flown."""
-
-SUBSTEPS = 2
-"""Runge-Kutta steps per period, as in flights."""
+MARGIN, GRID_ERROR = np.array([100.0, 10.0]), 5e-4
+"""Altitude (m) and velocity (m/s) beyond the trims, and relative margin for the rate between grid points, which its
+curvature lets exceed the largest rate at them by less."""
 
 DELAYS = (0.0, 0.1, 0.2)
 """Times (s) after which the effectiveness is known."""
@@ -63,11 +51,9 @@ def transfer(vehicle: VehicleParameters, periods: int, *, settling: bool, rest: 
     """Return the problem of the least time (s), s, from Case 1's start to its target.
 
     Args:
-        vehicle: Parameters.
         periods: Number of periods of equal length within that time in which inputs are held.
         settling: The time is that after which altitude and velocity are within 2 % of their steps of the target; the
             vehicle is at rest there a share ``rest`` of the time later. Otherwise it is the time to rest.
-        rest: Share.
     """
     start, target = trim(vehicle, *START), trim(vehicle, *TARGET)
     total = periods + (round(rest * periods) if settling else 0)
@@ -77,7 +63,10 @@ def transfer(vehicle: VehicleParameters, periods: int, *, settling: bool, rest: 
         low[periods:, :2], high[periods:, :2] = target.state[:2] - band, target.state[:2] + band
     low[-1] = high[-1] = target.state
     inputs = np.tile([[vehicle.input_minimum], [vehicle.input_maximum]], (1, total, 1))
-    substeps, slope = np.full(total, max(2, round(TYPICAL / periods / SUBSTEP))), np.full(total, 1.0 / periods)
+    substeps, slope = (
+        np.full(total, max(2, round(TYPICAL / periods * SUBSTEPS / PERIOD))),
+        np.full(total, 1.0 / periods),
+    )
     none, states, scalar = np.zeros(total), np.stack((low, high)), (1.0, LONGEST)
     return Problem(vehicle, none, slope, substeps, inputs, np.zeros_like(inputs), states, False, scalar)
 
@@ -94,10 +83,10 @@ def free_states(vehicle: VehicleParameters, start: np.ndarray, periods: int) -> 
 def straight(problem: Problem, time: float) -> Point:
     """Return a first guess of ``time`` (s): states and inputs in a straight line from trim to trim."""
     start, target = trim(problem.vehicle, *START), trim(problem.vehicle, *TARGET)
-    share = np.concatenate(([0.0], np.cumsum(problem.periods(time))))
-    share = np.minimum(share / time, 1.0)[:, None]
+    share = np.minimum(problem.times(time) / time, 1.0)[:, None]
     state = start.state + share * (target.state - start.state)
-    return Point.guess(time, state, (start.input + share * (target.input - start.input))[:-1])
+    inputs = (start.input + share * (target.input - start.input))[:-1]
+    return Point(time, state, inputs, np.zeros((len(inputs), N_STATES)))
 
 
 def time_bound(vehicle: VehicleParameters) -> float:
@@ -144,15 +133,16 @@ def recovery(vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizo
     3 s on.
 
     Args:
-        vehicle: Parameters, perturbed or not.
         envelope: The vehicle's envelope of commands, which has the trim at the end.
         delay: s.
         horizon: Time from the fault to the trim (s).
         divide: In how many each period is divided, for a finer mesh.
     """
     before = trim(vehicle, *TARGET)
-    held = np.array(held_periods(horizon))
-    period = np.repeat(held * PERIOD / divide, divide)
+    held: list[int] = []
+    while (time := sum(held) * PERIOD) < horizon - 1e-9:
+        held.append(1 if time < 1.5 - 1e-9 else 2 if time < 3.0 - 1e-9 else 5)
+    period = np.repeat(np.array(held) * PERIOD / divide, divide)
     n, kept = len(period), round(delay / PERIOD) * divide
     low, high = free_states(vehicle, before.state, n)
     low[-1, :2], high[-1, :2] = np.transpose((envelope.altitude_range, envelope.velocity_range))
@@ -161,23 +151,15 @@ def recovery(vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizo
     for side, limits in enumerate((vehicle.input_minimum, vehicle.input_maximum)):
         inputs[side, :, 0], slope[side, :, 1] = limits
     inputs[:, :kept, 0], slope[:, :kept, 1] = before.input
-    substeps, states = np.repeat(SUBSTEPS * held, divide), np.stack((low, high))
+    substeps, states = np.repeat(SUBSTEPS * np.array(held), divide), np.stack((low, high))
     return Problem(vehicle, period, np.zeros(n), substeps, inputs, slope, states, True, (0.05, 1.0), COST)
-
-
-def held_periods(horizon: float) -> list[int]:
-    """Return for how many periods of the flight each input is held, up to a ``horizon`` (s)."""
-    held: list[int] = []
-    while (time := sum(held) * PERIOD) < horizon - 1e-9:
-        held.append(1 if time < 1.5 - 1e-9 else 2 if time < 3.0 - 1e-9 else 5)
-    return held
 
 
 def at_trim(problem: Problem) -> Point:
     """Return the first guess: the vehicle stays in its trim, at half of the effectiveness."""
     before = trim(problem.vehicle, *TARGET)
     n = len(problem.period)
-    return Point.guess(0.5, np.tile(before.state, (n + 1, 1)), np.tile(before.input, (n, 1)))
+    return Point(0.5, np.tile(before.state, (n + 1, 1)), np.tile(before.input, (n, 1)), np.zeros((n, N_STATES)))
 
 
 def static_limit(vehicle: VehicleParameters, points: np.ndarray) -> float:
@@ -196,14 +178,6 @@ def static_limit(vehicle: VehicleParameters, points: np.ndarray) -> float:
 def envelope_points(envelope: Vehicle) -> np.ndarray:
     """Return a grid (9, 2) of altitudes (m) and velocities (m/s) over the envelope: its corners, sides and middle."""
     return np.array([*product(*(np.linspace(*axis, 3) for axis in (envelope.altitude_range, envelope.velocity_range)))])
-
-
-def least(holds: Callable[[float], bool], low: float, high: float, resolution: float) -> float:
-    """Return the least value from ``low`` to ``high`` for which something ``holds``, to a resolution, by bisection."""
-    while high - low > resolution:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if holds(middle) else (middle, high)
-    return high
 
 
 def turning_limit(vehicle: VehicleParameters, delay: float, resolution: float = 1e-4) -> float:
@@ -226,4 +200,8 @@ def turning_limit(vehicle: VehicleParameters, delay: float, resolution: float = 
                 return False
         return False
 
-    return least(turns, 0.0, 1.0, resolution)
+    low, high = 0.0, 1.0
+    while high - low > resolution:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if turns(middle) else (middle, high)
+    return high

@@ -12,11 +12,11 @@ STUDIES = {
         Study("sampling", "Sampling period", flown.sampling, 3),
         Study("notch", "Centre and depth of the notch filter", notch.run, 10),
         Study("parameters", "Size of the parameter uncertainty", flown.parameters, 5),
-        Study("fault", "Depth of the fault", flown.fault, 5, flies_others=True),
+        Study("fault", "Depth of the fault", flown.fault, 5),
         Study("weights", "Weights of F and K, input bounds of K", weights.run, 5),
         Study("ramp", "Length of the ramp", flown.ramp, 2),
         Study("factor", "Adjustable factor τ", factor.run, 20),
-        Study("hardware", "Actuators, delay, noise and gusts", hardware.run, 10),
+        Study("hardware", "Actuators, delay and noise", hardware.run, 8),
     )
 }
 """All sensitivity studies by name."""

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import cycle
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from hsv.base.errors import ScenarioError
 from hsv.control.design import ControlDesign, find_design, read_design, read_parameters
 from hsv.design.baseline import design_gains
 from hsv.design.inputs import find_inputs, read_inputs
-from hsv.flight.assembly import assemble_flight
 from hsv.flight.scenario import load_scenario
 from hsv.flight.tables import CommandTable
 from hsv.model.vehicle import load_vehicle
@@ -53,8 +50,6 @@ PERIODS = {
 }
 """Controllers by sampling period (s)."""
 
-_OTHER_COLORS = ("#008b8b", "#8c564b", "#c71585", "#556b2f")
-
 INTEGRATION_STEP = 0.01
 """s: of the vehicle, as at the shipped period."""
 
@@ -66,7 +61,7 @@ def coupling(scope: Scope) -> Outcome:
     def point(controller: Controller, kappa: float) -> Point:
         return Point({**controller.parameters(), "vehicle.model": "CM", "vehicle.coupling": repr(kappa)}, scope.over)
 
-    results = sweep(scope, "coupling", {c: [point(c, kappa) for kappa in kappas.tolist()] for c in ALL})
+    results = sweep(scope, ALL, kappas.tolist(), point)
     figure = plots.new_figure(7.2)
     axes = figure.subplots(3, 1, sharex=True)
     for done, (controller, width) in enumerate(zip(ALL, widths(len(ALL)), strict=True)):
@@ -105,13 +100,12 @@ def sampling(scope: Scope) -> Outcome:
     kappas = scope.grid(COUPLING_SCALES[0], COUPLING_SCALES[-1], 0.05)
     designs = {period: _design_at(period, scope) for period in PERIODS}
 
-    def point(design: ControlDesign) -> Point:
+    def point(controller: Controller, period: float) -> Point:
         # The integration keeps its step, whatever the control period.
-        substeps = max(1, round(design.period / INTEGRATION_STEP))
-        values = {**design.to_parameters(), **load_scenario("case1").parameters(), "substeps": substeps}
+        substeps = max(1, round(period / INTEGRATION_STEP))
+        values = {**designs[period].to_parameters(), **load_scenario("case1").parameters(), "substeps": substeps}
         return Point(values, scope.over)
 
-    results = sweep(scope, "sampling", {PERIODS[period]: [point(design)] for period, design in designs.items()})
     figure = plots.new_figure(5.6)
     axes = figure.subplots(2, 1, sharex=True)
     rows = []
@@ -123,7 +117,7 @@ def sampling(scope: Scope) -> Outcome:
             style = {"label": f"${controller.label}$".replace(" s$", "$ s"), "color": controller.color}
             draw_growth(axis, kappas, loop, scope.over, (1.0, 0.9), **style)
             row |= {f"{name}: {what}": limit for what, limit in coupling_limits(loop, scope.over).items()}
-        columns = results[controller]
+        columns = sweep(scope, [controller], [period], point)[controller]
         for metric, head, factor, digits in (
             ("post_fault_attitude_deviation", "attitude excursion, deg", plots.DEGREES, 3),
             ("elastic_decay_time", "decay, s", 1.0, 1),
@@ -149,51 +143,31 @@ def sampling(scope: Scope) -> Outcome:
 def parameters(scope: Scope) -> Outcome:
     """Fly every controller with 0 to 6 times the paper's parameter bounds."""
     scales = scope.grid(0.0, 6.0, 0.25)
-    over = [scope.corners(scale) for scale in scales.tolist()]
-    results = sweep(scope, "parameters", {c: [Point(c.parameters(), corners) for corners in over] for c in FLOWN})
+    results = sweep(scope, FLOWN, scales.tolist(), lambda c, scale: Point(c.parameters(), scope.corners(scale)))
     figure = plots.new_figure(7.2)
     label = "parameter scale (1: the paper's bounds, mass and moment of inertia 10 %)"
     for axis in draw_losses(figure, scales, {c: results[c] for c in ALL}, label):
         axis.axvline(1.0, **plots.DOTTED_GREY)
     return Outcome(
         figure,
-        f"Case 1 on the coupled model with the paper-like coupling, {in_words(over[0])} of the scaled bounds. {LOSSES}",
+        f"Case 1 on the coupled model with the paper-like coupling, {in_words(scope.over)} of the scaled bounds. "
+        f"{LOSSES}",
         "In multiples of the bounds:",
         [{"controller": c.label, **lost_where(scales, columns)} for c, columns in results.items()],
     )
 
 
-def others_with_elevator_fault(scenarios: Sequence[str]) -> list[Controller]:
-    """Return the controllers of further scenarios, labelled with their titles.
-
-    Raises:
-        ScenarioError: A scenario is invalid, or does not have exactly one fault, of the elevator.
-    """
-    others = []
-    for name, color in zip(scenarios, cycle(_OTHER_COLORS), strict=False):
-        scenario = load_scenario(name)
-        assemble_flight(scenario)
-        others.append(Controller(scenario.title, name, color, scenario.design, kept=False))
-        if (channels := others[-1].parameters().get("fault.channels", [])) != ["elevator_deflection"]:
-            raise ScenarioError(
-                f"scenario {name!r}: fault: of {', '.join(channels) or 'nothing'}, expected one, of elevator_deflection"
-            )
-    return others
-
-
 def fault(scope: Scope) -> Outcome:
-    """Fly every controller, and those of further scenarios, with an elevator effectiveness from 1 down to 0.3."""
-    others = others_with_elevator_fault(scope.additional)
+    """Fly every controller with an elevator effectiveness from 1 down to 0.3."""
     shares = scope.grid(0.3, 1.0, 0.025)
 
     def point(controller: Controller, left: float) -> Point:
         return Point(controller.parameters() | {"fault.parameters": [f"effectiveness={left!r}"]}, scope.over)
 
-    along = {c: [point(c, left) for left in shares.tolist()] for c in (*FLOWN, *others)}
-    results = sweep(scope, "fault", along)
+    results = sweep(scope, FLOWN, shares.tolist(), point)
     figure = plots.new_figure(7.2)
     label = "elevator effectiveness after the fault (0.9: the paper's)"
-    axes = draw_losses(figure, shares, {c: results[c] for c in (*ALL, *others)}, label)
+    axes = draw_losses(figure, shares, {c: results[c] for c in ALL}, label)
     # Without a fault the excursions are tiny, and that end of the curves would take most of the axis.
     axes[1].set_ylim(bottom=0.05)
     axes[2].set_ylim(bottom=1.0)
@@ -221,7 +195,7 @@ def ramp(scope: Scope) -> Outcome:
         scenario = load_scenario(controller.scenario).model_copy(update={"command": (changed,)})
         return Point({**read_parameters(find_design(controller.design)), **scenario.parameters()}, scope.over)
 
-    results = sweep(scope, "ramp", {c: [point(c, length) for length in lengths.tolist()] for c in RAMPED})
+    results = sweep(scope, RAMPED, lengths.tolist(), point)
     shipped = command(RAMPED[0])
     figure = plots.new_figure(7.2)
     axes = figure.subplots(3, 1, sharex=True)

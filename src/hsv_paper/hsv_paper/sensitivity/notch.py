@@ -36,7 +36,7 @@ def run(scope: Scope) -> Outcome:
         flown = {"notch.flown.zero_frequency": [centre], "notch.flown.pole_frequency": [centre]}
         return Point(coupled.parameters() | flown, scope.over)
 
-    results = sweep(scope, "notch", {c: [point(c, centre) for centre in centres.tolist()] for c in SETS})
+    results = sweep(scope, SETS, centres.tolist(), point)
     figure = new_figure(6.4)
     spec = figure.add_gridspec(2, 2)
     panels: list[Axes] = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -19,7 +19,7 @@ from hsv.flight.metrics import METRICS
 from hsv.flight.scenario import load_scenario
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.flights import Point, Table
+from hsv_paper.flights import Point, Table, fly_over
 from hsv_paper.linear_loop import Feedback
 from hsv_paper.plots import BLUE, GREEN, ORANGE, PURPLE, RED, letter, plain_log
 from hsv_paper.study import Scope
@@ -43,8 +43,6 @@ class Controller:
     color: str
     design: str = "baseline"
     changes: tuple[tuple[str, Any], ...] = ()
-    kept: bool = True
-    """Whether its flights are kept, because they depend only on the parameters and this library."""
 
     def parameters(self) -> dict[str, Any]:
         """Flat parameters of the flight."""
@@ -84,14 +82,21 @@ RMPC_DECOUPLED = Controller("RMPC as the paper flies it, on the decoupled model"
 ALL = (WITH_NOTCH, WIDER_NOTCH, WITHOUT_NOTCH, RMPC, RMPC_WITH_NOTCH)
 
 
-def sweep(scope: Scope, name: str, along: Mapping[Controller, Sequence[Point]]) -> dict[Controller, Columns]:
-    """Fly every controller at its points and return the columns; the nominal vehicle is the first of each point."""
-    return {
-        controller: columns_of(
-            scope.flights.tables(f"{name} flights {number} of {len(along)}", points, keep=controller.kept)
-        )
-        for number, (controller, points) in enumerate(along.items(), 1)
-    }
+def sweep(
+    scope: Scope,
+    controllers: Sequence[Controller],
+    values: Sequence[float],
+    point: Callable[[Controller, float], Point],
+) -> dict[Controller, Columns]:
+    """Fly every controller at the points of all values and return the columns."""
+    results = {}
+    for controller in controllers:
+        tables = []
+        for done, value in enumerate(values):
+            scope.progress(controller.label, done, len(values))
+            tables.append(fly_over(point(controller, value)))
+        results[controller] = columns_of(tables)
+    return results
 
 
 def columns_of(tables: Sequence[Table]) -> Columns:
@@ -129,7 +134,6 @@ def draw_losses(figure: Figure, x: np.ndarray, results: Mapping[Controller, Colu
     """Draw and return three panels over ``x``: flights not lost or saturated, attitude excursion, altitude error.
 
     Args:
-        figure: An empty figure.
         x: Values along the sweeps.
         results: Columns by controller.
         label: Label of ``x``.
@@ -163,7 +167,6 @@ def lost_where(x: np.ndarray, columns: Columns, digits: int = 2, *, rising: bool
 
     Args:
         x: Values along the sweep, increasing.
-        columns: Columns of the sweep.
         digits: Decimals of a value.
         rising: Begin at the smallest value, otherwise at the largest.
     """

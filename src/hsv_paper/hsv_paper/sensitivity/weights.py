@@ -8,7 +8,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from matplotlib.lines import Line2D
 
 from hsv.control.design import ControlDesign
 from hsv.design.baseline import disturbance_columns, nominal_family, nominal_problem, with_family
@@ -19,13 +18,16 @@ from hsv.model.signals import N_RIGID, N_STATES
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.designs import design
 from hsv_paper.flights import Point
-from hsv_paper.linear_loop import Corners, Feedback, stability_limit
-from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, ORANGE, PURPLE, RED, ZERO, letter, new_figure
-from hsv_paper.sensitivity.sweep import RMPC_DECOUPLED, WITH_NOTCH, WITHOUT_NOTCH, Columns, Controller, sweep
+from hsv_paper.linear_loop import Corners, Feedback
+from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, ORANGE, PURPLE, RED, ZERO, new_figure
+from hsv_paper.sensitivity.sweep import RMPC_DECOUPLED, WITH_NOTCH, Columns, Controller, sweep
 from hsv_paper.study import Outcome, Scope, in_words, rounded
 
 FACTORS = (0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0)
 """Factors by which a group is multiplied; 1: the baseline's own value."""
+
+FLOWN = FACTORS[::2]
+"""Factors with which flights are flown."""
 
 ATTITUDE = "post_fault_attitude_from_nominal_worst"
 
@@ -97,79 +99,50 @@ def varied(law: str, group: Group, factor: float) -> ControlDesign:
 
 def run(scope: Scope) -> Outcome:
     """Design F and K with each group of weights times each factor, linearise and fly Case 1 with them."""
-    factors = {"F": FACTORS[:: 1 if scope.coarseness < 2.0 else 2], "K": FACTORS[::2]}
 
-    def flown(law: str, controller: Controller) -> Results:
-        fixed = load_scenario(controller.scenario).parameters()
-        along = {
-            Controller(group.label, controller.scenario, group.color): [
-                Point({**varied(law, group, factor).to_parameters(), **fixed}, scope.over) for factor in factors[law]
-            ]
-            for group in GROUPS[law]
-        }
-        found = sweep(scope, f"weights {law} {controller.scenario}", along)
-        return dict(zip(GROUPS[law], found.values(), strict=True))
+    def flown(law: str, flown: Controller) -> Results:
+        fixed = load_scenario(flown.scenario).parameters()
+        groups = {Controller(group.label, flown.scenario, group.color): group for group in GROUPS[law]}
+
+        def point(controller: Controller, factor: float) -> Point:
+            return Point({**varied(law, groups[controller], factor).to_parameters(), **fixed}, scope.over)
+
+        return {groups[c]: columns for c, columns in sweep(scope, list(groups), FLOWN, point).items()}
 
     of_F, of_K, of_rmpc = flown("F", WITH_NOTCH), flown("K", WITH_NOTCH), flown("K", RMPC_DECOUPLED)
-    figure = new_figure(7.6)
-    panels = figure.subplots(3, 2, sharex=True)
+    figure = new_figure(3.6)
+    axis = figure.subplots()
     unstable = {}
     for notched, style in ((True, "o-"), (False, "o--")):
         for group in WEIGHTS:
             scope.progress("weights, linear loops", WEIGHTS.index(group), len(WEIGHTS))
-            growths = [_growth(group, factor, notched, scope.over) for factor in factors["F"]]
-            panels[0, 0].plot(factors["F"], growths, style, color=group.color, markersize=3)
-            unstable[group] = [value >= 0.0 for value in growths]
-    panels[0, 0].set_ylabel("largest real part (1/s)")
-    ends = ("altitude_end_error_nominal", "altitude_end_error_worst")
-    settling = ("altitude_settling_time_nominal", "velocity_settling_time_nominal")
-    for axis, law, results, names, unit, label in (
-        (panels[0, 1], "K", of_K, settling, 1.0, "step settled (s)"),
-        (panels[1, 0], "F", of_F, (ATTITUDE,), DEGREES, "attitude from nominal (deg)"),
-        (panels[1, 1], "K", of_K, (ATTITUDE,), DEGREES, "attitude from nominal (deg)"),
-        (panels[2, 0], "F", of_F, ends, FEET, "altitude error at end (ft)"),
-        (panels[2, 1], "K", of_rmpc, ends, FEET, "altitude error at end,\nRMPC (ft)"),
-    ):
-        for group, columns in results.items():
-            for name, style in zip(names, ("o-", "o--"), strict=False):
-                axis.plot(factors[law], unit * columns[name], style, color=group.color, markersize=3)
-        axis.set_ylabel(label)
-    for axis, limit in ((panels[0, 0], 0.0), (panels[1, 0], 0.5), (panels[1, 1], 0.5)):
-        axis.axhline(limit, **ZERO)
-    panels[1, 1].sharey(panels[1, 0])
-    for axis in (panels[0, 1], *panels[2]):
-        axis.set_ylim(bottom=0.0)
-    for axis, law in zip(panels[2], ("F", "K"), strict=True):
-        axis.set_xlabel(f"factor on a group of weights of {law}")
-    for axis in panels.ravel():
-        axis.set_xscale("log")
-        axis.set_xticks(FACTORS, [f"{factor:.2g}" for factor in FACTORS])
-        axis.minorticks_off()
-    letter(panels.ravel())
-    groups = [Line2D([], [], color=group.color, marker="o", markersize=3, label=group.label) for group in of_K]
-    figure.legend(handles=groups, loc="outside upper center", ncols=2, frameon=False)
+            growths = [_growth(group, factor, notched, scope.over) for factor in FACTORS]
+            label = group.label if notched else None
+            axis.plot(FACTORS, growths, style, color=group.color, markersize=3, label=label)
+            unstable[group] = [value >= 0.0 for value in growths[::2]]
+    axis.axhline(0.0, **ZERO)
+    axis.set(ylabel="largest real part (1/s)", xlabel="factor on a group of weights of F", xscale="log")
+    axis.set_xticks(FACTORS, [f"{factor:.2g}" for factor in FACTORS])
+    axis.minorticks_off()
+    figure.legend(loc="outside upper center", ncols=2, frameon=False)
 
     def rows(law: str, columns: Callable[[Group, int], dict[str, Any]]) -> list[dict[str, Any]]:
         """Return the rows of the baseline's own weights, and of the smallest and the largest factor of each group."""
-        last = len(factors[law]) - 1
-        chosen = [(ELEVATOR, factors[law].index(1.0)), *((group, i) for group in GROUPS[law] for i in (0, last))]
+        chosen = [(ELEVATOR, FLOWN.index(1.0)), *((group, i) for group in GROUPS[law] for i in (0, len(FLOWN) - 1))]
         return [
-            {law: "own weights" if factors[law][i] == 1.0 else f"{group.label} times {factors[law][i]:g}"}
-            | columns(group, i)
+            {law: "own weights" if FLOWN[i] == 1.0 else f"{group.label} times {FLOWN[i]:g}"} | columns(group, i)
             for group, i in chosen
         ]
 
     return Outcome(
         figure,
         "The baseline with one group of its scales or input bounds multiplied by a factor (1 is the baseline itself; a "
-        "weight is one over the square of its scale, so that a larger scale is a smaller weight). The left panels vary "
-        "F, the right panels K with its input bounds; everything else is unchanged. The flights are those of Case 1 "
-        f"with the paper-like coupling, {in_words(scope.over)}. (a) Largest growth of all vehicles; with notch (solid) "
-        "and without (dashed). (b) Time until altitude (solid) and velocity (dashed) have settled to 2 % of the step, "
-        "nominal vehicle; a line ends where they do not settle before the fault. (c), (d) Attitude deviation from "
-        "nominal after the fault, worst corner; the black line is half a degree. (e) Altitude error at the end, "
-        "nominal vehicle (solid) and worst corner (dashed). (f) The same error with robust MPC and the fourth gain, as "
-        "the paper flies it: on the decoupled model, without notch; a dashed line ends where a flight is lost.",
+        "weight is one over the square of its scale, so that a larger scale is a smaller weight). Either F is varied, "
+        "or K with its input bounds; everything else is unchanged. The figure shows the largest growth of all vehicles "
+        "over the weights of F, with notch (solid) and without (dashed). The flights are those of Case 1 with the "
+        f"paper-like coupling, {in_words(scope.over)}; settling times are those to 2 % of the step of the nominal "
+        "vehicle (–: not before the fault). Robust MPC flies the fourth gain as the paper does: on the decoupled "
+        "model, without notch.",
         rows(
             "F",
             lambda group, i: {
@@ -189,16 +162,6 @@ def run(scope: Scope) -> Outcome:
                 "flights of RMPC lost, %": rounded(100.0 * (1.0 - of_rmpc[group]["finished"][i])),
             },
         ),
-        "Scale of the elevator in F up to which the linear loop is stable, in rad "
-        f"({_inputs().feedback.input_scale.elevator_deflection:g} in the baseline; –: at every factor):",
-        [
-            {
-                "controller": controller.label,
-                "nominal vehicle": _elevator_limit(controller is WITH_NOTCH, scope.over[:1]),
-                "worst corner": _elevator_limit(controller is WITH_NOTCH, scope.over),
-            }
-            for controller in (WITH_NOTCH, WITHOUT_NOTCH)
-        ],
     )
 
 
@@ -206,8 +169,3 @@ def _growth(group: Group, factor: float, notched: bool, over: Corners) -> float:
     loop = Feedback.of(design("baseline"), notched=notched)
     vehicle = load_vehicle().coupled("paper_like")
     return replace(loop, gain=varied("F", group, factor).feedback_gain).growth(vehicle, over)
-
-
-def _elevator_limit(notched: bool, over: Corners) -> float | None:
-    found = stability_limit(lambda factor: _growth(ELEVATOR, factor, notched, over), FACTORS)
-    return None if found is None else round(found * _inputs().feedback.input_scale.elevator_deflection, 3)

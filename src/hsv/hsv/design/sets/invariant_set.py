@@ -6,7 +6,7 @@ are lam and l_j >= 0, sum l_j <= 1 - lam, with (S-procedure)
     [lam Q, 0, Q A_i'; 0, diag(l), G_i'; A_i Q, G_i, Q] >= 0.
 
 Convex combinations of vertices follow, because the set is convex. For fixed lam this is linear in Q, l and c. The
-paper's set is a box (eq. 25 to eq. 28), which does not exist here; see ``hsv_paper.box``.
+paper's set is a box (eq. 25 to eq. 28), which does not exist here; see ``hsv_paper.claims.numbers.box``.
 """
 
 from __future__ import annotations
