@@ -13,7 +13,7 @@ FILES = {
 }
 
 PLANT, TUBE_MPC = ("hsv_plant", "plant"), ("hsv_ctrl", "tube_mpc")
-COMPOSED, RECORDER = ("hsv_bringup", "composed"), ("hsv_bringup", "recorder")
+RECORDER = ("hsv_bringup", "recorder")
 
 
 @pytest.mark.parametrize(
@@ -25,13 +25,9 @@ COMPOSED, RECORDER = ("hsv_bringup", "composed"), ("hsv_bringup", "recorder")
         long(TUBE_MPC, "-r __ns:=/veh1 --params-file full.yaml", ["feedback.tua", "nearest is feedback.tau"]),
         long(TUBE_MPC, "--params-file broken.yaml", ["broken.yaml"]),
         long(TUBE_MPC, "-p feedback.gain:=[1.0,2.0]", ["feedback.gain", "2 values, expected 18"]),
-        long(COMPOSED, "-r __node:=x", ["__node:=x", "expected NODE:__node:=x"]),
         long(RECORDER, "-p bag.attachments:=[1]", ["bag.attachments = [1]", "expected string array"]),
         long(RECORDER, "-p bag.attachments:=[nowhere.txt]", ["bag.attachments = 'nowhere.txt'"]),
-        long(PLANT, "-p use_sim_time:=true", ["use_sim_time", "makes the clock itself"]),
         long(PLANT, "-p initial.altitude:=30000.0", ["initial.altitude = 30000.0", "25908 to 26365.2 m"]),
-        long(PLANT, "-r __ns:=veh1", ["__ns:=veh1", "leading slash"]),
-        long(PLANT, "-r __node:=9x", ["__node:=9x", "no digit first"]),
         long(PLANT, "-p controller:=nosuch", ["controller = 'nosuch'", "expected one of robust_mpc, tube_mpc"]),
         long(PLANT, "-p vehicle.name:=nosuch", ["vehicle 'nosuch'", "expected one of parker, "]),
         long(PLANT, "-r hsv/state", ["'-r hsv/state'"]),

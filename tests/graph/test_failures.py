@@ -162,7 +162,6 @@ def test_nodes_do_not_outlive_a_killed_launcher(processes):
 @pytest.mark.parametrize("name", ["notch_filter", "plant"])
 def test_a_hung_node_is_named_and_ends_the_run(processes, name):
     bag = processes.folder / "hung"
-    # Longer than it takes to call a process hung: that is said before.
     run = _start_and_fly(processes, bag, "--step-timeout", "6")
     pid = children(run.pid)[name]
     os.kill(pid, signal.SIGSTOP)
@@ -172,7 +171,6 @@ def test_a_hung_node_is_named_and_ends_the_run(processes, name):
         if Path(f"/proc/{pid}").exists():
             os.kill(pid, signal.SIGCONT)
     assert run.returncode == 1
-    assert f"{name}: [WARN] hangs: no progress for 5 s" in output
     assert ("plant hangs: no progress for 6." if name == "plant" else f"no answer from {name}") in output
     assert Bag(bag).complete
 

@@ -10,7 +10,6 @@ from hsv.bags.description import COMPOSED, ROOT, TUBE_MPC
 from hsv.base.errors import ParameterError, RunError
 from hsv.graph.exclusive import claim
 from hsv.graph.launcher import Launcher
-from hsv.graph.snapshot import Snapshot
 
 # A number that no graph can have and no other test run takes: only its name is held.
 DOMAIN = 10**9 + os.getpid()
@@ -71,12 +70,3 @@ def test_a_network_is_needed():
     words = [sys.executable, "-c", "from hsv.graph.exclusive import ros_domain; ros_domain()"]
     done = subprocess.run([*isolated, *words], capture_output=True, text=True, check=False)
     assert "ParameterError: network interface lo: down, expected up" in done.stderr
-
-
-def test_a_line_about_the_flight_is_read_as_it_was_written_and_no_other_is_taken_for_one():
-    for told in (
-        Snapshot(120.5, 26200.0, -1.2, 0.06, ("elevator_deflection bias",)),
-        Snapshot(0.0, 1.0, 2.0, None, ()),
-    ):
-        assert Snapshot.read(told.line) == told
-    assert Snapshot.read("step 50 of 10000") is Snapshot.read("[INFO] recording to bags/x") is Snapshot.read("") is None

@@ -141,15 +141,15 @@ def _refuse_duplicates(processes, files):
 
 
 def _fly_dumped(processes):
-    """Fly with the dumped parameters, and simulated time for all who do not make it, which changes no bit."""
+    """Fly with the dumped parameters, and simulated time for all, which changes no bit."""
     folder = processes.folder
     arguments = {
         node.name: ["--params-file", str(folder / "dumps" / f"{'nf2' if node is NOTCH_FILTER else node.name}.yaml")]
         for node in graph()
     }
     for name in arguments:
-        shortened = ["-p", f"duration:={DURATION}", "-p", "real_time_factor:=0.0"]
-        arguments[name] += shortened if name == PLANT.name else ["-p", "use_sim_time:=true"]
+        arguments[name] += ["-p", "use_sim_time:=true"]
+    arguments[PLANT.name] += ["-p", f"duration:={DURATION}", "-p", "real_time_factor:=0.0"]
     arguments[NOTCH_FILTER.name] += ["-r", "__node:=nf2"]
     arguments[RECORDER.name] += ["-p", f"bag.directory:={folder / 'again'}", "-p", "bag.attachments:=['']"]
     nodes = by_hand(processes, graph(), arguments)

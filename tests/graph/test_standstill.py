@@ -5,10 +5,9 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 from hsv.graph import standstill as module
-from hsv.graph.standstill import Standstill, processor_time, processor_time_of
+from hsv.graph.standstill import Standstill, processor_time
 
 
 def test_time_counts_while_nothing_changes_and_a_gap_between_looks_little(monkeypatch):
@@ -34,7 +33,6 @@ def test_processor_time_grows_for_a_process_that_looks_around_and_not_for_a_stop
         assert process.stdout is not None
         process.stdout.readline()
         before = used = processor_time(process.pid)
-        assert processor_time_of((Path(sys.executable).name,)) >= (used or 0.0) > processor_time_of(("nobody",)) == 0.0
         assert before is not None and before > 0.0
         while used == before:
             time.sleep(0.01)

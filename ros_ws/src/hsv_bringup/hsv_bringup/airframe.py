@@ -12,7 +12,6 @@ from functools import partial
 
 from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Vector3
 from hsv_msgs.msg import Actuator, VehicleState
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -22,6 +21,7 @@ from hsv.model.airframe.geometry import airframe
 from hsv.model.airframe.pose import LEVEL, Sample, Transform, composed, transforms
 from hsv.model.airframe.solids import LABEL_COLOUR, LABEL_HEIGHT, LABEL_SIZE, Colour, label, solids
 from hsv_node.main import run_node
+from hsv_node.middleware import LATEST
 from hsv_node.parameters import declare
 from hsv_node.process import ProcessNode
 
@@ -30,21 +30,11 @@ try:
 except ImportError:  # ROS 2 as wheels has no such package
     TFMessage = None
 
+_LARGEST = airframe().largest_exaggeration
 PARAMETERS = (
     Parameter("rate", 25.0, "pictures a second of wall time, at most", "1/s", 0.1, 1e3),
-    Parameter(
-        "exaggeration",
-        airframe().exaggeration,
-        "of the bending",
-        "",
-        0.0,
-        airframe().largest_exaggeration,
-        read_only=False,
-    ),
+    Parameter("exaggeration", airframe().exaggeration, "of the bending", "", 0.0, _LARGEST, read_only=False),
 )
-
-LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Quality of service that keeps only the latest message."""
 
 
 class AirframeNode(ProcessNode):
@@ -88,35 +78,16 @@ class AirframeNode(ProcessNode):
     def _marker_array(self, stamp: object, chain: Sequence[Transform], text: str) -> MarkerArray:
         # All in one frame, so that they are drawn where there is no /tf.
         frames = composed(chain)
-        header = Header(stamp=stamp, frame_id=LEVEL)
+        common = {"header": Header(stamp=stamp, frame_id=LEVEL), "action": Marker.ADD}
         markers = []
         for number, (solid, points) in enumerate(self._solids):
             at = frames[solid.frame]
-            markers.append(
-                Marker(
-                    header=header,
-                    ns=solid.name,
-                    id=number,
-                    type=Marker.TRIANGLE_LIST,
-                    action=Marker.ADD,
-                    pose=Pose(position=Point(x=at.x, z=at.z), orientation=_quaternion(at)),
-                    scale=Vector3(x=1.0, y=1.0, z=1.0),
-                    color=_colour(solid.colour),
-                    points=points,
-                )
-            )
-        markers.append(
-            Marker(
-                header=header,
-                ns="label",
-                type=Marker.TEXT_VIEW_FACING,
-                action=Marker.ADD,
-                pose=Pose(position=Point(z=LABEL_HEIGHT)),
-                scale=Vector3(z=LABEL_SIZE),
-                color=_colour(LABEL_COLOUR),
-                text=text,
-            )
-        )
+            pose = Pose(position=Point(x=at.x, z=at.z), orientation=_quaternion(at))
+            look = {"scale": Vector3(x=1.0, y=1.0, z=1.0), "color": _colour(solid.colour), "points": points}
+            markers.append(Marker(ns=solid.name, id=number, type=Marker.TRIANGLE_LIST, pose=pose, **look, **common))
+        pose = Pose(position=Point(z=LABEL_HEIGHT))
+        look = {"scale": Vector3(z=LABEL_SIZE), "color": _colour(LABEL_COLOUR), "text": text}
+        markers.append(Marker(ns="label", type=Marker.TEXT_VIEW_FACING, pose=pose, **look, **common))
         return MarkerArray(markers=markers)
 
 
@@ -128,13 +99,11 @@ def _stamped(stamp: object, transform: Transform) -> TransformStamped:
 
 
 def _quaternion(transform: Transform) -> Quaternion:
-    x, y, z, w = transform.quaternion
-    return Quaternion(x=x, y=y, z=z, w=w)
+    return Quaternion(**dict(zip("xyzw", transform.quaternion, strict=True)))
 
 
 def _colour(colour: Colour) -> ColorRGBA:
-    red, green, blue, alpha = colour
-    return ColorRGBA(r=red, g=green, b=blue, a=alpha)
+    return ColorRGBA(**dict(zip("rgba", colour, strict=True)))
 
 
 main = partial(run_node, AirframeNode, "airframe")

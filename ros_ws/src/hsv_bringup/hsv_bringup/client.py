@@ -8,7 +8,7 @@ import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import Any, NoReturn
+from typing import Any
 
 import rclpy
 from hsv_msgs.msg import Run
@@ -22,7 +22,7 @@ from hsv.base.processes import take_signals
 from hsv.graph.exclusive import is_published, ros_domain
 from hsv.graph.standstill import Standstill
 from hsv_node import roles
-from hsv_node.middleware import LATCHED, ServiceCall, type_name
+from hsv_node.middleware import LATCHED, ServiceCall
 from hsv_node.process import ends_with
 
 ABSENT_AFTER = 3.0
@@ -34,17 +34,8 @@ SILENT_AFTER = 30.0
 SETTLED_AFTER = 3.0
 """Time (s) without a change in the topics after which discovery is complete."""
 
-COMPLETE_AFTER = 1.0
-"""As :data:`SETTLED_AFTER`, if all nodes of a graph are known."""
-
 MESSAGE_AFTER = 5.0
 """Time (s) of waiting before the first message about it, and between messages."""
-
-INTERRUPTED = 130
-"""Exit code after Ctrl-C."""
-
-_UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
-"""Name that rmw reports for a node whose endpoint is known but whose name is not yet."""
 
 _POLL = 0.1
 """Time (s) between checks of a condition."""
@@ -59,16 +50,18 @@ class GraphClient(Node):
     def find_run(self) -> Run:
         """Return the current run of the plant."""
         runs: list[Run] = []
-        name = self._name_of(PLANT, roles.published, Run)
+        name = self._name_of(PLANT, Run)
         if name:
             self.create_subscription(Run, name, runs.append, LATCHED)
         if not name or not self.wait_for(lambda: runs, f"a run ({name})"):
             raise RunError(f"no run in {self.where}: expected hsv run, or nodes started by hand there")
         return runs[-1]
 
-    def topic_of(self, role: NodeDescription, kind: type) -> str:
-        """Return the full name of the topic of message type ``kind`` published by the node in ``role``."""
-        return self._name_of(role, roles.published, kind) or self._refuse_absent(role)
+    def name_of(self, role: NodeDescription, kind: type) -> str:
+        """Return the full name of the topic or service of type ``kind`` of the node in ``role``."""
+        if name := self._name_of(role, kind):
+            return name
+        raise RunError(f"no {role.name} in {self.where}: expected a node that publishes {role.known_by}")
 
     @property
     def where(self) -> str:
@@ -78,7 +71,7 @@ class GraphClient(Node):
 
     def call(self, role: NodeDescription, kind: Any, request: Any) -> Any:
         """Call the service of type ``kind`` of the node in ``role`` and return the reply."""
-        service = self._name_of(role, roles.services, kind) or self._refuse_absent(role)
+        service = self.name_of(role, kind)
         call = ServiceCall(self, kind, service, request)
         if self.wait_for(call.response, service):
             return call.response()
@@ -92,22 +85,15 @@ class GraphClient(Node):
         """Return the full names of the known nodes that subscribe to ``topic``, except this one."""
         return self._others(self.get_subscriptions_info_by_topic(topic))
 
-    def settle(self, complete: Callable[[], object], enough: Callable[[], object]) -> None:
-        """Wait until the topics and endpoints do not change any more, or until ``enough`` are known.
-
-        The wait is shorter if the graph is ``complete``. It is needed even then, because further nodes, such as a
-        recorder or a viewer, may use the topics of the graph.
-        """
+    def settle(self, enough: Callable[[], object]) -> None:
+        """Wait until the topics and endpoints do not change any more, or until ``enough`` are known."""
         standstill = Standstill()
         while not enough():
-            still = standstill.look(self._endpoints())
-            if still >= (COMPLETE_AFTER if complete() else SETTLED_AFTER):
+            names = (name for name, _ in self.get_topic_names_and_types())
+            endpoints = [(name, self.count_publishers(name), self.count_subscribers(name)) for name in names]
+            if standstill.look(endpoints) >= SETTLED_AFTER:
                 return
             rclpy.spin_once(self, timeout_sec=_POLL)
-
-    def _endpoints(self) -> list[tuple[str, int, int]]:
-        names = (name for name, _ in self.get_topic_names_and_types())
-        return [(name, self.count_publishers(name), self.count_subscribers(name)) for name in names]
 
     def wait_for(
         self, done: Callable[[], object], what: str, published: Sequence[str] = (), for_ever: bool = False
@@ -122,13 +108,11 @@ class GraphClient(Node):
             for_ever: Whether to wait without a limit.
         """
         standstill, message_pause = Standstill(), Standstill()
+        domain = self.context.get_domain_id()
         absent = bool(published)
         while not done():
             rclpy.spin_once(self, timeout_sec=_POLL)
-            if absent:
-                absent = not any(
-                    is_published(self.context.get_domain_id(), self.resolve_topic_name(topic)) for topic in published
-                )
+            absent = absent and not any(is_published(domain, self.resolve_topic_name(topic)) for topic in published)
             still = standstill.look(sorted(self.get_node_names_and_namespaces()))
             if not for_ever and still > (ABSENT_AFTER if absent else SILENT_AFTER):
                 return False
@@ -137,42 +121,19 @@ class GraphClient(Node):
                 print(f"waiting for {what}", file=sys.stderr, flush=True)
         return True
 
-    def _name_of(
-        self, role: NodeDescription, offers: Callable[[Node, str, str], Mapping[str, Sequence[str]]], kind: type
-    ) -> str | None:
-        """Return the name of the topic or service of type ``kind`` of the node in ``role``, or None without a node."""
-        names: list[str] = []
+    def _name_of(self, role: NodeDescription, kind: type) -> str | None:
+        names: list[str | None] = []
 
         def found() -> bool:
-            node = roles.node_in_role(self, role)
-            offered = offers(self, *node) if node else {}
-            names[:] = [name for name, kinds in offered.items() if type_name(kind) in kinds]
-            return bool(names)
+            names.append(roles.name_of(self, role, kind))
+            return names[-1] is not None
 
-        return names[0] if self.wait_for(found, f"{role.name} in {self.where}", role.own_topics) else None
-
-    def _refuse_absent(self, role: NodeDescription) -> NoReturn:
-        raise RunError(f"no {role.name} in {self.where}: expected a node that publishes {role.known_by}")
+        return names[-1] if self.wait_for(found, f"{role.name} in {self.where}", role.own_topics) else None
 
     def _others(self, endpoints: Sequence[Any]) -> list[str]:
         # Discovery finds an endpoint before the name of its node.
-        known = [e for e in endpoints if e.node_name not in (_UNKNOWN_NODE, self.get_name())]
+        known = [e for e in endpoints if e.node_name not in ("_NODE_NAME_UNKNOWN_", self.get_name())]
         return sorted({roles.full_name(e.node_name, e.node_namespace) for e in known})
-
-
-class OneLineParser(argparse.ArgumentParser):
-    """A parser that reports wrong arguments in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        """Print the message and end with exit code 2."""
-        self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
-
-
-class _Prog(argparse.Action):
-    """Option that sets the command name in error messages, such as ``hsv set``."""
-
-    def __call__(self, parser: argparse.ArgumentParser, _options: argparse.Namespace, values: Any, *_: object) -> None:
-        parser.prog = values
 
 
 def run_client(
@@ -188,30 +149,28 @@ def run_client(
         args: Command line; default: ``sys.argv``.
     """
     arguments = list(sys.argv if args is None else args)
-    name = parser.prog
-    parser.add_argument("--prog", action=_Prog, help=argparse.SUPPRESS)
+    parser.add_argument("--prog", default=parser.prog, help=argparse.SUPPRESS)  # such as hsv set, for error messages
     options = parser.parse_args(remove_ros_args(arguments)[1:])
-    clients: list[GraphClient] = []
+    client: GraphClient | None = None
     code = 1
     try:
         take_signals(signal.default_int_handler)
         ros_domain()
         rclpy.init(args=arguments, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-        clients.append(GraphClient(name))
-        act(clients[0], options)
+        client = GraphClient(parser.prog)
+        act(client, options)
         sys.stdout.flush()
         code = 0
     except KeyboardInterrupt:
-        code = _refuse(parser.prog, "interrupted", INTERRUPTED)
+        code = _refuse(options.prog, "interrupted", 130)
     except BrokenPipeError:
         # The reader of the pipe has ended: redirect stdout, so that Python does not fail again when it exits.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 1
     except HsvError as error:
-        code = _refuse(parser.prog, error, 1 if isinstance(error, RunError) else 2)
+        code = _refuse(options.prog, error, 1 if isinstance(error, RunError) else 2)
     finally:
         with suppress(KeyboardInterrupt), ends_with(code):
-            for client in clients:
+            if client:
                 client.destroy_node()
             rclpy.try_shutdown()
     return code

@@ -9,7 +9,7 @@ import argparse
 from collections.abc import Sequence
 from math import isclose
 
-from hsv_msgs.msg import Actuator, Fault, Reference
+from hsv_msgs.msg import Actuator, Reference
 from hsv_msgs.srv import ClearFault, InjectFault, SetCommand
 from rcl_interfaces.msg import Log, SetParametersResult
 from rcl_interfaces.srv import SetParameters
@@ -20,18 +20,13 @@ from hsv.bags.messages import fault_in
 from hsv.base.errors import ParameterError, RunError
 from hsv.graph.node_parameters import find, parse, step_in
 from hsv.model.faults.injector import read_parameters
-from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
-from hsv_node.middleware import LATCHED, STEP
+from hsv_bringup.client import GraphClient, acting_from, answer, run_client
+from hsv_node.middleware import LATCHED, STEP, fault_message
 
 
 def _inject(client: GraphClient, options: argparse.Namespace) -> None:
     parameters = read_parameters(",".join(options.parameters))
-    fault = Fault(
-        channel=options.channel,
-        type=options.type,
-        parameter_names=list(parameters),
-        parameter_values=list(parameters.values()),
-    )
+    fault = fault_message(options.channel, options.type, parameters)
     _change(client, options, InjectFault, InjectFault.Request(fault=fault, duration=options.duration))
 
 
@@ -51,7 +46,7 @@ def _change(client: GraphClient, options: argparse.Namespace, kind: type, reques
 def _list(client: GraphClient, options: argparse.Namespace) -> None:
     run = client.find_run()
     statuses: list[Actuator] = []
-    name = client.topic_of(FAULT_INJECTOR, Actuator)
+    name = client.name_of(FAULT_INJECTOR, Actuator)
     client.create_subscription(Actuator, name, statuses.append, STEP)
     if not client.wait_for(lambda: statuses, f"a step ({name})"):
         raise RunError(f"no step is flown: no message on {name}")
@@ -59,15 +54,15 @@ def _list(client: GraphClient, options: argparse.Namespace) -> None:
     active = [fault_in(message) for message in status.active]
     time, values = acting_from(run, status.step)
     words = "; ".join(map(str, active)) or "no fault"
-    described = [{"channel": f.channel, "type": f.type, "parameters": f.parameters} for f in active]
-    answer(f"step {status.step}, {time}: {words}", {**values, "active": described}, options.json)
+    values["active"] = [{"channel": f.channel, "type": f.type, "parameters": f.parameters} for f in active]
+    answer(f"step {status.step}, {time}: {words}", values, options.json)
 
 
 def fault(args: Sequence[str] | None = None) -> int:
     """Run the command."""
-    parser = OneLineParser(prog="fault", description="Inject, clear and list faults in flight.")
+    parser = argparse.ArgumentParser(prog="fault", description="Inject, clear and list faults in flight.")
     parser.add_argument("--json", action="store_true", help="print a JSON object")
-    commands = parser.add_subparsers(required=True, metavar="{inject,clear,list}", parser_class=OneLineParser)
+    commands = parser.add_subparsers(required=True, metavar="{inject,clear,list}")
     inject = commands.add_parser("inject", help="begin a fault with the next step")
     inject.add_argument("channel", help="e.g. elevator_deflection")
     inject.add_argument("type", help="e.g. loss_of_effectiveness")
@@ -86,7 +81,7 @@ def _command(client: GraphClient, options: argparse.Namespace) -> None:
     run = client.find_run()
     fields = {name: getattr(options, name) for name in ("altitude", "velocity", "duration", "blend")}
     published: list[Reference] = []
-    topic = client.topic_of(NOMINAL_TRAJECTORY, Reference)
+    topic = client.name_of(NOMINAL_TRAJECTORY, Reference)
     client.create_subscription(Reference, topic, published.append, LATCHED)
     logged: list[Log] = []
     client.create_subscription(Log, ROSOUT, logged.append, LATCHED)
@@ -100,10 +95,10 @@ def _command(client: GraphClient, options: argparse.Namespace) -> None:
     def reasons() -> list[str]:
         return [log.msg.removeprefix(rejected) for log in logged if log.msg.startswith(rejected)]
 
-    def plans() -> list[Reference]:
-        """Return the references that lead to this point; a rejected command may have had the same step."""
+    def ends() -> list[float]:
+        """Return the times of rest of the references that lead to this point, not those of an earlier command."""
         return [
-            m
+            m.times[-1] + m.blends[-1]
             for m in published
             if (m.status, m.step) == (Reference.FLOWN, response.step)
             and isclose(m.altitudes[-1], options.altitude)
@@ -111,22 +106,23 @@ def _command(client: GraphClient, options: argparse.Namespace) -> None:
         ]
 
     def known() -> bool:
-        return bool(plans() or reasons()) or not client.count_publishers(topic)
+        return bool(ends() or reasons()) or not client.count_publishers(topic)
 
     client.wait_for(known, f"the plan ({topic})", for_ever=True)
-    if reasons() and not plans():
-        raise ParameterError(reasons()[-1])
-    if not plans():
+    if not ends():
+        if reasons():
+            raise ParameterError(reasons()[-1])
         raise RunError("the flight has ended before the plan was known")
-    reference = plans()[-1]
-    end = reference.times[-1] + reference.blends[-1]
+    end = ends()[-1]
     message = f"{response.message}, at rest at {end:.2f} s"
     answer(f"{message}, {time}", {"message": message, **values, "end_s": round(end, 9)}, options.json)
 
 
 def set_command(args: Sequence[str] | None = None) -> int:
     """Run the command."""
-    parser = OneLineParser(prog="set_command", description="Command another point of altitude and velocity in flight.")
+    parser = argparse.ArgumentParser(
+        prog="set_command", description="Command another point of altitude and velocity in flight."
+    )
     parser.add_argument("altitude", type=float, help="m")
     parser.add_argument("velocity", type=float, help="m/s")
     parser.add_argument("--duration", type=float, default=0.0, help="least length of the ramp, s; 0: as short as fits")
@@ -153,7 +149,7 @@ def _set(client: GraphClient, options: argparse.Namespace) -> None:
 
 def set_parameter(args: Sequence[str] | None = None) -> int:
     """Run the command."""
-    parser = OneLineParser(prog="set_parameter", description="Change a parameter in flight.")
+    parser = argparse.ArgumentParser(prog="set_parameter", description="Change a parameter in flight.")
     parser.add_argument("name", help="e.g. tau, or feedback.tau; real_time_factor, paused")
     parser.add_argument("value", help="e.g. 0.8, or a number for each element: 0.8,0.8,0.9,0.9,1; true or false")
     parser.add_argument("--json", action="store_true", help="print a JSON object")

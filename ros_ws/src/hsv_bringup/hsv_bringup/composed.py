@@ -14,7 +14,7 @@ from hsv_bringup.recorder import RecorderNode
 from hsv_ctrl.blocks import ControllerNode, NotchFilterNode
 from hsv_ctrl.nominal_trajectory import NominalTrajectoryNode
 from hsv_ctrl.tube_mpc import RobustMpcNode, TubeMpcNode
-from hsv_node.main import run_nodes
+from hsv_node.main import run_node
 from hsv_node.process import ProcessNode
 from hsv_plant.fault_injector import FaultInjectorNode
 from hsv_plant.plant import PlantNode
@@ -38,4 +38,4 @@ def nodes() -> Iterator[ProcessNode]:
         yield RecorderNode()
 
 
-main = partial(run_nodes, nodes, "composed", executor_class=FlowExecutor)
+main = partial(run_node, nodes, "composed", executor_class=FlowExecutor, several=True)

@@ -57,11 +57,7 @@ class FlowExecutor(SingleThreadedExecutor):
         super().spin_once(timeout_sec=0.0 if sweeps else timeout_sec)
 
     def drain(self) -> bool:
-        """Take all messages that have arrived, subscription by subscription, up to ``SWEEPS`` of each.
-
-        Returns:
-            Whether there were any.
-        """
+        """Take all messages that have arrived, up to ``SWEEPS`` of each subscription; return whether there were any."""
         return self._take(self._subscriptions, SWEEPS)
 
     def _take(self, subscriptions: list[_Subscription], limit: int) -> bool:

@@ -9,9 +9,8 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from hsv_msgs.msg import Fault, Run, VehicleState
+from hsv_msgs.msg import Run, VehicleState
 from hsv_msgs.srv import ClearFault, InjectFault
-from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter as RosParameter
@@ -46,22 +45,16 @@ from hsv.pages.panels import INPUTS
 from hsv_bringup.client import ABSENT_AFTER, SILENT_AFTER
 from hsv_bringup.flow_executor import FlowExecutor
 from hsv_node.main import run_node
-from hsv_node.middleware import LATCHED, ServiceCall, message_class, type_name
+from hsv_node.middleware import LATCHED, ServiceCall, fault_message, message_class
 from hsv_node.parameters import declare, refuse_unknown
 from hsv_node.process import ProcessNode
-from hsv_node.roles import full_name, node_in_role, services
+from hsv_node.roles import name_of
 
 RATE = 20.0
 """Polls per second, Hz: rows of the page, and batches for Foxglove."""
 
-DEPTH = 1000
-"""Depth of the queue of a topic, messages: 20 s in real time; at full speed messages may be lost."""
-
-WATCHING = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Quality of service of a viewer, for which no publisher waits."""
-
-_PLANT_CHECK = 1.0
-"""Time (s) between two checks for the plant."""
+WATCHING = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Quality of service of a viewer, for which no publisher waits. At full speed messages may be lost."""
 
 
 class LiveExecutor(FlowExecutor):
@@ -84,7 +77,7 @@ class _Request:
     request: Any
     done: Callable[[Any], None]
     """Function called with the response."""
-    refused: Callable[[str], None]
+    refused: Callable[[str], None] = lambda reason: None
     """Function called with the reason if there is no response."""
     call: ServiceCall | None = None
     standstill: Standstill = field(default_factory=Standstill)
@@ -96,12 +89,13 @@ class LiveNode(ProcessNode):
     def __init__(self) -> None:
         # Without rosout and parameter services, so that nothing of this node is recorded with the flight.
         super().__init__(LIVE.name, enable_rosout=False, start_parameter_services=False)
-        refuse_unknown(self, LIVE.name, self.of_others)
+        refuse_unknown(self, LIVE.name)
         values = declare(self, LIVE_PARAMETERS)
-        self._kinds = {topic: message_class(kind) for topic, kind in (TOPICS | OTHER_TOPICS).items()}
-        self._names = {topic: self.resolve_topic_name(topic) for topic in self._kinds}
+        kinds = TOPICS | OTHER_TOPICS
+        self._kinds = {topic: message_class(kind) for topic, kind in kinds.items()}
+        self._names = {topic: self.resolve_topic_name(topic) for topic in kinds}
         self.hub = Hub(self._decode, {"title": values["live.title"], "bag": values["live.bag"]})
-        names = {self._names[topic]: kind for topic, kind in (TOPICS | OTHER_TOPICS).items()}
+        names = {self._names[topic]: kind for topic, kind in kinds.items()}
         self.foxglove = FoxgloveServer(values["live.port"], names, [self._names[topic] for topic in LATCHED_TOPICS])
         layout = foxglove_layout(lambda topic: self._names.get(topic) or self.resolve_topic_name(topic))
         self.page = PageServer(values["live.page_port"], self.hub, layout)
@@ -109,18 +103,18 @@ class LiveNode(ProcessNode):
         self._plant = ""
         """Full name of the plant, once it is found."""
         self._requests: list[_Request] = []
-        self._next_poll = self._next_plant_check = time.monotonic()
+        self._next_poll = time.monotonic()
         # The executor takes subscriptions in this order: a run before its messages, its end after them.
         self.create_subscription(Run, RUN, self._on_run, LATCHED, raw=True)
         for topic in TOPICS:
-            self._watch(topic, partial(self._on_step_message, topic, self._names[topic]))
+            self._watch(topic, partial(self._on_step_message, topic))
         for topic in OTHER_TOPICS:
             if topic != RUN:
                 self._watch(topic, partial(self._on_other_message, topic))
         self.create_subscription(VehicleState, LAST_STATE, self._on_last_state, WATCHING)
-        data = f"ws://127.0.0.1:{self.foxglove.port}"
-        print(f"live page: {self.page.url}", flush=True)
-        print(f"live data: {data} (Foxglove, Lichtblick; layout {self.page.layout_url})", flush=True)
+        print(f"live page: {self.page.url}")
+        viewers = f"Foxglove, Lichtblick; layout {self.page.layout_url}"
+        print(f"live data: ws://127.0.0.1:{self.foxglove.port} ({viewers})", flush=True)
 
     def poll(self) -> None:
         """Sample the messages that have arrived, and continue with the commands."""
@@ -128,14 +122,8 @@ class LiveNode(ProcessNode):
         self.hub.sample()
         while not self.page.commands.empty():
             self._execute(*self.page.commands.get())
-        for request in list(self._requests):
-            if self._finished(request):
-                self._requests.remove(request)
-                if request.call:
-                    request.call.close()
-        if time.monotonic() >= self._next_plant_check:
-            self._next_plant_check = time.monotonic() + _PLANT_CHECK
-            self._check_plant()
+        self._requests = [request for request in self._requests if not self._finished(request)]
+        self._check_plant()
 
     def wait_timeout(self) -> float:
         """Return the time (s) to the next poll."""
@@ -157,9 +145,9 @@ class LiveNode(ProcessNode):
     def _decode(self, topic: str, data: bytes) -> Any:
         return deserialize_message(data, self._kinds[topic])
 
-    def _on_step_message(self, topic: str, name: str, data: bytes) -> None:
+    def _on_step_message(self, topic: str, data: bytes) -> None:
         stamp = stamp_in(data)
-        self.foxglove.send(name, stamp, data)
+        self.foxglove.send(self._names[topic], stamp, data)
         self.hub.offer(topic, stamp, data)
 
     def _on_other_message(self, topic: str, data: bytes) -> None:
@@ -167,7 +155,9 @@ class LiveNode(ProcessNode):
         if topic == DIAGNOSTICS:
             self._on_diagnostics(self._decode(topic, data))
         elif topic == PARAMETER_EVENTS:
-            self._on_parameter_event(self._decode(topic, data))
+            event = self._decode(topic, data)
+            if event.node == self._plant:
+                self._on_settings({p.name: parameter_value_to_python(p.value) for p in event.changed_parameters})
 
     def _on_run(self, data: bytes) -> None:
         self._run = run = self._decode(RUN, data)
@@ -189,11 +179,6 @@ class LiveNode(ProcessNode):
             if level:
                 self.hub.note(f"{node}: {status.message}", warning=True)
 
-    def _on_parameter_event(self, event: ParameterEvent) -> None:
-        """Update the settings when parameters of the plant change."""
-        if event.node == self._plant:
-            self._on_settings({p.name: parameter_value_to_python(p.value) for p in event.changed_parameters})
-
     def _on_settings(self, values: dict[str, Any]) -> None:
         settings = {name: value for name, value in values.items() if name in SETTABLE}
         self.hub.update(settings=self.hub.status()["settings"] | settings)
@@ -203,11 +188,10 @@ class LiveNode(ProcessNode):
         self.hub.update(limits=dict(zip(INPUTS, zip(low, high, strict=False), strict=False)))
 
     def _check_plant(self) -> None:
-        """Record the end of a run if the plant has disappeared without announcing it."""
-        if self._run is None or self.hub.status()["ending"] is not None:
+        """Record the end of a run if the plant, which had published, has disappeared without announcing it."""
+        if self._run is None or self.hub.status()["ending"] is not None or not self.hub.time:
             return
-        # The plant can be missing only after it has published.
-        if self.hub.time and not self.count_publishers(STATE):
+        if not self.count_publishers(STATE):
             self.hub.end(VehicleState.RUNNING, round(self.hub.time * 1e-9 / self._run.period))
 
     def _ask_parameters(
@@ -219,31 +203,26 @@ class LiveNode(ProcessNode):
             take(dict(zip(names, map(parameter_value_to_python, response.values), strict=False)))
 
         # An external controller may not have these parameters; the page then omits them.
-        self._requests.append(
-            _Request(role, GetParameters, GetParameters.Request(names=names), done, lambda reason: None)
-        )
+        self._requests.append(_Request(role, GetParameters, GetParameters.Request(names=names), done))
 
     def _execute(self, command: Command, answer: Answer) -> None:
         def refuse(why: str) -> None:
             answer({"accepted": False, "message": why})
 
-        def acknowledge(words: str, step: int) -> None:
-            period = self._run.period if self._run else 0.0
-            if isinstance(command, Change):  # the hub adds events for faults when they act
-                self.hub.note(words, step=step)
-            answer({"accepted": True, "message": f"{words}, t = {step * period:.2f} s", "step": step})
-
         def done(response: Any) -> None:
             if isinstance(command, Change):
                 result = response.results[0]
-                if result.successful:
-                    acknowledge(result.reason, step_in(result.reason))
-                else:
-                    refuse(result.reason)
-            elif response.success:
-                acknowledge(response.message, response.step)
+                accepted, words = result.successful, result.reason
             else:
-                refuse(response.message)
+                accepted, words = response.success, response.message
+            if not accepted:
+                refuse(words)
+                return
+            step = step_in(words) if isinstance(command, Change) else response.step
+            if isinstance(command, Change):  # the hub adds events for faults when they act
+                self.hub.note(words, step=step)
+            period = self._run.period if self._run else 0.0
+            answer({"accepted": True, "message": f"{words}, t = {step * period:.2f} s", "step": step})
 
         kind, request = _service_request(command)
         self._requests.append(_Request(command.node, kind, request, done, refuse))
@@ -251,24 +230,19 @@ class LiveNode(ProcessNode):
     def _finished(self, request: _Request) -> bool:
         """Continue with a request; return whether it is answered or abandoned."""
         if request.call and (response := request.call.response()):
+            request.call.close()
             request.done(response)
             return True
-        if request.call is None:
-            node = node_in_role(self, request.role)
-            kinds = services(self, *node) if node else {}
-            name = next((name for name, types in kinds.items() if type_name(request.kind) in types), None)
-            if node and name:
-                request.call = ServiceCall(self, request.kind, name, request.request)
-                if request.role is PLANT:
-                    self._plant = full_name(*node)
+        if request.call is None and (name := name_of(self, request.role, request.kind)):
+            request.call = ServiceCall(self, request.kind, name, request.request)
+            if request.kind is GetParameters and request.role is PLANT:
+                self._plant = name.rpartition("/")[0]
         still = request.standstill.look(sorted(self.get_node_names_and_namespaces()))
-        if request.call is None and still > ABSENT_AFTER:
-            request.refused(f"no {request.role.name}: expected a flight whose {request.role.name} is there")
-            return True
-        if still > SILENT_AFTER:
-            request.refused(f"no answer from the {request.role.name} for {SILENT_AFTER:g} s")
-            return True
-        return False
+        if silent := still > (SILENT_AFTER if request.call else ABSENT_AFTER):
+            if request.call:
+                request.call.close()
+            request.refused(f"no answer from the {request.role.name} for {still:.0f} s")
+        return silent
 
 
 def _service_request(command: Command) -> tuple[Any, Any]:
@@ -277,12 +251,7 @@ def _service_request(command: Command) -> tuple[Any, Any]:
         parameter = RosParameter(command.parameter.name, value=command.value).to_parameter_msg()
         return SetParameters, SetParameters.Request(parameters=[parameter])
     if isinstance(command, Inject):
-        fault = Fault(
-            channel=command.fault.channel,
-            type=command.fault.type,
-            parameter_names=list(command.fault.parameters),
-            parameter_values=list(command.fault.parameters.values()),
-        )
+        fault = fault_message(command.fault.channel, command.fault.type, command.fault.parameters)
         return InjectFault, InjectFault.Request(fault=fault, duration=command.duration)
     return ClearFault, ClearFault.Request(channel=command.channel, type=command.type)
 

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-import rclpy
 from hsv_msgs.msg import Ready, Run
-from rclpy.node import Node
 
 from hsv.bags import description
 from hsv.bags.definitions import definition, type_hash
-from hsv.bags.description import NodeDescription
 from hsv.bags.infrastructure_parameters import PEER_EMULATOR_PARAMETERS
 from hsv.bags.messages import stamp_in
 from hsv.bags.reader import Bag
@@ -28,12 +24,15 @@ from hsv_node.parameters import declare
 
 
 class PeerEmulatorNode(LockstepNode):
-    """A node that emulates the peers of ``peer_emulator.node``, each under its name, with the messages in a bag."""
+    """A node that emulates the peers of ``peer_emulator.node``, all that it is linked with, with the messages in a bag.
+
+    The types of its messages make it all peers at once.
+    """
 
     def __init__(self) -> None:
         super().__init__(description.PEER_EMULATOR, "replay")
         values = declare(self, PEER_EMULATOR_PARAMETERS)
-        bag = Bag(values["peer_emulator.bag"])
+        self._bag = bag = Bag(values["peer_emulator.bag"])
         self._under_test = values["peer_emulator.node"]
         self._limit = values["peer_emulator.timeout"]
         me = next(n for n in description.graph(self.controller, self.estimator) if n.name == self._under_test)
@@ -45,31 +44,24 @@ class PeerEmulatorNode(LockstepNode):
         self._fed = 0
         self._output = BagWriter(Path(values["peer_emulator.directory"]))
         self._emulated = description.peers(me, self.controller, recorded=False, estimator=self.estimator)
-        self._peers: dict[str, Node] = {}
-        published = {topic: publisher for peer in self._emulated for topic, publisher in self._emulate(peer, me)}
-        self._feeds = {topic: published[topic] for topic in me.subscribes}
+        self._feeds: dict[str, Callable[[bytes], None]] = {}
+        for peer in self._emulated:
+            for topic in peer.publishes:
+                self.claim(topic, f"no {peer.name} while its emulator runs")
+                publish = self.create_step_publisher(topic)
+                if topic in me.subscribes:
+                    self._feeds[topic] = publish
+            for topic in set(me.publishes) & set(peer.subscribes):
+                # An endpoint for each peer, which is counted; the answers are read once.
+                kind = message_class(description.TOPICS[topic])
+                self.create_subscription(kind, topic, lambda message: None, STEP, raw=True)
         for topic in me.publishes:
             kind = description.TOPICS[topic]
             name = self.resolve_topic_name(topic)
             self._output.add_topic(Topic(name, kind, definition(kind), type_hash(kind), usual_qos(STEP.depth)))
-            answer: Callable[[bytes], None] = partial(self._on_answer, topic, name)
-            self.create_subscription(message_class(kind), topic, answer, STEP, raw=True)
-        self._run = next((message for _, message in bag.decode(description.RUN)), None)
+            self.create_subscription(message_class(kind), topic, partial(self._on_answer, topic), STEP, raw=True)
         self._ready = self._join()
         self._standstill = Standstill()
-
-    def _emulate(self, peer: NodeDescription, me: NodeDescription) -> Iterator[tuple[str, Any]]:
-        """Create a node with the topics of ``peer``, which identify it, and yield its publishers by topic."""
-        node = rclpy.create_node(
-            peer.name, namespace=self.get_namespace(), context=self.context, use_global_arguments=False
-        )
-        self._peers[peer.name] = node
-        for topic in peer.publishes:
-            self.claim(topic, f"no {peer.name} while its emulator runs")
-            yield topic, node.create_publisher(message_class(description.TOPICS[topic]), topic, STEP)
-        for topic in me.publishes:
-            if topic in peer.subscribes:
-                node.create_subscription(message_class(description.TOPICS[topic]), topic, _ignore, STEP, raw=True)
 
     def _join(self) -> bool:
         """Announce a run to the node under test, or all peers as ready to a plant; return whether to start at once."""
@@ -77,15 +69,11 @@ class PeerEmulatorNode(LockstepNode):
             self._announcer = self.create_publisher(Ready, description.READY, LATCHED)
             self.create_subscription(Run, description.RUN, self._on_run, LATCHED)
             return True
-        assert self._run is not None, "hsv replay takes no bag without the announcement of its run"
-        run = Run(
-            run_id="replay",
-            period=self._run.period,
-            last_step=self._run.last_step,
-            seed=self._run.seed,
-            interface_version=Run.INTERFACE_VERSION,
-        )
-        self._announcer = self._peers[description.PLANT.name].create_publisher(Run, description.RUN, LATCHED)
+        recorded = next((message for _, message in self._bag.decode(description.RUN)), None)
+        assert recorded is not None, "hsv replay takes no bag without the announcement of its run"
+        run = Run(run_id="replay", interface_version=Run.INTERFACE_VERSION)
+        run.period, run.last_step, run.seed = recorded.period, recorded.last_step, recorded.seed
+        self._announcer = self.create_publisher(Run, description.RUN, LATCHED)
         self._announcer.publish(run)
         self.create_subscription(Ready, description.READY, self._on_ready, LATCHED)
         return False
@@ -98,8 +86,8 @@ class PeerEmulatorNode(LockstepNode):
         if ready.node == self._under_test:
             self._ready = True
 
-    def _on_answer(self, topic: str, name: str, data: bytes) -> None:
-        self._output.write(name, stamp_in(data), data)
+    def _on_answer(self, topic: str, data: bytes) -> None:
+        self._output.write(self.resolve_topic_name(topic), stamp_in(data), data)
         self._answered[topic] += 1
         self._feed()
 
@@ -110,10 +98,10 @@ class PeerEmulatorNode(LockstepNode):
         if done >= self._steps and (not self._is_plant or self._fed >= self._steps):
             self.finish(0)
         elif self._fed < self._steps and done >= self._fed + self._is_plant:
-            for topic, publisher in self._feeds.items():
+            for topic, publish in self._feeds.items():
                 step = self._fed - (topic in self._delayed)
                 if step >= 0:
-                    publisher.publish(self._recorded[topic][step])
+                    publish(self._recorded[topic][step])
             self._fed += 1
             if self._fed % 200 == 0:
                 print(f"step {self._fed}", flush=True)
@@ -127,19 +115,15 @@ class PeerEmulatorNode(LockstepNode):
         answers = sum(self._answered.values())
         if not answers and not self._fed:
             # There is no limit for the start of the node: its launcher sees whether it ends or hangs.
-            self.log_waiting(lambda: [self._under_test], decides=True)
+            self.log_waiting([self._under_test], decides=True)
         elif self._standstill.look((self._fed, answers)) > self._limit:
             silent = [topic for topic, count in self._answered.items() if count <= min(self._answered.values())]
-            self.get_logger().fatal(
-                f"step {min(self._answered.values())}: no {', '.join(silent)} from {self._under_test} "
-                f"for {self._limit:g} s"
-            )
-            self.finish(1)
+            step, topics = min(self._answered.values()), ", ".join(silent)
+            self.fail(f"step {step}: no {topics} from {self._under_test} for {self._limit:g} s")
 
     def _connected(self) -> bool:
-        return all(publisher.get_subscription_count() > 0 for publisher in self._feeds.values()) and all(
-            self.count_publishers(topic) > 0 for topic in self._answered
-        )
+        fed = all(self._matched(topic) for topic in self._feeds)
+        return fed and all(self.count_publishers(topic) for topic in self._answered)
 
     def stopped(self, signal_number: int) -> int:
         """Return the exit code of an incomplete replay."""
@@ -147,13 +131,7 @@ class PeerEmulatorNode(LockstepNode):
 
     def close(self) -> None:
         """Finish the bag with the outputs."""
-        for peer in self._peers.values():
-            peer.destroy_node()
         self._output.close()
-
-
-def _ignore(_: bytes) -> None:
-    """Ignore a message: the subscription only makes the peer visible, and the emulator itself reads the answers."""
 
 
 main = partial(run_node, PeerEmulatorNode, "peer_emulator")

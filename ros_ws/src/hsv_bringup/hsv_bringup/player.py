@@ -8,9 +8,9 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from rclpy.duration import Duration
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 from rosbags.interfaces import Qos, QosDurability, QosReliability
@@ -18,11 +18,11 @@ from std_srvs.srv import Trigger
 
 from hsv.bags.description import CLOCK, PLANT, RECORDER, TOPICS
 from hsv.bags.reader import Bag
-from hsv.base.errors import ParameterError, RecordingError
+from hsv.base.errors import ParameterError
 from hsv_node.lockstep import LOG_INTERVAL
 from hsv_node.main import run_node
-from hsv_node.middleware import LATCHED, message_class
-from hsv_node.parameters import refuse_sim_time, refuse_unknown
+from hsv_node.middleware import LATCHED, installed_class
+from hsv_node.parameters import refuse_unknown
 from hsv_node.process import ProcessNode
 
 EXCLUSIVE = (*TOPICS, *PLANT.announces, *RECORDER.announces)
@@ -44,28 +44,21 @@ class PlayerNode(ProcessNode):
         """
         # In the namespace of the bag, so that a remapping of the player's own moves its topics as well.
         super().__init__("player", bag.namespace)
-        refuse_unknown(self, "", self.of_others)
-        if bag.roles.get(CLOCK) in topics:
-            refuse_sim_time(self)
+        refuse_unknown(self, "")
         self._rate = rate
         self._paused = paused
+        exclusive = {bag.roles.get(role) for role in EXCLUSIVE}
+        self._outputs: dict[str, Publisher] = {}
         for topic in topics:
-            if any(bag.roles.get(role) == topic for role in EXCLUSIVE):
+            name = _relative(bag, topic)
+            if topic in exclusive:
                 # A graph that flies would take the messages for its own.
-                self.claim(
-                    _relative(bag, topic), "others to play, or a place of their own (ROS_DOMAIN_ID, --namespace)"
-                )
-        self._outputs = {
-            topic: self.create_publisher(
-                _message_class(bag, topic), _relative(bag, topic), _profile(bag.topics[topic].qos)
-            )
-            for topic in topics
-        }
+                self.claim(name, "others to play, or a place of their own (ROS_DOMAIN_ID, --namespace)")
+            kind = installed_class(topic, bag.topics[topic].type)
+            self._outputs[topic] = self.create_publisher(kind, name, _profile(bag.topics[topic].qos))
         self._instants = _instants(bag, topics)
         self._next = 0
         self._begins = time.monotonic() + delay
-        self._says = self._begins
-        """Time of the next warning about slow subscribers."""
         self._anchor: tuple[float, int] | None = None
         """Wall time (s) and simulated time (ns) at the start of the current pace."""
         self.create_service(Trigger, "~/pause", self._pause)
@@ -99,9 +92,9 @@ class PlayerNode(ProcessNode):
         slow = [t for t, p in self._outputs.items() if not p.wait_for_all_acked(Duration(seconds=0.25))]
         if not slow:
             self.finish(0)
-        elif time.monotonic() > self._says:
-            self._says = time.monotonic() + LOG_INTERVAL
-            self.get_logger().info("waiting for slow subscribers of " + ", ".join(slow))
+        else:
+            words = "waiting for slow subscribers of " + ", ".join(slow)
+            self.get_logger().info(words, throttle_duration_sec=LOG_INTERVAL)
 
     def _publish(self) -> None:
         for topic, data in self._instants[self._next][1]:
@@ -119,20 +112,16 @@ class PlayerNode(ProcessNode):
 
     def _step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if not self._paused:
-            response.message = "playing: pause first"
-            return response
+            return Trigger.Response(message="playing: pause first")
         if self._next >= len(self._instants):
-            response.message = "at the end, nothing is left to publish"
-            return response
+            return Trigger.Response(message="at the end, nothing is left to publish")
         self._publish()
         return self._answer(response)
 
     def _answer(self, response: Trigger.Response) -> Trigger.Response:
-        response.success = True
-        played = (
-            f"played up to t = {self._instants[self._next - 1][0] * 1e-9:.3f} s" if self._next else "nothing played"
-        )
-        response.message = f"{'paused' if self._paused else 'playing'}, {played}"
+        time = self._instants[self._next - 1][0] * 1e-9
+        played = f"played up to t = {time:.3f} s" if self._next else "nothing played"
+        response.success, response.message = True, f"{'paused' if self._paused else 'playing'}, {played}"
         return response
 
 
@@ -151,16 +140,6 @@ def _relative(bag: Bag, topic: str) -> str:
     own = bag.namespace.rstrip("/") + "/"
     role = next((role for role, name in bag.roles.items() if name == topic), "")
     return topic if role.startswith("/") or not topic.startswith(own) else topic.removeprefix(own)
-
-
-def _message_class(bag: Bag, topic: str) -> Any:
-    kind = bag.topics[topic].type
-    try:
-        return message_class(kind)
-    except (ImportError, AttributeError, ValueError):
-        raise RecordingError(
-            f"{bag.path}: topic {topic}: message type {kind} is not installed, expected it or a choice of other topics"
-        ) from None
 
 
 def _profile(qos: Qos) -> QoSProfile:

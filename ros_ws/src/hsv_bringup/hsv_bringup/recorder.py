@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import datetime
 import mimetypes
-import time
-from collections.abc import Callable
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -16,9 +14,7 @@ from rclpy.serialization import deserialize_message
 
 from hsv.bags.definitions import definition, type_hash
 from hsv.bags.description import (
-    ACTUATOR,
     LATCHED_TOPICS,
-    NOMINAL,
     NOMINAL_TRAJECTORY,
     OTHER_TOPICS,
     READY,
@@ -29,7 +25,6 @@ from hsv.bags.description import (
     STATE,
     TOPICS,
     TRANSIENT_LOCAL,
-    TUBE_STATUS,
     controller_node,
     graph,
     step_topics,
@@ -41,9 +36,8 @@ from hsv.bags.topic import Topic, usual_qos
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import ParameterError
 from hsv.flight.blocks import Signals
-from hsv.graph.snapshot import Snapshot
 from hsv_bringup.flow_executor import BatchExecutor
-from hsv_bringup.peer_parameters import GIVE_UP_AFTER, PeerParameters
+from hsv_bringup.peer_parameters import PeerParameters
 from hsv_node.lockstep import LOG_INTERVAL, PeerNode
 from hsv_node.main import run_node
 from hsv_node.middleware import LATCHED, STEP, message_class
@@ -52,21 +46,15 @@ from hsv_node.parameters import declare
 CONFIRMATION_INTERVAL = 50
 """Steps between confirmations: a confirmation of every step would halve the speed of the loop."""
 
-TOLD_EVERY = 0.2
-"""Wall time (s) between two lines of numbers."""
-
 
 class RecorderNode(PeerNode):
     """A node that writes the messages of a step in a fixed order once all have arrived: equal runs give equal bags."""
 
     def __init__(self) -> None:
-        super().__init__(RECORDER, "bag", hears_runs=False)
+        super().__init__(RECORDER, "bag")
         values = declare(self, RECORDER_PARAMETERS)
         utc = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%SZ")
         self._directory = Path(values["bag.directory"] or f"bags/run_{utc}")
-        self._tells = values["progress"]
-        self._told = 0.0
-        """Wall time (s) at which the last numbers of the flight were printed."""
         self._last_step = 0
         self._now = 0
         self._complete = -1
@@ -94,15 +82,13 @@ class RecorderNode(PeerNode):
         self._state_messages, self._signals = StepMessages(STATE), Signals()
         for topic, name in zip(recorded, self._order, strict=True):
             self.create_step_subscription(topic, partial(self._on_step_message, name))
-        callbacks: dict[str, Callable[[bytes], None]] = {READY: self._on_ready, REFERENCE: self._on_reference}
         for topic, kind in OTHER_TOPICS.items():
             if topic != RUN:
                 profile = LATCHED if topic in LATCHED_TOPICS else STEP
-                callback = callbacks.get(topic) or partial(self._on_other_message, self._names[topic])
+                callback = partial(self._on_other_message, topic)
                 self.create_subscription(message_class(kind), topic, callback, profile, raw=True)
         # Last, so that the messages of a run that is reset are taken before the run that replaces it.
         self.hear_runs(self._on_raw_run, raw=True)
-        self._progress_message = RecorderProgress()
         self._progress = self.create_publisher(RecorderProgress, RECORDER_PROGRESS, STEP)
 
     def _begin_bag(self) -> None:
@@ -129,32 +115,26 @@ class RecorderNode(PeerNode):
 
     def start_run(self, run: Run) -> None:
         """Store the number of steps to expect; a run that replaces one that was reset has a bag of its own."""
-        if self._run is not None and self._runs_of_one_plant():
+        if self._run is not None and not self.over and len(self.publishers_of(RUN)) == 1:
             self._keep_reset_run()
         elif self._complete >= 0:
-            self.get_logger().fatal(
+            self.fail(
                 "a new run was announced: expected one recorder per run, "
                 "and a separate ROS_DOMAIN_ID or namespace for simultaneous runs"
             )
-            self.finish(1)
             return
-        if self._peers:
-            self._peers.close()
         self._peers = None
         self.bag.add_custom_data({"run_id": run.run_id})
         self._last_step = run.last_step
         self._nanoseconds_per_step = round(run.period * 1e9)
 
-    def _runs_of_one_plant(self) -> bool:
-        return not self.over and len(self.publishers_of(RUN)) == 1
-
     def end_run(self, how: str) -> None:
         """Log how the run ended, and the next action of the user."""
-        self.get_logger().info(f"{how}{'; Ctrl-C closes the bag' if self._asks else ''}")
+        super().end_run(f"{how}{'; Ctrl-C closes the bag' if self._asks else ''}")
 
-    def missing(self) -> list[str]:
-        """Wait for the links and, in a run started by hand, for the parameters of all its nodes."""
-        missing = super().missing()
+    def missing_links(self) -> list[str]:
+        """Return the missing links and, in a run started by hand, the nodes whose parameters are not known yet."""
+        missing = super().missing_links()
         if missing or self._run is None or not self._asks:
             return missing
         if self._peers is None:
@@ -162,19 +142,11 @@ class RecorderNode(PeerNode):
             asked = [node.name for node in graph(self.controller) if not node.foreign]
             self._peers = PeerParameters(self, {role: name for role, name in self.linked.items() if role in asked})
         silent = self._peers.silent()
-        if silent and not self._peers.gave_up:
-            return [f"{role} ({service})" for role, service in silent.items()]
-        self._keep_parameters(self._run, self._peers.values(), list(silent))
-        self._peers.close()
-        return []
+        if not silent:
+            self._keep_parameters(self._run, self._peers.values)
+        return [f"{role} ({service})" for role, service in silent.items()]
 
-    def _keep_parameters(self, run: Run, values: dict[str, dict[str, Any]], silent: list[str]) -> None:
-        if silent:
-            self.get_logger().warning(
-                f"no answer from {', '.join(silent)} for {GIVE_UP_AFTER:g} s: the bag lacks the parameters of the run, "
-                "hsv replay will need --scenario and --design"
-            )
-            return
+    def _keep_parameters(self, run: Run, values: dict[str, dict[str, Any]]) -> None:
         # Not at the top: the components' tables take their time, and a prepared run does without.
         from hsv.bags.parameter_sections import disagreements
         from hsv.control.design import digest
@@ -204,13 +176,11 @@ class RecorderNode(PeerNode):
                 f"{topic} at {stamp * 1e-9:.2f} s: is written already, ignored", throttle_duration_sec=LOG_INTERVAL
             )
             return
-        step = self._pending.setdefault(stamp, {})
-        step[topic] = data
-        if len(step) == len(self._order):
-            self._write_step(stamp)
-
-    def _write_step(self, stamp: int) -> None:
-        messages = self._pending.pop(stamp)
+        messages = self._pending.setdefault(stamp, {})
+        messages[topic] = data
+        if len(messages) < len(self._order):
+            return
+        del self._pending[stamp]
         for topic in self._order:
             self.bag.write(topic, stamp, messages[topic])
         self._now = stamp
@@ -220,51 +190,34 @@ class RecorderNode(PeerNode):
         if self._complete % CONFIRMATION_INTERVAL == 0 or final:
             # What is confirmed is on its way to the disk, whatever happens to this process.
             self.bag.flush()
-            self._progress_message.step = self._complete
-            self._progress.publish(self._progress_message)
-            self._tell(messages, final)
-
-    def _tell(self, messages: dict[str, bytes], final: bool) -> None:
-        """Print numbers of a recorded step; the loop does not wait for this."""
-        now = time.monotonic()
-        if not self._tells or (now - self._told < TOLD_EVERY and not final):
-            return
-        self._told = now
-        read = {
-            topic: deserialize_message(messages[name], message_class(TOPICS[topic]))
-            for topic in (STATE, NOMINAL, TUBE_STATUS, ACTUATOR)
-            if (name := self._names.get(topic)) in messages
-        }
-        print(Snapshot.of(read[STATE], read[NOMINAL], read.get(TUBE_STATUS), read[ACTUATOR]).line, flush=True)
-
-    def _on_other_message(self, topic: str, data: bytes) -> None:
-        self.bag.write(topic, self._now, data)
+            self._progress.publish(RecorderProgress(step=self._complete))
 
     def _on_raw_run(self, data: bytes) -> None:
         """Begin the run, in a bag of its own if it replaces another, and write what was announced for it before."""
         held, self._held, self._referenced = self._held, [], False
         self._on_run(deserialize_message(data, Run))
-        self._on_other_message(self._names[RUN], data)
+        self._on_other_message(RUN, data)
         for topic, announced in held:
-            (self._on_ready if topic == READY else self._on_reference)(announced)
+            self._on_other_message(topic, announced)
 
-    def _on_ready(self, data: bytes) -> None:
-        ready = deserialize_message(data, Ready)
-        self._write_or_hold(READY, data, self._run is not None and ready.run_id == self._run.run_id)
+    def _on_other_message(self, topic: str, data: bytes) -> None:
+        if self._is_of_this_run(topic, data):
+            self.bag.write(self._names[topic], self._now, data)
+        else:
+            self._held.append((topic, data))
 
-    def _on_reference(self, data: bytes) -> None:
+    def _is_of_this_run(self, topic: str, data: bytes) -> bool:
+        """Return whether a message is not an announcement for a run that the plant has not announced to this node."""
+        if topic == READY:
+            return self._run is not None and deserialize_message(data, Ready).run_id == self._run.run_id
+        if topic != REFERENCE:
+            return True
         # A reference does not name its run, but the first of every run is flown from step 0 on.
         reference = deserialize_message(data, Reference)
         first = reference.step == 0 and reference.status == Reference.FLOWN
         of_this_run = self._run is not None and not (first and self._referenced)
         self._referenced |= first and of_this_run
-        self._write_or_hold(REFERENCE, data, of_this_run)
-
-    def _write_or_hold(self, topic: str, data: bytes, of_this_run: bool) -> None:
-        if of_this_run:
-            self._on_other_message(self._names[topic], data)
-        else:
-            self._held.append((topic, data))
+        return of_this_run
 
     def close(self) -> None:
         """Write the messages of an unfinished step and what is held, and finish the bag."""
@@ -272,7 +225,7 @@ class RecorderNode(PeerNode):
             for topic in sorted(self._pending[stamp], key=self._order.index):
                 self.bag.write(topic, stamp, self._pending[stamp][topic])
         for topic, data in self._held:
-            self._on_other_message(self._names[topic], data)
+            self.bag.write(self._names[topic], self._now, data)
         self.bag.close()
         self.get_logger().info(f"closed the bag {self.bag.directory}: {self._complete + 1} steps")
 

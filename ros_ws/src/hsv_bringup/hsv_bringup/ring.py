@@ -43,17 +43,17 @@ class RingNode:
     def __init__(self, role: str, laps: int, bag: Path) -> None:
         self.ros = Node(role)
         self.lap = 0
-        self._laps = laps
+        self.laps = laps
         self._arrived = 0
-        self._role = next(node for node in description.graph() if node.name == role)
+        self.role = next(node for node in description.graph() if node.name == role)
         kinds = {topic: message_class(kind) for topic, kind in description.TOPICS.items()}
-        self._bag = BagWriter(bag) if self._role is description.RECORDER else None
+        self._bag = BagWriter(bag) if self.role is description.RECORDER else None
         self._outputs = [
             (topic, self.ros.create_publisher(kinds[topic], topic, STEP), kinds[topic](**_FILLED.get(topic, {})))
-            for topic in self._role.publishes
+            for topic in self.role.publishes
         ]
         self._inputs = {}
-        for topic in self._role.subscribes:
+        for topic in self.role.subscribes:
             callback, raw = partial(self._receive, topic), self._bag is not None
             self._inputs[topic] = self.ros.create_subscription(kinds[topic], topic, callback, STEP, raw=raw)
             if self._bag:
@@ -62,7 +62,7 @@ class RingNode:
 
     def matched(self) -> bool:
         """Return whether all links of the graph description are connected."""
-        links = [topic for topic, _ in description.links(self._role, description.TUBE_MPC.name, True)]
+        links = [topic for topic, _ in description.links(self.role, description.TUBE_MPC.name, True)]
         counts = {topic: publisher.get_subscription_count() for topic, publisher, _ in self._outputs}
         counts |= {topic: subscription.get_publisher_count() for topic, subscription in self._inputs.items()}
         return all(count >= links.count(topic) for topic, count in counts.items())
@@ -74,18 +74,13 @@ class RingNode:
                 message.step = self.lap
             publisher.publish(message)
 
-    def finished(self) -> bool:
-        """Return whether all laps are done."""
-        return self.lap == self._laps
-
     def _receive(self, topic: str, message: Any) -> None:
-        """Record an input or count it; publish when all inputs of a step have arrived."""
         if self._bag:
             self._bag.write(topic, self.lap, message)
         self._arrived = (self._arrived + 1) % len(self._inputs)
         if self._arrived == 0:
             self.lap += 1
-            if self._role is not description.PLANT or not self.finished():
+            if self.role is not description.PLANT or self.lap < self.laps:
                 self.publish()
 
 
@@ -103,13 +98,15 @@ def main(args: Sequence[str] | None = None) -> int:
     while not node.matched():
         time.sleep(0.02)
     print("ready", flush=True)
-    if arguments.role == description.PLANT.name:
+    starts = node.role is description.PLANT
+    if starts:
         sys.stdin.readline()
-        started = time.perf_counter()
+    started = time.perf_counter()
+    if starts:
         node.publish()
-    while not node.finished():
+    while node.lap < node.laps:
         executor.spin_once(timeout_sec=0.25)
-    if arguments.role == description.PLANT.name:
+    if starts:
         print(time.perf_counter() - started, flush=True)
     sys.stdin.readline()
     return 0

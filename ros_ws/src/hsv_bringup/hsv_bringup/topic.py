@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import difflib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -16,9 +16,9 @@ from hsv.bags.description import TOPICS, graph
 from hsv.bags.export import table
 from hsv.bags.typestore import message_types
 from hsv.bags.units import units_of
-from hsv.base.errors import ParameterError, RecordingError, RunError
-from hsv_bringup.client import GraphClient, OneLineParser, answer, run_client
-from hsv_node.middleware import message_class
+from hsv.base.errors import ParameterError, RunError
+from hsv_bringup.client import GraphClient, answer, run_client
+from hsv_node.middleware import installed_class
 from hsv_node.roles import node_in_role
 
 DEPTH = 1000
@@ -27,49 +27,39 @@ DEPTH = 1000
 _PUBLISHED = tuple(node.publishes[0] for node in graph() if node.publishes)
 """Topic that every node publishes."""
 
-_SUBSCRIBERS = {topic: sum(topic in node.subscribes for node in graph()) for topic in TOPICS}
-"""Number of subscribers of each topic in a complete graph."""
 
+def decoder(topic: str, kind: str) -> Callable[[bytes], dict[str, Any]]:
+    """Return a function that returns the fields of a message with names and units as in an export.
 
-class Decoder:
-    """Conversion of the messages of a type to columns with units, by the installed definition."""
+    It uses the installed definition of ``kind``.
+    """
+    text = definition(kind)
+    types = message_types([(kind, text)], topic)
+    units = units_of(text, types.fielddefs, kind)
 
-    def __init__(self, topic: str, kind: str) -> None:
-        """Read the definition."""
-        self._topic, self._kind = topic, kind
-        text = definition(kind)
-        self._types = message_types([(kind, text)], topic)
-        self._units = units_of(text, self._types.fielddefs, kind)
+    def decode(data: bytes) -> dict[str, Any]:
+        columns = table(Track(topic, kind, types, [0], [data]).columns(), units)
+        return {name: column[0].item() if hasattr(column[0], "item") else column[0] for name, column in columns.items()}
 
-    def decode(self, data: bytes) -> dict[str, Any]:
-        """Return the numbers and texts of a message by field, with names and units as in an export."""
-        columns = Track(self._topic, self._kind, self._types, [0], [data]).columns()
-        return {
-            name: column[0].item() if hasattr(column[0], "item") else column[0]
-            for name, column in table(columns, self._units).items()
-        }
+    return decode
 
 
 def _topic(client: GraphClient, options: argparse.Namespace) -> None:
     if options.every < 1:
         raise ParameterError(f"every = {options.every}: expected a number of messages, at least 1")
-    if options.name:
-        _print_messages(client, options)
-    else:
-        _print_topics(client, options)
+    (_print_messages if options.name else _print_topics)(client, options)
 
 
 def _print_topics(client: GraphClient, options: argparse.Namespace) -> None:
-    rows = []
-    for name, kinds in _topics(client).items():
-        rows.append((name, ", ".join(kinds), client.publishers_of(name), client.subscribers_of(name)))
-    width = [max(len(row[column]) for row in rows) for column in (0, 1)]
-    for name, kind, publishers, subscribers in rows:
-        text = (
-            f"{name:{width[0]}}  {kind:{width[1]}}  {', '.join(publishers) or '-'} -> {', '.join(subscribers) or '-'}"
-        )
-        values = {"topic": name, "type": kind, "publishers": publishers, "subscribers": subscribers}
-        answer(text, values, options.json)
+    rows = [
+        {"topic": name, "type": ", ".join(kinds)}
+        | {"publishers": client.publishers_of(name), "subscribers": client.subscribers_of(name)}
+        for name, kinds in _topics(client).items()
+    ]
+    width, wide = (max(len(row[column]) for row in rows) for column in ("topic", "type"))
+    for row in rows:
+        links = " -> ".join(", ".join(row[end]) or "-" for end in ("publishers", "subscribers"))
+        answer(f"{row['topic']:{width}}  {row['type']:{wide}}  {links}", row, options.json)
 
 
 def _topics(client: GraphClient, name: str = "") -> dict[str, list[str]]:
@@ -81,15 +71,9 @@ def _topics(client: GraphClient, name: str = "") -> dict[str, list[str]]:
     def found() -> bool:
         return enough() or any(map(client.publishers_of, TOPICS)) or any(node_in_role(client, role) for role in graph())
 
-    def whole() -> bool:
-        return all(
-            len(client.subscribers_of(topic)) >= count and client.publishers_of(topic)
-            for topic, count in _SUBSCRIBERS.items()
-        )
-
     if not client.wait_for(found, "a node of the graph", _PUBLISHED):
         raise RunError(f"no node of the graph in {client.where}: expected hsv run, or nodes started by hand there")
-    client.settle(whole, enough)
+    client.settle(enough)
     return dict(client.get_topic_names_and_types())
 
 
@@ -104,11 +88,8 @@ def _print_messages(client: GraphClient, options: argparse.Namespace) -> None:
         meant = f"{close[0]}?" if close else f"one of {', '.join(published)}"
         raise ParameterError(f"topic {name}: no node publishes it, expected {meant}")
     offered = client.get_publishers_info_by_topic(name)[0]
-    try:
-        kind = message_class(offered.topic_type)
-    except (ImportError, AttributeError, ValueError):
-        raise RecordingError(f"topic {name}: message type {offered.topic_type} is not installed") from None
-    decoder = Decoder(name, offered.topic_type)
+    kind = installed_class(name, offered.topic_type)
+    decode = decoder(name, offered.topic_type)
     qos = QoSProfile(
         depth=DEPTH, reliability=offered.qos_profile.reliability, durability=offered.qos_profile.durability
     )
@@ -116,7 +97,7 @@ def _print_messages(client: GraphClient, options: argparse.Namespace) -> None:
     client.create_subscription(kind, name, received.append, qos, raw=True)
     for number, data in enumerate(_messages(client, name, received)):
         if number % options.every == 0:
-            fields = decoder.decode(data)
+            fields = decode(data)
             answer("\n".join(_lines(name, fields)), fields, options.json)
             if options.once:
                 return
@@ -135,9 +116,11 @@ def _resolved(client: GraphClient, name: str) -> str:
 def _messages(client: GraphClient, name: str, received: list[bytes]) -> Iterator[bytes]:
     """Yield the messages of a topic as they arrive, as long as it has a publisher."""
     came = False
-    while client.wait_for(lambda: received or not client.count_publishers(name), f"a message on {name}", for_ever=True):
-        if not received:
-            break
+
+    def known() -> bool:
+        return bool(received) or not client.count_publishers(name)
+
+    while client.wait_for(known, f"a message on {name}", for_ever=True) and received:
         came = True
         yield received.pop(0)
     if not came:
@@ -159,7 +142,9 @@ def _lines(name: str, fields: dict[str, Any]) -> Iterator[str]:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command."""
-    parser = OneLineParser(prog="topic", description="Print the topics of a running graph, or the messages of one.")
+    parser = argparse.ArgumentParser(
+        prog="topic", description="Print the topics of a running graph, or the messages of one."
+    )
     parser.add_argument("name", nargs="?", default="", help="e.g. /hsv/state; default: list the topics")
     parser.add_argument("--once", action="store_true", help="one message only")
     parser.add_argument("--every", type=int, default=1, help="print every N-th message")

@@ -6,23 +6,17 @@ import argparse
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict
+from math import isfinite
 from typing import Any
-
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from hsv.bags.description import ACTUATOR, NOMINAL, STATE, TOPICS, TUBE_STATUS
 from hsv.base.errors import RunError
-from hsv.base.units import unit_system
-from hsv.graph.snapshot import Snapshot
-from hsv_bringup.client import GraphClient, OneLineParser, answer, run_client
-from hsv_node.middleware import message_class
+from hsv.base.units import UnitSystem, in_system, significant, unit_system
+from hsv_bringup.client import GraphClient, answer, run_client
+from hsv_node.middleware import LATEST, message_class
 
 EVERY = 0.2
 """Wall time (s) between two updates."""
-
-LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Quality of service of a viewer: publishers do not wait for it, and it may miss messages."""
 
 _CLEARED = "\r\x1b[K"
 """Control sequence that returns to the start of the line and clears it."""
@@ -42,27 +36,51 @@ def _watch(client: GraphClient, options: argparse.Namespace) -> None:
         raise RunError(f"no run in {client.where}: expected hsv run, or nodes started by hand there")
     moves = sys.stdout.isatty() and not options.json
     shown = 0.0
-    while client.wait_for(
-        lambda: STATE in latest or not client.count_publishers(state), f"a step on {state}", for_ever=True
-    ):
-        if STATE not in latest:
-            break
+
+    def came() -> bool:
+        return STATE in latest or not client.count_publishers(state)
+
+    while client.wait_for(came, f"a step on {state}", for_ever=True) and STATE in latest:
         reached = latest.pop(STATE)
         if time.monotonic() - shown < EVERY and reached.status == reached.RUNNING:
             continue
         shown = time.monotonic()
-        snapshot = Snapshot.of(reached, latest[NOMINAL], latest.get(TUBE_STATUS), latest[ACTUATOR])
+        values = _snapshot(reached, latest[NOMINAL], latest.get(TUBE_STATUS), latest[ACTUATOR])
+        words = _in_words(values, system)
         if moves:
-            print(_CLEARED + snapshot.in_words(system), end="", flush=True)
+            print(_CLEARED + words, end="", flush=True)
         else:
-            answer(snapshot.in_words(system), asdict(snapshot), options.json)
+            answer(words, values, options.json)
     if moves:
         print()
 
 
+def _snapshot(state: Any, nominal: Any, status: Any | None, actuator: Any) -> dict[str, Any]:
+    """Return numbers (SI) of a step from its messages; no tube level for a controller or a design without a tube."""
+    return {
+        "time": state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec,
+        "altitude": state.altitude,
+        "velocity_error": state.velocity - nominal.reference.velocity,
+        "tube_level": None if status is None or not isfinite(status.level) else float(status.level),
+        "faults": [f"{fault.channel} {fault.type}" for fault in actuator.active],
+    }
+
+
+def _in_words(values: dict[str, Any], system: UnitSystem) -> str:
+    """Return a snapshot as text with a fixed number of characters."""
+    altitude, length = in_system(values["altitude"], "m", system)
+    error, speed = in_system(values["velocity_error"], "m/s", system)
+    level = "-" if values["tube_level"] is None else significant(values["tube_level"])
+    faults = ", ".join(values["faults"]).replace("_", " ") or "no fault"
+    time = f"t {values['time']:6.1f} s"
+    return f"{time}  h {altitude:7.0f} {length}  V off {error:+7.2f} {speed}  tube {level:>7}  {faults}"
+
+
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command."""
-    parser = OneLineParser(prog="watch", description="Show on one line where the flight of a running graph is.")
+    parser = argparse.ArgumentParser(
+        prog="watch", description="Show on one line where the flight of a running graph is."
+    )
     parser.add_argument("--units", default="metric", help="metric, si or paper")
     parser.add_argument("--json", action="store_true", help="print a JSON object (SI) on a line for each look")
     return run_client(parser, _watch, args)

@@ -32,27 +32,22 @@ ARGUMENTS = {
     "scenario": ("case1", "name of a shipped scenario (hsv list scenarios lists them), or path of a TOML file"),
     "bag": ("", "bag to write, a new folder; empty: bags/<scenario>_<UTC>"),
     "real_time_factor": ("", "pace: 1 is real time, 0 as fast as possible; empty: 0, with a live view 1"),
-    "step_timeout": (
-        "",
-        "wall time (s) after which a silent node ends the run; empty: 10, with an external controller 2.5",
-    ),
+    "step_timeout": ("", "wall time (s) after which a silent node ends the run; empty: 10"),
     "paused": ("false", "true: start paused, until hsv set paused false or the live page resumes the flight"),
     "external": ("false", "true: wait for a controller that is started by hand, any node of yours"),
     "live": ("false", "true: show the flight while it is flown, on a page and to Foxglove; or false"),
     "live_port": ("", "port for Foxglove, the page has the next one; 0: any two that are free; empty: 8765"),
     "composed": ("false", "true: all nodes in one process, faster, the same bytes; or false"),
     "report": ("true", "true: write the report into the bag's folder; or false"),
-    "units": (
-        "metric",
-        "units of the summary and the report: metric (SI with degrees), si, or paper for ft, ft/s, deg",
-    ),
+    "units": ("metric", "units of summary and report: metric (SI with degrees), si, or paper for ft, ft/s, deg"),
     "log_level": ("info", "what the nodes log: debug, info, warn, error or fatal"),
     "namespace": ("/", "namespace of all nodes and topics, such as /veh1: several graphs fly in one domain"),
 }
 """Default and description of each launch argument; the arguments correspond to the options of hsv run."""
 
+FLAGS = ("composed", "external", "live", "paused")
 CHOICES = {
-    **dict.fromkeys(("composed", "external", "live", "paused", "report"), ("true", "false")),
+    **dict.fromkeys((*FLAGS, "report"), ("true", "false")),
     "units": ("metric", "si", "paper"),
     "log_level": ("debug", "info", "warn", "error", "fatal"),
 }
@@ -68,16 +63,8 @@ class Flight:
     """The processes of one run: when the first ends, the others are ended, and the flight is concluded."""
 
     def __init__(self, hsv: str, run: dict[str, Any], options: dict[str, str]) -> None:
-        """Prepare a flight.
-
-        Args:
-            hsv: Path of the command ``hsv``.
-            run: Output of ``hsv prepare``.
-            options: Launch arguments by name.
-        """
-        self._hsv = hsv
-        self._run = run
-        self._options = options
+        """Take the path of the command ``hsv``, the output of ``hsv prepare`` and the launch arguments by name."""
+        self._hsv, self._run, self._options = hsv, run, options
         self._running: dict[Action, dict[str, Any]] = {}
         self._ending = False
         self._failure = ""
@@ -149,7 +136,7 @@ def prepare(context: LaunchContext) -> list[Action]:
     command = [hsv, "prepare", options["scenario"], "--json", "--folder", folder]
     for name in ("real_time_factor", "live_port", "step_timeout", "namespace", "bag"):
         command += [f"--{name.replace('_', '-')}", options[name]] if options[name] else []
-    command += [f"--{name}" for name in ("composed", "external", "live", "paused") if options[name] == "true"]
+    command += [f"--{name}" for name in FLAGS if options[name] == "true"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         refuse(as_arguments(done.stderr.strip().removeprefix("hsv: error: ")), done.returncode)

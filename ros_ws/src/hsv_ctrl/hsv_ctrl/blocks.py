@@ -51,8 +51,7 @@ class ControllerNode(BlockNode):
 
     def stepped(self, signals: Signals) -> None:
         """Report whether the command is limited."""
-        if self.diagnosis_due(signals):
-            self.diagnose(signals, saturated=bool(signals.saturated.any()))
+        self.diagnose(signals, saturated=bool(signals.saturated.any()))
 
 
 notch_filter = partial(run_node, NotchFilterNode, NOTCH_FILTER.name)

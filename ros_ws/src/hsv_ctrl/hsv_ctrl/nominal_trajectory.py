@@ -59,15 +59,10 @@ class NominalTrajectoryNode(BlockNode):
     def stepped(self, signals: Signals) -> None:
         """Report the status of the law; warn when a solver begins to fail."""
         failed = bool(int(signals.nominal_status) & _SOLVER_FAILED)
-        fails, self._failed = failed and not self._failed, failed
-        if fails or self.diagnosis_due(signals):
-            status = NominalStatus(signals.nominal_status)
-            self.diagnose(
-                signals,
-                "running" if status is NominalStatus.OK else str(status.name),
-                warning=fails,
-                gain_index=signals.gain_index,
-            )
+        begins, self._failed = failed and not self._failed, failed
+        status = NominalStatus(signals.nominal_status)
+        summary = "running" if status is NominalStatus.OK else str(status.name)
+        self.diagnose(signals, summary, warning=begins, gain_index=signals.gain_index)
 
     def holds(self, step: int) -> bool:
         """Return whether ``step`` needs a plan that is still being computed."""
@@ -92,7 +87,6 @@ class NominalTrajectoryNode(BlockNode):
         self._first, plan = governor.command(request.altitude, request.velocity, request.duration, request.blend)
         self._plan = self._planner.submit(plan)
         self._words = f"to {request.altitude:.6g} m and {request.velocity:.6g} m/s from step {self._first} on"
-        self.get_logger().info(f"plans {self._words}")
         self._publish_reference(self._first, Reference.PLANNING)
         return self._first, self._words
 

@@ -53,27 +53,16 @@ class TubeNode(BlockNode):
         if left:
             time = signals.stamp[0] + 1e-9 * signals.stamp[1]
             self.get_logger().warning(f"left the tube at {time:.2f} s: {result.component}, level {result.level:.3f}")
-        found, changed, known = result.effectiveness, False, {}
-        if found:
+        values = {"saturated": bool(result.saturated.any()), "level": result.level, "component": result.component}
+        summary, changed = result.status.name, False
+        if found := result.effectiveness:
             changed, self._mode = found.mode is not self._mode, found.mode
-            known = {
-                "effectiveness": found.estimate,
-                "effectiveness_low": found.low,
-                "effectiveness_high": found.high,
-                "elevator": found.mode.name,
-            }
-        if found and changed:
-            self.get_logger().warning(f"elevator {found}")
-        if left or changed or self.diagnosis_due(signals):
-            self.diagnose(
-                signals,
-                f"elevator {found}" if changed else result.status.name,
-                warning=left or changed,
-                saturated=bool(result.saturated.any()),
-                level=result.level,
-                component=result.component,
-                **known,
-            )
+            values |= {"effectiveness": found.estimate, "effectiveness_low": found.low}
+            values |= {"effectiveness_high": found.high, "elevator": found.mode.name}
+        if changed:
+            summary = f"elevator {found}"
+            self.get_logger().warning(summary)
+        self.diagnose(signals, summary, warning=left or changed, **values)
 
 
 class TubeMpcNode(TubeNode):
@@ -90,17 +79,16 @@ class TubeMpcNode(TubeNode):
             values |= declare(self, WATCHED_PARAMETERS)
         if warning := preflight(design, values["design.certificate"]):
             self.get_logger().warning(warning)
+        warn = self.get_logger().warning
         certified, flown = design.coupling, values["vehicle.coupling"]
         if certified not in ("", flown):
-            self.get_logger().warning(
+            warn(
                 f"outside certified vehicle set: vehicle.coupling = {flown!r}, the tube is certified for {certified!r}"
             )
         if values["vehicle.digest"] != design.vehicle:
-            self.get_logger().warning(
-                "vehicle.digest: not that of the design, the tube is certified for another vehicle"
-            )
+            warn("vehicle.digest: not that of the design, the tube is certified for another vehicle")
         for thing in uncovered_hardware(values, design) if design.tube else ():
-            self.get_logger().warning(f"not covered by the certificate: {thing}")
+            warn(f"not covered by the certificate: {thing}")
         self.component = self._law = TubeLaw.from_parameters(values, design)
         self.add_on_set_parameters_callback(self._on_change)
 

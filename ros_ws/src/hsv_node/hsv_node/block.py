@@ -26,6 +26,7 @@ class BlockNode(PeerNode):
 
     def __init__(self, role: NodeDescription, task: str) -> None:
         super().__init__(role, task)
+        self.hear_runs(self._on_run)
         assert role.block is not None
         self._step = role.block.step
         self.signals = Signals()
@@ -33,11 +34,11 @@ class BlockNode(PeerNode):
         """The latest message of each topic, with its step."""
         # In the order of the role: other nodes wait for the first and work on it while the rest is published.
         self._answers = [(StepMessages(topic).pack, self.create_step_publisher(topic)) for topic in role.publishes]
-        self.messages = {topic: StepMessages(topic) for topic in self.role.subscribes}
         self._step_times = array("d")
         """Wall time (s) of each step of the component in this run."""
-        self._delays = {topic: int(topic in self.role.delayed) for topic in self.role.subscribes}
-        for topic in self.role.subscribes:
+        self.messages = {topic: StepMessages(topic) for topic in self.role.subscribes}
+        self._delays = {topic: int(topic in self.role.delayed) for topic in self.messages}
+        for topic in self.messages:
             self.create_step_subscription(topic, partial(self.on_message, topic))
 
     def start_run(self, run: Run) -> None:
@@ -47,12 +48,11 @@ class BlockNode(PeerNode):
         self.component.reset()
 
     def stepped(self, signals: Signals) -> None:
-        """Publish the diagnostics once per simulated second; overridden by nodes that report more."""
-        if self.diagnosis_due(signals):
-            self.diagnose(signals)
+        """Publish the diagnostics; overridden by nodes that report more."""
+        self.diagnose(signals)
 
     def serve(self, kind: Any, name: str, change: Callable[[Any], tuple[int, str]]) -> None:
-        """Offer a service that changes the flight.
+        """Offer the service ``name`` that changes the flight.
 
         Args:
             kind: Type of the service, whose responses have ``success``, ``message`` and ``step``.
@@ -64,6 +64,7 @@ class BlockNode(PeerNode):
             try:
                 response.step, response.message = change(request)
                 response.success = True
+                self.get_logger().info(response.message)
             except HsvError as error:
                 response.message = str(error)
             return response
@@ -96,18 +97,15 @@ class BlockNode(PeerNode):
             self.refuse_message(TOPIC_OF[error.signal], error)
             return
         except RunError as error:
-            # Not raised: the executor would print a traceback.
-            self.get_logger().fatal(str(error))
-            self.finish(1)
+            self.fail(str(error))
             return
         for pack, publish in self._answers:
             publish(pack(signals))
         self.stepped(signals)
 
-    def diagnose(self, signals: Signals, summary: str = "running", warning: bool = False, **values: object) -> None:
-        """Publish this node's diagnostics with the wall times of the steps of its component so far, in ms."""
-        measured = {f"step_time_{name}": f"{value:.3f}" for name, value in step_statistics(self._step_times).items()}
-        super().diagnose(signals, summary, warning, **values, **measured)
+    def measured(self) -> dict[str, str]:
+        """Return the wall times of the steps of the component so far, in ms."""
+        return {f"step_time_{name}": f"{value:.3f}" for name, value in step_statistics(self._step_times).items()}
 
     def _due(self, step: int) -> Sequence[str]:
         """Return the topics that ``step`` takes; none while one of their messages is missing."""

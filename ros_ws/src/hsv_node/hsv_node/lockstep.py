@@ -11,7 +11,7 @@ from hsv_msgs.msg import Ready, Run, VehicleState
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.event_handler import QoSSubscriptionMatchedInfo, SubscriptionEventCallbacks
 from rclpy.parameter import Parameter as RosParameter
-from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
+from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from hsv.bags import description
@@ -33,10 +33,7 @@ LOG_INTERVAL = 10.0
 """Time (s) between repeated messages."""
 
 LINK_CHECK = 0.05
-"""Time (s) between checks of the links until they are matched. A check takes about 1 ms, which slows the start."""
-
-WARN_AFTER = 10.0
-"""Time (s) after which a node that waits for all others logs a warning."""
+"""Time (s) between checks of the links until they are matched."""
 
 
 class LockstepNode(ProcessNode):
@@ -51,12 +48,7 @@ class LockstepNode(ProcessNode):
     """
 
     def __init__(self, role: NodeDescription, task: str = "") -> None:
-        """Join the graph.
-
-        Args:
-            role: Role of the node in the graph.
-            task: Short name of the task in the diagnostics.
-        """
+        """Join the graph in ``role``; ``task`` is its short name in the diagnostics."""
         super().__init__(role.name)
         self._task = task
         place = f"one {role.name} a domain and namespace (ROS_DOMAIN_ID, -r __ns:=)"
@@ -64,7 +56,7 @@ class LockstepNode(ProcessNode):
         for topic in role.own_topics:
             self.claim(topic, place)
         if role.known_by:
-            refuse_unknown(self, role.name, self.of_others)
+            refuse_unknown(self, role.name)
         values = declare(self, LOCKSTEP_PARAMETERS)
         self.recorded, self.controller = bool(values["recorder"]), str(values["controller"])
         self.estimator = bool(values[ESTIMATOR_ENABLED.name])
@@ -79,8 +71,6 @@ class LockstepNode(ProcessNode):
         self._next_log = self._made + FIRST_LOG_AFTER
         self._changed = ""
         """Description of the current parameter change, with the step at which it takes effect."""
-        self._foreign = 0
-        self._foreign_logged = -LOG_INTERVAL
         self._links: dict[str, list[NodeDescription]] = {}
         self.linked: dict[str, str] = {}
         """Full names of the linked nodes by role, as of the last :meth:`missing_links`."""
@@ -92,23 +82,24 @@ class LockstepNode(ProcessNode):
         """Subscribe to a step topic of the graph description; ``callback`` is called with the bytes of a message."""
 
         def take(message: bytes) -> None:
-            if self.exit_code is not None:
-                return  # The node is shutting down; the reason has been logged.
-            try:
-                callback(message)
-            except RunError as error:
-                self.refuse_message(topic, error)
+            if self.exit_code is None:  # otherwise the node is shutting down; the reason has been logged
+                try:
+                    callback(message)
+                except RunError as error:
+                    self.refuse_message(topic, error)
 
         kind = message_class(description.TOPICS[topic])
         self._inputs[topic] = self.create_subscription(kind, topic, take, STEP, raw=True)
 
     def refuse_message(self, topic: str, error: RunError) -> str:
         """Shut down because of an invalid message; return the logged error."""
-        logged = f"{self.resolve_topic_name(topic)}: {error}"
-        # The error is logged and not raised, because the executor would print a traceback.
-        self.get_logger().fatal(logged)
-        self.finish(1)
-        return logged
+        return self.fail(f"{self.resolve_topic_name(topic)}: {error}")
+
+    def fail(self, words: str, code: int = 1) -> str:
+        """Log and return an error that ends the process; an exception in a callback would be printed with traceback."""
+        self.get_logger().fatal(words)
+        self.finish(code)
+        return words
 
     def create_step_publisher(self, topic: str) -> Callable[[bytes], None]:
         """Return a function that publishes the bytes of a message on a step topic of the graph description."""
@@ -118,44 +109,31 @@ class LockstepNode(ProcessNode):
         publish: Callable[[bytes], None] = publisher.handle.publish_raw
         return publish
 
-    def links_are_counted(self) -> bool:
-        """Return whether enough endpoints are matched for all links; a fast check that does not identify the nodes."""
-        return all(self._matched(topic) >= len(roles) for topic, roles in self._links.items())
-
     def missing_links(self) -> list[str]:
         """Return the missing links, such as ``"tube_mpc (/hsv/nominal)"``; empty when all links are matched."""
         missing = []
-        types_of: dict[tuple[str, str], set[str]] = {}
         self.linked = {}
+        here = self.get_name(), self.get_namespace()
         for topic, roles in self._links.items():
-            publishers, subscriptions = (
-                self.get_publishers_info_by_topic(topic),
-                self.get_subscriptions_info_by_topic(topic),
-            )
-            name = self.resolve_topic_name(topic)
-            seen, own = (subscriptions, publishers) if topic in self._outputs else (publishers, subscriptions)
-            here = self.get_name(), self.get_namespace()
+            own, seen = self.get_publishers_info_by_topic(topic), self.get_subscriptions_info_by_topic(topic)
+            if topic in self._inputs:
+                own, seen = seen, own
             definitions = [e.topic_type_hash for e in own if (e.node_name, e.node_namespace) == here]
             there: dict[str, str] = {}
             different: dict[str, str] = {}
             for endpoint in seen:
                 node = endpoint.node_name, endpoint.node_namespace
-                if node not in types_of:
-                    types_of[node] = published_types(self, *node)
-                found = {role.name: full_name(*node) for role in roles if role.known_by in types_of[node]}
+                types = published_types(self, *node)
+                found = {role.name: full_name(*node) for role in roles if role.known_by in types}
                 # DDS matches nodes built from other message definitions, but their messages would be misread.
                 (there if endpoint.topic_type_hash in definitions else different).update(found)
             self.linked |= there
-            absent = [role for role in roles if role.name not in there]
-            # A link needs the node, identified by its types, and a matched endpoint, which is counted. Viewers are not
-            # counted.
-            absent = absent or roles[max(self._matched(topic) - self._watching(seen, topic, there), 0) :]
-            kind = description.TOPICS[topic]
-            missing += [
-                f"{role.name} ({name}"
-                + (f"; {different[role.name]} has another definition of {kind})" if role.name in different else ")")
-                for role in absent
-            ]
+            # A link needs the node, identified by its types, and a matched endpoint, which is counted without viewers.
+            matched = self._matched(topic) - self._watching(seen, topic, there)
+            name, kind = self.resolve_topic_name(topic), description.TOPICS[topic]
+            for role in [role for role in roles if role.name not in there] or roles[max(matched, 0) :]:
+                other = f"; {different[role.name]} has another definition of {kind}" if role.name in different else ""
+                missing.append(f"{role.name} ({name}{other})")
         return missing
 
     def node_in_role(self, role: NodeDescription) -> str | None:
@@ -165,37 +143,21 @@ class LockstepNode(ProcessNode):
         found = node_in_role(self, role)
         return full_name(*found) if found else None
 
-    def log_waiting(self, missing: Callable[[], Sequence[str]], decides: bool = False) -> None:
+    def log_waiting(self, missing: Sequence[str], decides: bool = False) -> None:
         """Log from time to time the nodes that this node waits for; a warning if this node ``decides`` the start."""
         now = time.monotonic()
         if now < self._next_log:
             return
         self._next_log = now + LOG_INTERVAL
-        words = "waiting for " + ", ".join(missing())
-        if decides and now - self._made > WARN_AFTER:
+        words = "waiting for " + ", ".join(missing)
+        if decides and now - self._made > LOG_INTERVAL:
             self.get_logger().warning(f"slow start, for {now - self._made:.0f} s {words}")
         else:
             self.get_logger().info(words)
 
     def publishers_of(self, topic: str) -> list[str]:
         """Return the full names of the publishers of ``topic``, one per endpoint."""
-        return sorted(
-            full_name(endpoint.node_name, endpoint.node_namespace)
-            for endpoint in self.get_publishers_info_by_topic(topic)
-        )
-
-    def log_foreign(self, topic: str, step: int, expected: int) -> None:
-        """Log from time to time that messages with an unexpected step arrive, which come from outside this graph."""
-        self._foreign += 1
-        now = time.monotonic()
-        if now < self._foreign_logged + LOG_INTERVAL:
-            return
-        self._foreign_logged = now
-        publishers = self.publishers_of(topic)
-        self.get_logger().error(
-            f"{self._inputs[topic].topic_name} of step {step}: expected {expected}, ignored ({self._foreign} so far; "
-            f"published by {', '.join(publishers) or 'a node that is gone'})"
-        )
+        return sorted(full_name(e.node_name, e.node_namespace) for e in self.get_publishers_info_by_topic(topic))
 
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
         """Set the parameters; the result states the step at which a change in flight takes effect."""
@@ -210,35 +172,35 @@ class LockstepNode(ProcessNode):
         self._changed = words
         self.get_logger().info(words)
 
-    def diagnosis_due(self, signals: Signals) -> bool:
-        """Return whether a simulated second has begun since the last diagnosis."""
-        return signals.stamp[0] != self._diagnosed_second
-
     def diagnose(self, signals: Signals, summary: str = "running", warning: bool = False, **values: object) -> None:
-        """Publish the diagnostics of this node; nodes do so once per simulated second and for warnings."""
+        """Publish the diagnostics of this node, once per simulated second and for a ``warning``."""
+        if signals.stamp[0] == self._diagnosed_second and not warning:
+            return
         self._diagnosed_second = signals.stamp[0]
+        values = {"step": signals.step, **values, **self.measured()}
         status = DiagnosticStatus(
             level=DiagnosticStatus.WARN if warning else DiagnosticStatus.OK,
             name=f"{self.get_name()}: {self._task}",
             message=summary,
             hardware_id="hsv",
-            values=[KeyValue(key=key, value=str(value)) for key, value in ({"step": signals.step} | values).items()],
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
         message = DiagnosticArray(status=[status])
         message.header.stamp.sec, message.header.stamp.nanosec = signals.stamp
         self._diagnostics.publish(message)
 
+    def measured(self) -> dict[str, str]:
+        """Return further values for the diagnostics; for subclasses."""
+        return {}
+
     def _watching(self, seen: Sequence[TopicEndpointInfo], topic: str, linked: Mapping[str, str]) -> int:
         """Return the number of endpoints in ``seen`` that are matched although their nodes are not ``linked``."""
-
-        def ends(other: QoSProfile) -> tuple[QoSProfile, QoSProfile]:
-            return (STEP, other) if topic in self._outputs else (other, STEP)
-
+        strangers = [e for e in seen if full_name(e.node_name, e.node_namespace) not in linked.values()]
+        pairs = [(STEP, e.qos_profile) if topic in self._outputs else (e.qos_profile, STEP) for e in strangers]
         return sum(
-            full_name(endpoint.node_name, endpoint.node_namespace) not in linked.values()
-            and endpoint.topic_type == description.TOPICS[topic]
-            and qos_check_compatible(*ends(endpoint.qos_profile))[0] is not QoSCompatibility.ERROR
-            for endpoint in seen
+            endpoint.topic_type == description.TOPICS[topic]
+            and qos_check_compatible(*pair)[0] is not QoSCompatibility.ERROR
+            for endpoint, pair in zip(strangers, pairs, strict=True)
         )
 
     def _matched(self, topic: str) -> int:
@@ -253,8 +215,8 @@ class PeerNode(LockstepNode):
     The plant announces the end of the run; if it disappears without doing so, the run counts as broken off.
     """
 
-    def __init__(self, role: NodeDescription, task: str = "", hears_runs: bool = True) -> None:
-        """Join the graph; a subclass without ``hears_runs`` subscribes to the runs itself."""
+    def __init__(self, role: NodeDescription, task: str) -> None:
+        """Join the graph; the subclass then calls :meth:`hear_runs`."""
         super().__init__(role, task)
         self._run: Run | None = None
         self._announced = False
@@ -263,11 +225,9 @@ class PeerNode(LockstepNode):
         self._ready = self.create_publisher(Ready, description.READY, LATCHED)
         # Subscribe before /hsv/run, so that the end of a run is received before the start of the next.
         self.create_subscription(VehicleState, description.LAST_STATE, self._on_last_state, LATCHED)
-        if hears_runs:
-            self.hear_runs(self._on_run)
 
     def hear_runs(self, callback: Callable[[Any], None], raw: bool = False) -> None:
-        """Subscribe to the runs; ``callback`` is called with each, or with its bytes if ``raw``."""
+        """Subscribe to the runs, after everything that must be received before; ``raw`` as in rclpy."""
         links = SubscriptionEventCallbacks(matched=self._on_plant)
         self._runs = self.create_subscription(Run, description.RUN, callback, LATCHED, event_callbacks=links, raw=raw)
 
@@ -283,20 +243,18 @@ class PeerNode(LockstepNode):
         """The run for which this node has announced itself ready, or None."""
         return self._run if self._announced else None
 
-    def missing(self) -> list[str]:
-        """Return the missing conditions for this node to be ready; subclasses may add to the links."""
-        return self.missing_links()
-
     def poll(self) -> None:
         """Announce this node as ready as soon as all its links are matched; until then log the missing peers."""
         if self._announced:
             return
-        if self._run is not None and self.links_are_counted() and not self.missing():
+        if self._run is None:
+            self.log_waiting([f"plant ({self._runs.topic_name})"])
+        elif missing := self.missing_links():
+            self.log_waiting(missing)
+        else:
             self._announced = True
             self._ready.publish(Ready(node=self.role.name, run_id=self._run.run_id))
             self.get_logger().info(f"ready for {run_in_words(self._run)}")
-        else:
-            self.log_waiting(lambda: self.missing() or [f"plant ({self._runs.topic_name})"])
 
     def wait_timeout(self) -> float:
         """Return the time (s) to the next poll, which is shorter until the links are matched."""
@@ -304,26 +262,19 @@ class PeerNode(LockstepNode):
 
     def _on_run(self, run: Run) -> None:
         period = self.get_parameter("period").value if self.has_parameter("period") else run.period
-        refusal = ""
         if run.interface_version != Run.INTERFACE_VERSION:
-            refusal = (
-                f"interface version {run.interface_version} of the plant: expected {Run.INTERFACE_VERSION}, as here"
-            )
+            version = f"interface version {run.interface_version} of the plant"
+            self.fail(f"{version}: expected {Run.INTERFACE_VERSION}, as here", 2)
         elif period != run.period:
-            refusal = f"parameter period = {period}: expected the plant's, {run.period}"
-        if refusal:
-            self.get_logger().fatal(refusal)
-            self.finish(2)
-            return
-        self.start_run(run)
-        self._run = run
-        self._announced = self.over = False
+            self.fail(f"parameter period = {period}: expected the plant's, {run.period}", 2)
+        else:
+            self.start_run(run)
+            self._run = run
+            self._announced = self.over = False
 
     def _on_last_state(self, state: VehicleState) -> None:
-        if state.status == VehicleState.RUNNING:
-            how = "broken off by the plant"
-        else:
-            how = "finished" if state.status == VehicleState.FINISHED else "diverged"
+        words = {VehicleState.RUNNING: "broken off by the plant", VehicleState.FINISHED: "finished"}
+        how = words.get(state.status, "diverged")
         self._end(f"{how} at {step_in_words(state.step, self._run.period if self._run else 0.0)}")
 
     def _on_plant(self, info: QoSSubscriptionMatchedInfo) -> None:

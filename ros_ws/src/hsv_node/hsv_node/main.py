@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import gc
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+from itertools import pairwise
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -17,40 +18,27 @@ from rclpy.utilities import remove_ros_args
 from hsv.base.errors import HsvError, ParameterError
 from hsv.base.processes import choose_log_folder, ignore_ctrl_c_at_end, take_signals
 from hsv.graph.exclusive import ros_domain
-from hsv_node.arguments import check_names, shared_parameters
 from hsv_node.middleware import prefer_profiles
 from hsv_node.process import ProcessNode, ends_with
 
 
 def run_node(
-    build: Callable[[], ProcessNode],
+    build: Callable[[], ProcessNode | Iterable[ProcessNode]],
     name: str,
     args: Sequence[str] | None = None,
     executor_class: Callable[[], Executor] = EventsExecutor,
     *,
     own_arguments: bool = False,
+    several: bool = False,
 ) -> int:
     """Spin the node that ``build`` makes until it finishes or is interrupted; return the exit code of the process.
 
-    Bad parameters end it before it joins the graph, with one line on standard error and exit code 2. So do arguments
-    that are not for ROS, unless the process has ``own_arguments``, which it has checked itself.
+    ``several`` nodes share one executor, until the first of them finishes. Bad parameters end the process before it
+    joins the graph, with one line on standard error and exit code 2. So do arguments that are not for ROS, unless the
+    process has ``own_arguments``, which it has checked itself.
     """
-    return run_nodes(lambda: iter([build()]), name, args, executor_class, own_arguments=own_arguments, several=False)
-
-
-def run_nodes(
-    build: Callable[[], Iterator[ProcessNode]],
-    name: str,
-    args: Sequence[str] | None = None,
-    executor_class: Callable[[], Executor] = EventsExecutor,
-    *,
-    own_arguments: bool = False,
-    several: bool = True,
-) -> int:
-    """Spin several nodes with one executor, as :func:`run_node` does one, until the first of them finishes."""
     words = list(sys.argv if args is None else args)
     try:
-        check_names(words, several)
         # Looked through before they are used: then rcl logs nothing of its own about what is wrong.
         others = remove_ros_args(words)[1:]
         if others and not own_arguments:
@@ -63,7 +51,9 @@ def run_nodes(
         return _refuse(name, ParameterError(f"unknown ROS arguments {error}"))
     except Exception as error:  # rcl reports a malformed command line or parameter file by several exception types
         return _refuse(name, error)
-    ProcessNode.of_others = shared_parameters(words, several)
+    if not several:
+        given = (value.partition(":=")[0] for flag, value in pairwise(words) if flag in ("-p", "--param"))
+        ProcessNode.own_only = frozenset(given)
     # An orderly end must never wait for a message: the handler only asks, and the loop looks four times a second.
     stop: list[int] = []
     take_signals(lambda received, _frame: stop.append(received))
@@ -73,7 +63,8 @@ def run_nodes(
     code = 1
     try:
         executor = executor_class()
-        for node in build():
+        built = build()
+        for node in [built] if isinstance(built, ProcessNode) else built:
             nodes.append(node)
             node.process_nodes = nodes
             executor.add_node(node)

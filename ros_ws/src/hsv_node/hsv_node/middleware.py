@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import MutableMapping
+from collections.abc import Mapping, MutableMapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from hsv_msgs.msg import Fault
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
+
+from hsv.base.errors import RecordingError
 
 STEP = QoSProfile(depth=256, reliability=ReliabilityPolicy.RELIABLE)
 """Quality of service of the step topics; the queue is deeper than the lead of the plant over the recorder."""
@@ -18,18 +21,38 @@ STEP = QoSProfile(depth=256, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED = QoSProfile(depth=32, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Quality of service of announcements, which late subscribers must receive."""
 
+LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Quality of service of a viewer of the latest message: publishers do not wait for it, and it may miss messages."""
+
 PROFILES = Path(__file__).with_name("fastdds.xml")
 """The settings: how often a node announces itself at first, and when its own threads are woken."""
 
 _VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
-_OWN_FILE = "DEFAULT_FASTRTPS_PROFILES.xml"
-"""File in the working directory that Fast DDS reads."""
 
 
 def message_class(name: str) -> Any:
     """Return the class of a message type such as ``"hsv_msgs/msg/VehicleState"``."""
     package, kind, message = name.split("/")
     return getattr(import_module(f"{package}.{kind}"), message)
+
+
+def installed_class(topic: str, kind: str) -> Any:
+    """Return the class of the messages of any ``topic``.
+
+    Raises:
+        RecordingError: The type is not installed.
+    """
+    try:
+        return message_class(kind)
+    except (ImportError, AttributeError, ValueError):
+        raise RecordingError(f"topic {topic}: message type {kind} is not installed") from None
+
+
+def fault_message(channel: str, type: str, parameters: Mapping[str, float]) -> Fault:
+    """Return the message of a fault."""
+    return Fault(
+        channel=channel, type=type, parameter_names=list(parameters), parameter_values=list(parameters.values())
+    )
 
 
 def type_name(kind: type) -> str:
@@ -42,7 +65,6 @@ class ServiceCall:
     """A request to a service, which is sent once the service is ready; the node continues meanwhile."""
 
     def __init__(self, node: Node, kind: Any, name: str, request: Any) -> None:
-        """Prepare to send the ``request`` to the service ``name`` of type ``kind``."""
         self.name = name
         self._node, self._request = node, request
         self._client = node.create_client(kind, name)
@@ -71,5 +93,6 @@ def prefer_profiles(environment: MutableMapping[str, str] = os.environ, director
 
     A file that the ``environment`` names, or that Fast DDS finds in the working ``directory``, has precedence.
     """
-    if not any(name in environment for name in _VARIABLES) and not Path(directory or "", _OWN_FILE).exists():
+    own = Path(directory or "", "DEFAULT_FASTRTPS_PROFILES.xml")
+    if not any(name in environment for name in _VARIABLES) and not own.exists():
         environment[_VARIABLES[0]] = str(PROFILES)

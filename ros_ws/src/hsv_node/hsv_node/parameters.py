@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
@@ -19,6 +19,7 @@ from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.base.errors import DesignError, ParameterError
 from hsv.base.parameters import Parameter
 from hsv.model.vehicle import VEHICLE_PARAMETERS, missing_parameters, named_parameters
+from hsv_node.process import ProcessNode
 
 if TYPE_CHECKING:
     from hsv.control.design import ControlDesign
@@ -47,30 +48,24 @@ def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] 
         # Neither YAML nor rclpy can tell the element type of an empty list.
         empty = parameter.kind.endswith("_array") and (default == [] if override is None else override.value is None)
         try:
-            declared = _declare_empty(node, parameter) if empty else _declare(node, parameter, default)
+            declared = _declare(node, parameter, default, empty)
         except (InvalidParameterTypeException, InvalidParameterValueException, TypeError) as error:
             raise parameter.refusal(override.value if override else default) from error
         values[parameter.name] = parameter.check(declared)
     return values
 
 
-def _declare(node: Node, parameter: Parameter, default: Any) -> Any:
+def _declare(node: Node, parameter: Parameter, default: Any, empty: bool) -> Any:
+    kind = RosParameter.Type[parameter.kind.upper()]
+    if empty:
+        # Declare the type first, then set the value; only then may the parameter be read-only.
+        node.declare_parameter(parameter.name, kind, ParameterDescriptor(), ignore_override=True)
+        node.set_parameters([RosParameter(parameter.name, kind, [])])
+        node.set_descriptor(parameter.name, _descriptor(parameter, kind))
+        return []
     # A given value must have the type that an empty default cannot tell.
-    declared = _array_type(parameter) if default == [] else default
+    declared = kind if default == [] else default
     return node.declare_parameter(parameter.name, declared, _descriptor(parameter)).value
-
-
-def _array_type(parameter: Parameter) -> RosParameter.Type:
-    return RosParameter.Type.STRING_ARRAY if parameter.kind == "string_array" else RosParameter.Type.DOUBLE_ARRAY
-
-
-def _declare_empty(node: Node, parameter: Parameter) -> Any:
-    kind = _array_type(parameter)
-    # Declare the type first, then set the value; only then may the parameter be read-only.
-    node.declare_parameter(parameter.name, kind, ParameterDescriptor(), ignore_override=True)
-    node.set_parameters([RosParameter(parameter.name, kind, [])])
-    node.set_descriptor(parameter.name, _descriptor(parameter, kind))
-    return []
 
 
 def declare_vehicle(node: Node) -> None:
@@ -78,8 +73,8 @@ def declare_vehicle(node: Node) -> None:
 
     A parameter that is not given has the value of the vehicle named by ``vehicle.name``.
     """
-    # Skip the look-up for a vehicle that is given completely, because importing the units takes time.
     overrides = {p.name: node._parameter_overrides[p.name].value for p in VEHICLE_PARAMETERS if given(node, p.name)}
+    # A vehicle that is given completely need not be looked up, which imports the units.
     declare(node, VEHICLE_PARAMETERS, named_parameters(overrides) if missing_parameters(overrides) else None)
 
 
@@ -108,26 +103,12 @@ def given(node: Node, name: str) -> bool:
     return name in node._parameter_overrides
 
 
-def refuse_sim_time(node: Node) -> None:
-    """Refuse ``use_sim_time`` for a node that publishes the clock."""
-    refusal = f"parameter use_sim_time = True: expected false for {node.get_name()}, which makes the clock itself"
-    if node.get_parameter("use_sim_time").value:
-        raise ParameterError(refusal)
-
-    def check(parameters: list[RosParameter]) -> SetParametersResult:
-        given = any(parameter.name == "use_sim_time" and parameter.value for parameter in parameters)
-        return SetParametersResult(successful=not given, reason=refusal if given else "")
-
-    node.add_on_set_parameters_callback(check)
-
-
-def refuse_unknown(node: Node, role: str, of_others: frozenset[str]) -> None:
-    """Refuse parameters given to ``node`` that it does not have.
+def refuse_unknown(node: ProcessNode, role: str) -> None:
+    """Refuse parameters given to ``node`` that it does not have; a file may have those of other nodes of the graph.
 
     Args:
         node: A new node, with no more than what ROS has declared.
         role: Its role, whose parameters it will declare; empty for none.
-        of_others: Names that may be there for other nodes of the graph: the files of a run address all of them.
     """
     if not node._parameter_overrides:
         return
@@ -144,11 +125,12 @@ def refuse_unknown(node: Node, role: str, of_others: frozenset[str]) -> None:
     own = {*node.get_parameters_by_prefix(""), *(p.name for p in LOCKSTEP_PARAMETERS if role), *tables.get(role, ())}
     for name in node._parameter_overrides:
         owner = next((other for other, names in tables.items() if name in names), "")
-        if name in own or (name in of_others and (owner or not known)):
+        if name in own or (name not in node.own_only and (owner or not known)):
             continue
-        nearest = difflib.get_close_matches(name, own.union(*tables.values()) if name in of_others else own, 1, 0.0)
+        admitted = own if name in node.own_only else own.union(*tables.values())
+        [nearest] = difflib.get_close_matches(name, admitted, 1, 0.0)
         of = f", {owner} has" if owner else ""
-        raise ParameterError(f"parameter {name}: {node.get_name()} has none of this name{of}; nearest is {nearest[0]}")
+        raise ParameterError(f"parameter {name}: {node.get_name()} has none of this name{of}; nearest is {nearest}")
 
 
 def _descriptor(parameter: Parameter, kind: RosParameter.Type | None = None) -> ParameterDescriptor:
@@ -162,10 +144,11 @@ def _descriptor(parameter: Parameter, kind: RosParameter.Type | None = None) -> 
         descriptor.type = kind.value
     # ROS has ranges for single numbers only, with two ends; the constraint in words covers lists.
     limits = parameter.minimum, parameter.maximum
-    if parameter.kind == "double" and any(map(math.isfinite, limits)):
-        low, high = (min(max(limit, -sys.float_info.max), sys.float_info.max) for limit in limits)
-        descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high, step=0.0)]
-    elif parameter.kind == "integer" and any(map(math.isfinite, limits)):
-        low, high = (int(min(max(limit, -_LARGEST), _LARGEST)) for limit in limits)
-        descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=1)]
+    if any(map(math.isfinite, limits)):
+        largest = sys.float_info.max if parameter.kind == "double" else _LARGEST
+        low, high = (min(max(limit, -largest), largest) for limit in limits)
+        if parameter.kind == "double":
+            descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high, step=0.0)]
+        elif parameter.kind == "integer":
+            descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=int(high), step=1)]
     return descriptor

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import signal
 import socket
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, ClassVar
@@ -14,9 +15,6 @@ from rclpy.node import Node
 from hsv.base.errors import RunError
 from hsv.graph.exclusive import claim
 
-LEAVE_WITHIN = 3.0
-"""Maximum time (s) to destroy the nodes, which takes milliseconds; ``hsv run`` reports a hung node only later."""
-
 _MONOTONIC = 1
 _NEW_THREAD = 2
 """``CLOCK_MONOTONIC`` and ``SIGEV_THREAD`` of Linux."""
@@ -25,8 +23,8 @@ _NEW_THREAD = 2
 class ProcessNode(Node):
     """A node with an exit code and a task between messages, see :meth:`poll`."""
 
-    of_others: ClassVar[frozenset[str]] = frozenset()
-    """Names of the parameters of this process that apply to several nodes; set before a node is created."""
+    own_only: ClassVar[frozenset[str]] = frozenset()
+    """Parameters given with ``-p`` to a process of one node, which must be its own; a file has those of others too."""
 
     def __init__(self, name: str, namespace: str | None = None, **options: Any) -> None:
         """Create the node with further ``options`` of rclpy."""
@@ -77,21 +75,8 @@ class ProcessNode(Node):
         return 0.25
 
 
-class _Event(ctypes.Structure):
-    """``struct sigevent``: the notification of an expired timer."""
-
-    _fields_ = (
-        ("value", ctypes.c_long),
-        ("signal", ctypes.c_int),
-        ("notification", ctypes.c_int),
-        ("function", ctypes.c_void_p),
-        ("attributes", ctypes.c_void_p),
-        ("reserved", ctypes.c_byte * 32),
-    )
-
-
 @contextmanager
-def ends_with(code: int, within: float = LEAVE_WITHIN) -> Iterator[None]:
+def ends_with(code: int, within: float = 3.0) -> Iterator[None]:
     """End the process with exit code ``code`` if the body takes longer than ``within`` seconds.
 
     For the destruction of nodes, when everything else is done and written. Fast DDS 2.14 can wait there for ever: a
@@ -100,14 +85,14 @@ def ends_with(code: int, within: float = LEAVE_WITHIN) -> Iterator[None]:
     it; a timer of the operating system can. Where the system refuses the timer, the body runs without it.
     """
     library = ctypes.CDLL(None)
-    exit_now = ctypes.cast(library._exit, ctypes.c_void_p)
-    event = _Event(value=code, notification=_NEW_THREAD, function=exit_now.value)
+    exit_now = ctypes.cast(library._exit, ctypes.c_void_p).value
+    # struct sigevent: value, signal, notification, function, attributes; struct itimerspec: no period, seconds and ns.
+    event = struct.pack("liiPP32x", code, 0, _NEW_THREAD, exit_now, 0)
+    times = struct.pack("llll", 0, 0, int(within), int(within % 1 * 1e9))
     timer = ctypes.c_void_p()
-    if library.timer_create(_MONOTONIC, ctypes.byref(event), ctypes.byref(timer)):
+    if library.timer_create(_MONOTONIC, event, ctypes.byref(timer)):
         yield
         return
-    # struct itimerspec: the period, which is none, and the time until it runs down, in seconds and nanoseconds.
-    times = (ctypes.c_long * 4)(0, 0, int(within), int(within % 1 * 1e9))
     library.timer_settime(timer, 0, times, None)
     try:
         yield

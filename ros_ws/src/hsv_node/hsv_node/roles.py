@@ -8,6 +8,7 @@ from itertools import chain
 from rclpy.node import Node, NodeNameNonExistentError
 
 from hsv.bags.description import NodeDescription
+from hsv_node.middleware import type_name
 
 
 def node_in_role(asking: Node, role: NodeDescription) -> tuple[str, str] | None:
@@ -33,17 +34,18 @@ def full_name(name: str, namespace: str) -> str:
 
 def published_types(asking: Node, name: str, namespace: str) -> set[str]:
     """Return the types of all messages that a node publishes."""
-    return {kind for kinds in published(asking, name, namespace).values() for kind in kinds}
+    found = _known(asking.get_publisher_names_and_types_by_node, name, namespace)
+    return {kind for kinds in found.values() for kind in kinds}
 
 
-def published(asking: Node, name: str, namespace: str) -> dict[str, list[str]]:
-    """Return the types of the topics that a node publishes, by full name; empty for an unknown node."""
-    return _known(asking.get_publisher_names_and_types_by_node, name, namespace)
-
-
-def services(asking: Node, name: str, namespace: str) -> dict[str, list[str]]:
-    """Return the types of the services that a node offers, by full name; empty for an unknown node."""
-    return _known(asking.get_service_names_and_types_by_node, name, namespace)
+def name_of(asking: Node, role: NodeDescription, kind: type) -> str | None:
+    """Return the full name of the topic or service of type ``kind`` of the node in ``role``, None if there is none."""
+    node = node_in_role(asking, role)
+    if node is None:
+        return None
+    offered = _known(asking.get_publisher_names_and_types_by_node, *node)
+    offered |= _known(asking.get_service_names_and_types_by_node, *node)
+    return next((name for name, kinds in offered.items() if type_name(kind) in kinds), None)
 
 
 def _known(look: Callable[[str, str], list[tuple[str, list[str]]]], name: str, namespace: str) -> dict[str, list[str]]:

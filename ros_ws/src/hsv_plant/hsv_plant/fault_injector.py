@@ -7,7 +7,7 @@ from functools import partial
 from hsv_msgs.msg import Run
 from hsv_msgs.srv import ClearFault, InjectFault
 
-from hsv.bags.description import CLEAR_FAULT, COMMAND, FAULT_INJECTOR, INJECT_FAULT, controller_node
+from hsv.bags.description import CLEAR_FAULT, COMMAND, FAULT_INJECTOR, INJECT_FAULT
 from hsv.bags.messages import fault_in, stamp_in, stamp_of
 from hsv.flight.blocks import Signals
 from hsv.model.faults.injector import DURATION, FAULT_PARAMETERS, LINK_PARAMETERS, FaultInjector
@@ -29,7 +29,6 @@ class FaultInjectorNode(BlockNode):
             declare_vehicle(self)
             values = declare(self, FaultInjector.PARAMETERS)
         self._period = values["period"]
-        self._controller = controller_node(self.controller)
         self._due_step = 0
         """Next step for which a command is expected."""
         self.component = self._injector = FaultInjector.from_parameters(values)
@@ -51,36 +50,28 @@ class FaultInjectorNode(BlockNode):
             self._due_step += 1
         super().on_message(topic, message)
 
-    def missing(self) -> list[str]:
+    def missing_links(self) -> list[str]:
         """Return the missing links; end the run if there are two controllers."""
-        missing = super().missing()
-        if not missing and len(names := self.publishers_of(COMMAND)) > 1:
-            self._end_for_two(names)
+        missing = super().missing_links()
+        if not missing:
+            self._refuse_two()
         return missing
 
     def _refuse(self, topic: str, step: int, time: float) -> None:
-        names = self.publishers_of(topic)
-        if len(names) > 1:
-            self._end_for_two(names)
-            return
-        name = names[0] if names else self._controller.name
-        due = self._due_step * self._period
-        self.get_logger().fatal(
-            f"{name} answered step {step} at {time:.2f} s on {self.resolve_topic_name(topic)}, expected step "
-            f"{self._due_step} at {due:.2f} s"
-        )
-        self.finish(1)
+        if not self._refuse_two():
+            name = (self.publishers_of(topic) or ["the controller"])[0]
+            answered = f"{name} answered step {step} at {time:.2f} s on {self.resolve_topic_name(topic)}"
+            self.fail(f"{answered}, expected step {self._due_step} at {self._due_step * self._period:.2f} s")
 
-    def _end_for_two(self, names: list[str]) -> None:
-        self.get_logger().fatal(
-            f"{' and '.join(names)} publish {self.resolve_topic_name(COMMAND)}: expected one controller"
-        )
-        self.finish(1)
+    def _refuse_two(self) -> bool:
+        names = self.publishers_of(COMMAND)
+        if two := len(names) > 1:
+            self.fail(f"{' and '.join(names)} publish {self.resolve_topic_name(COMMAND)}: expected one controller")
+        return two
 
     def stepped(self, signals: Signals) -> None:
         """Publish whether a fault acts."""
-        if self.diagnosis_due(signals):
-            self.diagnose(signals, "faults act" if signals.active_faults else "no fault")
+        self.diagnose(signals, "faults act" if signals.active_faults else "no fault")
 
     def _inject(self, request: InjectFault.Request) -> tuple[int, str]:
         fault = fault_in(request.fault)
@@ -88,16 +79,11 @@ class FaultInjectorNode(BlockNode):
         steps = first_step(request.duration, self._period) if request.duration else NEVER
         step = self._injector.inject(fault, steps)
         until = f" to step {step + steps - 1}" if request.duration else " on"
-        return self._logged(step, f"{fault} from step {step}{until}")
+        return step, f"{fault} from step {step}{until}"
 
     def _clear(self, request: ClearFault.Request) -> tuple[int, str]:
         step = self._injector.clear(request.channel, request.type)
-        what = f"no {request.type or 'fault'} of {request.channel or 'any channel'}"
-        return self._logged(step, f"{what} from step {step} on")
-
-    def _logged(self, step: int, words: str) -> tuple[int, str]:
-        self.get_logger().info(words)
-        return step, words
+        return step, f"no {request.type or 'fault'} of {request.channel or 'any channel'} from step {step} on"
 
 
 main = partial(run_node, FaultInjectorNode, "fault_injector")

@@ -33,7 +33,7 @@ from hsv.bags.description import (
     controller_node,
     peers,
 )
-from hsv.bags.infrastructure_parameters import PACE_PARAMETERS, STEP_TIMEOUT
+from hsv.bags.infrastructure_parameters import PACE_PARAMETERS
 from hsv.bags.messages import StepMessages, stamp_of
 from hsv.base.errors import SignalError
 from hsv.core.arithmetic import SEED_PARAMETER
@@ -41,18 +41,14 @@ from hsv.flight.blocks import VEHICLE, Signals
 from hsv.graph.standstill import Standstill
 from hsv.model.plant import FlightStatus, Plant
 from hsv.model.signals import INPUT_NAMES
-from hsv_node.lockstep import LINK_CHECK, LockstepNode, run_in_words, short_id, step_in_words
+from hsv_node.lockstep import LINK_CHECK, LOG_INTERVAL, LockstepNode, run_in_words, short_id, step_in_words
 from hsv_node.main import run_node
 from hsv_node.middleware import LATCHED, STEP, ServiceCall
-from hsv_node.parameters import declare, declare_vehicle, refuse_sim_time
+from hsv_node.parameters import declare, declare_vehicle
 from hsv_plant.simulation_control import SimulationControl
 
 MAX_AHEAD = 100
 """Maximum number of steps that the plant may be ahead of the recorder."""
-
-LAST_WORDS = 1.0
-"""Maximum time (s) to wait at the end until the other nodes have received the last state; usually much less."""
-
 
 _IN_FLIGHT = tuple(parameter.name for parameter in PACE_PARAMETERS if not parameter.read_only)
 
@@ -62,20 +58,17 @@ class PlantNode(LockstepNode):
 
     def __init__(self) -> None:
         super().__init__(PLANT, "flight")
-        refuse_sim_time(self)
         declare_vehicle(self)
         self.values = declare(self, (*Plant.PARAMETERS, *PACE_PARAMETERS))
         self.plant = Plant.from_parameters(self.values)
         self._peers = [node for node in peers(PLANT, self.controller, self.recorded) if not node.foreign]
-        self._foreign_controller = ""
-        """Full name of an external controller node; empty for other controllers."""
         self._ready: set[str] = set()
         # The measurement first: the other nodes work on it while the rest is published.
         self._answers = [(StepMessages(topic).pack, self.create_step_publisher(topic)) for topic in PLANT.publishes]
         self._actuator_messages = StepMessages(ACTUATOR)
         self.create_step_subscription(ACTUATOR, self._on_actuator)
-        self._readies = self.create_subscription(Ready, READY, self._on_ready, LATCHED)
-        self._confirmations = self.create_subscription(RecorderProgress, RECORDER_PROGRESS, self._on_progress, STEP)
+        self.create_subscription(Ready, READY, self._on_ready, LATCHED)
+        self.create_subscription(RecorderProgress, RECORDER_PROGRESS, self._on_progress, STEP)
         self._references = self.create_subscription(Reference, REFERENCE, self._on_reference, LATCHED)
         self._planning = False
         """Whether nominal_trajectory is computing the plan of a command."""
@@ -172,7 +165,12 @@ class PlantNode(LockstepNode):
         signals = self._signals
         step = self._actuator_messages.step(message)
         if not self._started or step != signals.step:
-            self.log_foreign(ACTUATOR, step, signals.step)
+            # A message from outside this graph.
+            self.get_logger().error(
+                f"{self.resolve_topic_name(ACTUATOR)} of step {step}: expected {signals.step}, ignored (published by "
+                f"{', '.join(self.publishers_of(ACTUATOR)) or 'a node that is gone'})",
+                throttle_duration_sec=LOG_INTERVAL,
+            )
             return
         self._messages += 1
         if signals.status is FlightStatus.RUNNING:
@@ -181,21 +179,15 @@ class PlantNode(LockstepNode):
             except SignalError as error:
                 self._broken_off = self.refuse_message(ACTUATOR, error)
                 return
-            if not all(map(math.isfinite, signals.actuator.tolist())):
-                self._refuse_answer(signals)
+            numbers = zip(INPUT_NAMES, signals.actuator.tolist(), strict=True)
+            if wrong := ", ".join(f"{key} = {value}" for key, value in numbers if not math.isfinite(value)):
+                name = self.node_in_role(controller_node(self.controller)) or "the controller"
+                self._broken_off = self.fail(f"{name}, step {signals.step}: {wrong}, expected a finite number")
                 return
             self._answered = True
         else:
             self._flown = True
         self._continue()
-
-    def _refuse_answer(self, signals: Signals) -> None:
-        name = self.node_in_role(controller_node(self.controller)) or "the controller"
-        numbers = dict(zip(INPUT_NAMES, signals.actuator.tolist(), strict=True))
-        wrong = ", ".join(f"{key} = {value}" for key, value in numbers.items() if not math.isfinite(value))
-        self._broken_off = f"{name}, step {signals.step}: {wrong}, expected a finite number"
-        self.get_logger().fatal(self._broken_off)
-        self.finish(1)
 
     def _continue(self) -> None:
         """Execute the next step, unless the plant must wait for its input, the recorder or the wall clock."""
@@ -211,20 +203,17 @@ class PlantNode(LockstepNode):
             self._publish()
 
     def _advance(self) -> None:
-        signals = self._signals
-        VEHICLE.step(self.plant, signals)
-        signals.stamp = stamp_of(signals.step, signals.period)
+        VEHICLE.step(self.plant, self._signals)
+        self._signals.stamp = stamp_of(self.step, self._signals.period)
 
     def _room(self) -> bool:
         return not self.recorded or self._signals.step < self._recorded_step + MAX_AHEAD
 
     def _delay(self) -> float:
         """Return the wall time (s) until the next state is due."""
-        factor = self.values["real_time_factor"]
-        if factor == 0.0:
-            return 0.0
-        begun, first = self._paced_from
-        return begun + (self._signals.step + 1 - first) * self.plant.period / factor - time.monotonic()
+        factor, (begun, first) = self.values["real_time_factor"], self._paced_from
+        due = begun + (self.step + 1 - first) * self.plant.period / factor if factor else 0.0
+        return due - time.monotonic()
 
     def _publish(self) -> None:
         signals = self._signals
@@ -233,8 +222,7 @@ class PlantNode(LockstepNode):
         status = FlightStatus(signals.status)
         if self.values["progress"] and (signals.step % 50 == 0 or status is not FlightStatus.RUNNING):
             print(f"step {signals.step} of {self.plant.steps}", flush=True)
-        if self.diagnosis_due(signals):
-            self.diagnose(signals, status=status.name)
+        self.diagnose(signals, status=status.name)
 
     def poll(self) -> None:
         """Start when all nodes are ready, keep the pace, and name a node that is silent for too long."""
@@ -246,16 +234,8 @@ class PlantNode(LockstepNode):
             planning = self._planning and self._references.get_publisher_count() > 0
             waits = self.paused or planning or (self._answered and self._delay() > 0.0)
             waited = self._standstill.look(time.monotonic() if waits else self._messages)
-            if waited > self._limit():
+            if waited > self.values["step_timeout"]:
                 self._give_up(waited)
-
-    def _limit(self) -> float:
-        """Return the time (s) to wait for a peer; a shorter one for an external controller excludes the recorder."""
-        limit = float(self.values["step_timeout"])
-        return max(limit, STEP_TIMEOUT) if self._foreign_controller and self._behind_recorder() else limit
-
-    def _behind_recorder(self) -> bool:
-        return self._flown or not self._room()
 
     def wait_timeout(self) -> float:
         """Return the time (s) to the next poll, or to the next state in a paced flight."""
@@ -273,94 +253,75 @@ class PlantNode(LockstepNode):
         """Log how the run ended, and announce it to the other nodes."""
         if not self._started:
             return
-        run, where = f"run {short_id(self._run)}", step_in_words(self._signals.step, self.plant.period)
-        match self._signals.status:
-            case FlightStatus.RUNNING:
-                self.get_logger().info(f"{run} broken off at {where}: {self._broken_off or 'an error'}")
-            case FlightStatus.FINISHED:
-                self.get_logger().info(f"{run} finished at {where}")
+        run, where = f"run {short_id(self._run)}", step_in_words(self.step, self.plant.period)
+        if self._signals.status is FlightStatus.RUNNING:
+            self.get_logger().info(f"{run} broken off at {where}: {self._broken_off or 'an error'}")
+        elif self._signals.status is FlightStatus.FINISHED:
+            self.get_logger().info(f"{run} finished at {where}")
         self._last_state.publish(StepMessages(STATE).pack(self._signals))
-        self._last_state.wait_for_all_acked(Duration(seconds=LAST_WORDS))
+        # At most; usually the other nodes have received it much sooner.
+        self._last_state.wait_for_all_acked(Duration(seconds=1.0))
 
     def _try_start(self) -> None:
-        if self._is_ready() and self.links_are_counted() and not self.missing_links():
+        unready = [peer.name for peer in self._peers if peer.name not in self._ready]
+        missing = [f"{name} ({self.resolve_topic_name(READY)})" for name in unready] or self.missing_links()
+        if not missing:
             self._started = True
-            controller = controller_node(self.controller)
-            self._foreign_controller = (self.node_in_role(controller) or "") if controller.foreign else ""
             self._paced_from = time.monotonic(), 0
             self._standstill = Standstill()
             self.get_logger().info(f"starts {run_in_words(self._run)}")
             self._publish()
             return
-        self.log_waiting(self._missing, decides=True)
+        self.log_waiting(missing, decides=True)
         limit = self.values["start_timeout"]
         if limit and time.monotonic() - self._begun > limit:
-            self.get_logger().fatal(f"no start within {limit:g} s: still waiting for " + ", ".join(self._missing()))
-            self.finish(1)
-
-    def _is_ready(self) -> bool:
-        return all(peer.name in self._ready for peer in self._peers)
-
-    def _missing(self) -> list[str]:
-        """Return the missing conditions for the start."""
-        unready = [peer.name for peer in self._peers if peer.name not in self._ready]
-        return [f"{name} ({self._readies.topic_name})" for name in unready] or self.missing_links()
+            self.fail(f"no start within {limit:g} s: still waiting for " + ", ".join(missing))
 
     def _give_up(self, waited: float) -> None:
-        step = self._signals.step
-        behind_recorder = self._behind_recorder()
-        source, topic = (
-            (RECORDER, self._confirmations.topic_name)
-            if behind_recorder
-            else (FAULT_INJECTOR, self.resolve_topic_name(ACTUATOR))
-        )
-        silent, slowest = unresponsive(self, self._elsewhere())
-        if not silent and not behind_recorder and self._foreign_controller:
-            silent = [self._foreign_controller]
-        if silent:
-            blame = f"no answer from {', '.join(silent)}"
-        else:
-            blame = "all nodes answer, " + (f"{slowest} last" if slowest else "one of them is stuck")
-        self.get_logger().fatal(f"step {step}: no {topic} (from {source.name}) for {waited:.1f} s; {blame}")
-        self._broken_off = blame
-        self.finish(1)
-
-    def _elsewhere(self) -> list[NodeDescription]:
-        """Return the peers in other processes."""
+        behind_recorder = self._flown or not self._room()
+        source = RECORDER if behind_recorder else FAULT_INJECTOR
+        topic = self.resolve_topic_name(RECORDER_PROGRESS if behind_recorder else ACTUATOR)
         here = {node.get_fully_qualified_name() for node in self.process_nodes}
-        return [peer for peer in self._peers if self.node_in_role(peer) not in here]
+        elsewhere = [peer for peer in self._peers if self.node_in_role(peer) not in here]
+        silent, slowest = unresponsive(self, elsewhere)
+        controller = controller_node(self.controller)
+        if not silent and not behind_recorder and controller.foreign:
+            silent = [self.node_in_role(controller) or "the controller"]
+        if silent:
+            self._broken_off = f"no answer from {', '.join(silent)}"
+        else:
+            self._broken_off = "all nodes answer, " + (f"{slowest} last" if slowest else "one of them is stuck")
+        self.fail(f"step {self.step}: no {topic} (from {source.name}) for {waited:.1f} s; {self._broken_off}")
 
     def _land(self) -> None:
-        signals = self._signals
-        if signals.status is FlightStatus.DIVERGED:
+        state, diverged = self._signals.state, self._signals.status is FlightStatus.DIVERGED
+        if diverged:
             self.get_logger().error(
-                f"flight diverged at t = {signals.step * self.plant.period:.2f} s: "
-                f"angle of attack {signals.state[2]:.3g} rad, pitch angle {signals.state[3]:.3g} rad"
+                f"flight diverged at t = {self.step * self.plant.period:.2f} s: "
+                f"angle of attack {state[2]:.3g} rad, pitch angle {state[3]:.3g} rad"
             )
-        self.finish(EXIT_DIVERGED if signals.status is FlightStatus.DIVERGED else 0)
+        self.finish(EXIT_DIVERGED if diverged else 0)
 
 
-def unresponsive(
-    node: LockstepNode, peers: Sequence[NodeDescription], wait: float = 2.0
-) -> tuple[list[str], str | None]:
-    """Return the ``peers`` whose parameter service does not answer while no other does for ``wait`` (s).
+def unresponsive(node: LockstepNode, peers: Sequence[NodeDescription]) -> tuple[list[str], str | None]:
+    """Return the ``peers`` whose parameter service does not answer while no other does for 2 s, and the last to answer.
 
-    Every node has that service, and a node that computes answers late: the last peer to answer is returned as well.
+    Every node has that service, and a node that computes answers late.
     """
     # The remappings of the command line do not apply to the helper.
     helper = rclpy.create_node(f"{node.get_name()}_liveness", context=node.context, use_global_arguments=False)
     try:
         calls: dict[str, ServiceCall] = {}
         standstill, answered = Standstill(), list[str]()
-        while standstill.look((sum(call.sent for call in calls.values()), len(answered))) < wait and len(
-            answered
-        ) < len(peers):
+        while len(answered) < len(peers):
             for peer in peers:
                 if peer.name not in calls and (name := node.node_in_role(peer)):
                     service = f"{name}/list_parameters"
                     calls[peer.name] = ServiceCall(helper, ListParameters, service, ListParameters.Request())
             rclpy.spin_once(helper, timeout_sec=0.05)
             answered += [name for name, call in calls.items() if call.response() and name not in answered]
+            if standstill.look((sum(call.sent for call in calls.values()), len(answered))) >= 2.0:
+                break
         return [peer.name for peer in peers if peer.name not in answered], answered[-1] if answered else None
     finally:
         helper.destroy_node()

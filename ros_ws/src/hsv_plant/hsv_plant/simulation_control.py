@@ -30,7 +30,6 @@ _NAMES = {
     SimulationState.STATE_PAUSED: "paused",
     SimulationState.STATE_QUITTING: "quitting",
 }
-_QUIT = "SetSimulationState, quitting"
 
 
 class SimulationControl:
@@ -73,7 +72,7 @@ class SimulationControl:
         if (state, target) == (SimulationState.STATE_STOPPED, SimulationState.STATE_PAUSED):
             return _answered(response, kinds.INCORRECT_TRANSITION, "a stopped flight cannot be paused, only played")
         if target == SimulationState.STATE_QUITTING:
-            self._plant.quit(_QUIT)
+            self._plant.quit("SetSimulationState, quitting")
             return _answered(response)
         paused = target != SimulationState.STATE_PLAYING
         [done] = self._plant.set_parameters([Parameter("paused", value=paused)])

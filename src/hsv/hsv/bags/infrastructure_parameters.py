@@ -41,7 +41,6 @@ RECORDER_PARAMETERS = (
     Parameter("bag.directory", "", "bag to write, a new directory; empty: bags/run_<UTC>"),
     Parameter("bag.attachments", [""], "files to attach"),
     Parameter("bag.custom_data", [""], "key=value pairs for the bag's metadata"),
-    Parameter("progress", False, "print numbers of the flight to standard output, for a live line"),
 )
 
 LIVE_PARAMETERS = (

@@ -42,9 +42,7 @@ LivePortOption = Annotated[
         show_default=False,
     ),
 ]
-StepTimeoutOption = Annotated[
-    float | None, Option(help="Wall time (s) until a silent node ends the run; default: 10, for a foreign node 2.5.")
-]
+StepTimeoutOption = Annotated[float, Option(help="Wall time (s) until a silent node ends the run.")]
 NewBagOption = Annotated[Path | None, Option("--bag", help="Bag to write; default: bags/<scenario>_<UTC>.")]
 ComposedOption = Annotated[bool, Option("--composed", help="All nodes in one process: faster, same bytes.")]
 ExternalOption = Annotated[bool, Option("--external", help="Wait for a controller node that you start by hand.")]
@@ -69,7 +67,7 @@ def run(
     external: ExternalOption = False,
     bag: NewBagOption = None,
     namespace: NamespaceOption = "/",
-    step_timeout: StepTimeoutOption = None,
+    step_timeout: StepTimeoutOption = 10.0,
     paused: PausedOption = False,
     report: ReportOption = True,
     verbose: Annotated[bool, Option("--verbose", help="Show the log output of the nodes.")] = False,
@@ -101,14 +99,15 @@ def run(
             output.report_line(node, text)
 
     try:
-        with output.flight_line(prepared.scenario.name, prepared.steps, units) as (show_step, show_snapshot):
+        with output.stages() as show:
+            show(prepared.scenario.name, 0, prepared.steps)
 
             def step(number: int) -> None:
                 clock["end"] = time.monotonic()
                 clock.setdefault("start", clock["end"])
-                show_step(number)
+                show(prepared.scenario.name, number, prepared.steps)
 
-            fly_graph(prepared, namespace=namespace, on_step=step, on_line=line, on_snapshot=show_snapshot)
+            fly_graph(prepared, namespace=namespace, on_step=step, on_line=line)
     except KeyboardInterrupt:
         if not prepared.bag.is_dir():
             raise
@@ -180,7 +179,7 @@ def prepare(
     external: ExternalOption = False,
     bag: NewBagOption = None,
     namespace: NamespaceOption = "/",
-    step_timeout: StepTimeoutOption = None,
+    step_timeout: StepTimeoutOption = 10.0,
     paused: PausedOption = False,
     folder: Annotated[Path | None, Option(help="Folder for the parameter files; default: temporary.")] = None,
     json: JsonOption = False,

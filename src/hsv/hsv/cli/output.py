@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
     from hsv.bags.reader import Bag
-    from hsv.graph.snapshot import Snapshot
 
 Quantity = tuple[float, str]
 """A number and its SI unit."""
@@ -242,15 +241,15 @@ def print_table(title: str, quantities: Mapping[str, Quantity], units: UnitSyste
     console.print(table)
 
 
-def _progress(bar: bool = True) -> Progress:
+def _progress() -> Progress:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     return Progress(
         TextColumn("{task.description}", markup=False),
-        *([BarColumn()] if bar else []),
+        BarColumn(),
         TextColumn("{task.percentage:>3.0f}%"),
         TextColumn("{task.fields[note]}", markup=False),
-        *([TimeElapsedColumn()] if bar else []),
+        TimeElapsedColumn(),
         console=errors,
         transient=True,
         disable=not errors.is_terminal,
@@ -269,19 +268,6 @@ def stages() -> Iterator[Callable[[str, int, int], None]]:
             bar.update(tasks[stage], completed=done, total=total)
 
         yield report
-
-
-@contextmanager
-def flight_line(
-    title: str, steps: int, units: UnitSystem
-) -> Iterator[tuple[Callable[[int], None], Callable[[Snapshot], None]]]:
-    """Yield two callbacks that update the line of a flight: with the step that is flown, and with a snapshot of it."""
-    with _progress(bar=False) as bar:
-        task = bar.add_task(title, total=steps, note="starting the nodes")
-        yield (
-            lambda number: bar.update(task, completed=number),
-            lambda snapshot: bar.update(task, note=snapshot.in_words(units)),
-        )
 
 
 @contextmanager

@@ -53,13 +53,9 @@ def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
 def replay_over_dds(
     results: Results, flight: int, bag: Path, progress: Callable[[int, int], None] = lambda step, steps: None
 ) -> ReplayedFlight:
-    """Repeat ``flight`` with the node processes, recorded to ``bag``.
+    """Repeat ``flight`` with the node processes, recorded to ``bag``, a new directory.
 
-    Args:
-        results: The campaign.
-        flight: Number of the flight.
-        bag: Bag to write, a new directory.
-        progress: Called with the step reached and the last step.
+    ``progress`` is called with the step reached and the last step.
 
     Raises:
         CampaignError, DesignError: No such flight, or the design is not what it was.

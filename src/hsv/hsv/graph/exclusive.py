@@ -19,11 +19,6 @@ LAST_DOMAIN = 232
 HOST = "127.0.0.1"
 """The only address on which the servers of the live view accept connections."""
 
-_LAST_PORT = 65535
-
-_LONGEST_NAME = 100
-"""Bytes; the system takes 107."""
-
 
 def ros_domain() -> int:
     """Return the ROS domain of this process, in which nodes can find each other.
@@ -75,10 +70,8 @@ def is_published(domain: int, topic: str) -> bool:
 
 
 def _address(kind: str, domain: int, name: str) -> str:
-    text = f"hsv_{kind}_{domain}{name}"
-    if len(text) > _LONGEST_NAME:
-        text = f"hsv_{kind}_{domain}_{hashlib.sha256(name.encode()).hexdigest()}"
-    return f"\0{text}"
+    # The system takes 107 bytes.
+    return f"\0hsv_{kind}_{domain}_{hashlib.sha256(name.encode()).hexdigest()}"
 
 
 def origins(port: int) -> list[str]:
@@ -92,8 +85,8 @@ def ports(first: int) -> tuple[int, int]:
     Raises:
         ParameterError: One of them is none, or in use.
     """
-    if not 0 <= first < _LAST_PORT:
-        raise ParameterError(f"live-port = {first}: expected 1 to {_LAST_PORT - 1}, or 0 for any free ones")
+    if not 0 <= first < 65535:
+        raise ParameterError(f"live-port = {first}: expected 1 to 65534, or 0 for any free ones")
     chosen = (first, first + 1 if first else 0)
     for port in chosen:
         with socket.socket() as tried:

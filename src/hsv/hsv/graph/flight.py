@@ -11,7 +11,6 @@ from hsv.bags.description import ROOT, TOPICS
 from hsv.base.errors import RecordingError, RunError
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.preparation import PreparedRun
-from hsv.graph.snapshot import Snapshot
 
 
 def fly_graph(
@@ -20,16 +19,10 @@ def fly_graph(
     namespace: str = ROOT,
     on_step: Callable[[int], None] = lambda step: None,
     on_line: Callable[[str, str], None] = lambda node, text: None,
-    on_snapshot: Callable[[Snapshot], None] = lambda snapshot: None,
 ) -> None:
     """Fly ``prepared`` with its processes, recorded to its bag; interrupted before the first step, it leaves no bag.
 
-    Args:
-        prepared: Prepared run, from :func:`hsv.graph.preparation.prepare`.
-        namespace: Namespace of all nodes, as :func:`hsv.bags.description.checked_namespace` returns it.
-        on_step: Called with the steps the plant reports.
-        on_line: Called with node and text of every other line that a node writes.
-        on_snapshot: Called with what the recorder tells of the flight.
+    The other arguments are those of :class:`hsv.graph.launcher.Launcher`.
 
     Raises:
         RunError: A process failed or is not built, or the bag cannot be repaired; last words are in the message.
@@ -37,8 +30,7 @@ def fly_graph(
     failures = []
     try:
         arguments = parameter_arguments(prepared.parameter_files)
-        given = (on_step, on_line, prepared.step_timeout, namespace, on_snapshot)
-        with Launcher(prepared.nodes, arguments, *given) as launcher:
+        with Launcher(prepared.nodes, arguments, on_step, on_line, prepared.step_timeout, namespace) as launcher:
             launcher.wait()
     except RunError as error:
         failures.append(str(error))
@@ -51,18 +43,21 @@ def fly_graph(
 
 
 def close_bag(bag: Path, failures: Sequence[str] = ()) -> None:
-    """Finish the bag of a graph whose processes have ended, and raise an error if anything failed.
-
-    Args:
-        bag: The bag directory; removed where no recorder has come to write anything.
-        failures: Failures of processes, in words.
+    """Finish the bag of a graph whose processes have ended; remove it where no recorder has come to write anything.
 
     Raises:
-        RunError: There are ``failures``, or the bag cannot be repaired; names the bag where there is one.
+        RunError: There are ``failures`` of processes, or the bag cannot be repaired; names the bag where there is one.
     """
+    from hsv.bags.metadata import FILE_NAME
+    from hsv.bags.recover import finalise
+
     words = list(failures)
+    with suppress(OSError):
+        bag.rmdir()  # where no recorder has come to write anything
     try:
-        _mend(bag)
+        # A recorder that was killed could not finish its bag.
+        if bag.is_dir() and not (bag / FILE_NAME).exists():
+            finalise(bag)
     except RecordingError as error:
         words.insert(0, str(error))
     if words:
@@ -77,14 +72,3 @@ def _remove_without_steps(bag: Path) -> None:
     opened = Bag(bag)
     if not any(len(opened.times(topic)) for topic in TOPICS if topic in opened.roles):
         shutil.rmtree(bag)
-
-
-def _mend(bag: Path) -> None:
-    from hsv.bags.metadata import FILE_NAME
-    from hsv.bags.recover import finalise
-
-    with suppress(OSError):
-        bag.rmdir()  # where no recorder has come to write anything
-    # A recorder that was killed could not finish its bag.
-    if bag.is_dir() and not (bag / FILE_NAME).exists():
-        finalise(bag)

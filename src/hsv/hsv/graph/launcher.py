@@ -21,7 +21,6 @@ from hsv.bags.description import (
     LANDED,
     LIVE,
     PLANT,
-    RECORDER,
     ROOT,
     NodeDescription,
     checked_namespace,
@@ -31,7 +30,6 @@ from hsv.bags.description import (
 from hsv.base.errors import RunError
 from hsv.base.processes import ENDING, choose_log_folder, end_with_parent, uninterrupted
 from hsv.graph.exclusive import claim, is_published, ros_domain
-from hsv.graph.snapshot import Snapshot
 from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
 
 GRACE = 20.0
@@ -96,9 +94,6 @@ class _Process:
     words: deque[str] = field(default_factory=lambda: deque(maxlen=10))
     reader: threading.Thread | None = None
     standstill: Standstill = field(default_factory=Standstill)
-    hung: bool = False
-    lost: bool = False
-    """Whether the process has ended early and the flight continues without it."""
 
     def idle(self) -> float:
         """Return the time (s) for which the process has used no processor time; 0 if unknown."""
@@ -117,7 +112,6 @@ class Launcher:
         on_line: Callable[[str, str], None],
         wait_timeout: float = 10.0,
         namespace: str = ROOT,
-        on_snapshot: Callable[[Snapshot], None] = lambda snapshot: None,
     ) -> None:
         """Prepare to start processes.
 
@@ -128,14 +122,12 @@ class Launcher:
             on_line: Called with the name of a node and every other line that it writes, or that is to be said of it.
             wait_timeout: Time (s) for which a process may be idle if no other node would end the run.
             namespace: Namespace of all nodes.
-            on_snapshot: Called with what the recorder tells of the flight.
         """
         self._nodes = list(nodes)
         self._arguments = [*arguments, *(["-r", f"__ns:={namespace}"] if namespace != ROOT else [])]
         self._namespace = namespace
         self._on_step = on_step
         self._on_line = on_line
-        self._on_snapshot = on_snapshot
         self._wait_timeout = max(wait_timeout, HUNG_AFTER)
         self._flying = False
         self._claims = ExitStack()
@@ -162,8 +154,7 @@ class Launcher:
     def wait(self) -> int:
         """Wait for the last node to finish and return its exit code: 0, or that of a flight that diverged.
 
-        A process that hangs is reported, and also when it continues. In flight the plant itself detects a peer that
-        does not answer, and ends.
+        In flight the plant itself detects a peer that does not answer, and ends.
 
         Raises:
             RunError: It failed, or another ended before it (a plant that has landed may). Or it hung, or another
@@ -171,7 +162,7 @@ class Launcher:
         """
         *others, last = self._processes
         while True:
-            for process in others:
+            for process in list(others):
                 code = process.popen.poll()
                 if code is None or _landed(process, code):
                     continue
@@ -179,11 +170,12 @@ class Launcher:
                 if process.description is not LIVE:
                     raise RunError(f"{process.description.label} {reason}")
                 self._on_line(process.description.label, WARNING + reason)
-                process.lost = True
-            others = [process for process in others if not process.lost]
-            for process in (*others, last):
-                decides = process is last or not self._flying
-                self._watch(process, decides and process.description is not LIVE)
+                others.remove(process)
+            for process in (last,) if self._flying else (*others, last):
+                idle = process.idle()
+                if idle > self._wait_timeout and process.description is not LIVE:
+                    name = process.description.label
+                    raise RunError(f"{name} hangs: no progress for {idle:.1f} s, not even processor time used")
             code = last.popen.poll()
             if code is not None:
                 if code == 0 or _landed(last, code):
@@ -195,17 +187,6 @@ class Launcher:
         """Wait until the viewer has reported its addresses or failed, so that it sees the flight from the start."""
         while not process.words and process.popen.poll() is None and process.idle() < HUNG_AFTER:
             time.sleep(_LOOK)
-
-    def _watch(self, process: _Process, decides: bool) -> None:
-        """Report a process that makes no progress; it ends the run only if it ``decides``."""
-        idle = process.idle()
-        name = process.description.label
-        if idle > self._wait_timeout and decides:
-            raise RunError(f"{name} hangs: no progress for {idle:.1f} s, not even processor time used")
-        if process.hung != (idle > HUNG_AFTER):
-            process.hung = not process.hung
-            words = f"hangs: no progress for {HUNG_AFTER:g} s" if process.hung else "goes on"
-            self._on_line(name, WARNING + words)
 
     def stop(self) -> None:
         """End all processes with SIGTERM, then SIGKILL; the plant first, so that the recorder receives everything."""
@@ -226,14 +207,15 @@ class Launcher:
     @uninterrupted
     def _start(self, description: NodeDescription, path: Path) -> None:
         command = [str(path), "--ros-args", *self._arguments]
-        if description in (*_FLYING, RECORDER):
+        if description in _FLYING:
             command += ["-p", "progress:=true"]
         popen = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            env=_environment(),
+            # Warnings are recognised by the default format of the log.
+            env={name: value for name, value in os.environ.items() if name != "RCUTILS_CONSOLE_OUTPUT_FORMAT"},
             text=True,
             errors="replace",
             # Ctrl-C in the terminal goes to this process alone, which ends the nodes in order.
@@ -253,8 +235,6 @@ class Launcher:
             self._flying |= text.startswith("step ")
             if process.description in _FLYING and text.startswith("step "):
                 self._on_step(int(text.split()[1]))
-            elif snapshot := Snapshot.read(text):
-                self._on_snapshot(snapshot)
             elif text:
                 # A crashed interpreter lists its extension modules: kilobytes that tell nothing.
                 if not text.startswith("Extension modules:"):
@@ -282,11 +262,6 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
                 held.close()
                 raise RunError(f"a node with {where} publishes {topic} already: expected no other {node.name} there")
     return held
-
-
-def _environment() -> dict[str, str]:
-    """Return the environment of the processes: warnings are recognised by the default format of the log."""
-    return {name: value for name, value in os.environ.items() if name != "RCUTILS_CONSOLE_OUTPUT_FORMAT"}
 
 
 def _ending(process: _Process, code: int) -> str:

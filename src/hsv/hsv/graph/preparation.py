@@ -31,11 +31,6 @@ from hsv.flight.scenario import Scenario, parse_scenario, scenario_text, with_co
 from hsv.graph.exclusive import ports
 from hsv.graph.launcher import executable
 
-_NO_DESIGN = ParameterSections({"design.name": NO_DESIGN})
-
-FOREIGN_STEP_TIMEOUT = 2.5
-"""Default step timeout (s) with an external controller."""
-
 
 @dataclass(frozen=True)
 class PreparedRun:
@@ -59,9 +54,8 @@ class RunOptions:
 
     real_time_factor: float | None = None
     """Simulated over wall time; 0: as fast as possible; None: 0, with a live view 1."""
-    step_timeout: float | None = None
-    """Wall time (s) after which a silent node ends the run; None: :data:`STEP_TIMEOUT`, or :data:`FOREIGN_STEP_TIMEOUT`
-    with an external controller."""
+    step_timeout: float = STEP_TIMEOUT
+    """Wall time (s) after which a silent node ends the run."""
     composed: bool = False
     """Whether all nodes share one process."""
     external: bool = False
@@ -75,7 +69,7 @@ class RunOptions:
         """Check the numbers."""
         if self.real_time_factor is not None and not 0.0 <= self.real_time_factor <= 1000.0:
             raise QuantityError(f"real-time-factor = {self.real_time_factor}: expected 0 (as fast as possible) to 1000")
-        if self.step_timeout is not None and not 0.1 <= self.step_timeout <= 1e6:
+        if not 0.1 <= self.step_timeout <= 1e6:
             raise QuantityError(f"step-timeout = {self.step_timeout}: expected at least 0.1 (seconds)")
 
 
@@ -105,10 +99,10 @@ def prepare(
         ScenarioError: Names the field that is wrong, or what is wrong with the design.
         RecordingError: ``bag`` exists already or cannot be made.
     """
+    live_ports = None if options.live_port is None else ports(options.live_port)
     real_time_factor = options.real_time_factor
     if real_time_factor is None:
-        real_time_factor = 0.0 if options.live_port is None else 1.0
-    live_ports = None if options.live_port is None else ports(options.live_port)
+        real_time_factor = 1.0 if live_ports else 0.0
     text = text or scenario_text(scenario_name)
     name = Path(scenario_name).stem
     if options.external:
@@ -120,11 +114,8 @@ def prepare(
         design = read_design(design_file) if design_file else None
         nodes = ((LIVE,) if live_ports else ()) + _started(scenario.controller, options.composed)
         own = own_parameters(scenario)
-        foreign = controller_node(scenario.controller).foreign
         library = library_record(scenario.controller)
-    wait = options.step_timeout or (FOREIGN_STEP_TIMEOUT if foreign else STEP_TIMEOUT)
-    components = assemble_flight(scenario, design)
-    now = datetime.datetime.now(datetime.UTC)
+    steps = assemble_flight(scenario, design).plant.steps
     temporary = None
     if folder is None:
         temporary = tempfile.TemporaryDirectory(prefix="hsv_run_")
@@ -134,49 +125,36 @@ def prepare(
     files = {
         "scenario.toml": text,
         "scenario.yaml": ParameterSections(scenario.parameters(), {CONTROLLER.name: own} if own else {}).to_yaml(),
-        **(design_files(design_file) if design_file else {"design.yaml": _NO_DESIGN.to_yaml()}),
+        "design.yaml": ParameterSections({"design.name": NO_DESIGN}).to_yaml(),
+        **(design_files(design_file) if design_file else {}),
     }
     if library and library.source_name:
         files[f"controller_{Path(library.source_name).name}"] = library.source.decode(errors="replace")
     for name, content in files.items():
         (folder / name).write_text(content, encoding="utf-8")
-    default = f"{scenario.name}_{now:%Y%m%dT%H%M%SZ}"
+    default = f"{scenario.name}_{datetime.datetime.now(datetime.UTC):%Y%m%dT%H%M%SZ}"
     bag = _new_directory([bag] if bag else [bags / default, *(bags / f"{default}_{n}" for n in range(2, 100))])
-    # The permanent path, unlike the folder of this run: parameters dumped from the nodes can be loaded later.
-    certified = (
-        {"design.certificate": str(design_file.with_suffix(".certificate.json").absolute())}
-        if design_file and "certificate.json" in files
-        else {}
-    )
+    design_hash = design.digest if design else digest({})
+    custom_data = {"scenario": scenario.name, "title": scenario.title}
+    custom_data |= provenance(scenario.controller, scenario.design, design_hash, scenario.seed)
     run = {
-        **certified,
         "real_time_factor": float(real_time_factor),
-        "step_timeout": float(wait),
+        "step_timeout": float(options.step_timeout),
         "paused": options.paused,
         "recorder": True,
         "bag.directory": str(bag.absolute()),
         "bag.attachments": [str(folder / name) for name in files],
-        "bag.custom_data": [
-            f"{key}={value}"
-            for key, value in {
-                "scenario": scenario.name,
-                "title": scenario.title,
-                **provenance(
-                    scenario.controller, scenario.design, design.digest if design else digest({}), scenario.seed
-                ),
-            }.items()
-        ],
+        "bag.custom_data": [f"{key}={value}" for key, value in custom_data.items()],
     }
+    if design_file and "certificate.json" in files:
+        # The permanent path, unlike the folder of this run: parameters dumped from the nodes can be loaded later.
+        run["design.certificate"] = str(design_file.with_suffix(".certificate.json").absolute())
     if live_ports:
-        run |= {
-            "live.port": live_ports[0],
-            "live.page_port": live_ports[1],
-            "live.title": scenario.title,
-            "live.bag": str(bag),
-        }
+        run |= {"live.port": live_ports[0], "live.page_port": live_ports[1]}
+        run |= {"live.title": scenario.title, "live.bag": str(bag)}
     (folder / "run.yaml").write_text(ParameterSections(run).to_yaml(), encoding="utf-8")
     parameter_files = tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
-    return PreparedRun(scenario, bag, parameter_files, nodes, components.plant.steps, wait, temporary)
+    return PreparedRun(scenario, bag, parameter_files, nodes, steps, options.step_timeout, temporary)
 
 
 def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:
@@ -208,9 +186,7 @@ def provenance(controller: str, name: str, design_hash: str, seed: int) -> dict[
 def recorded_files(values: Mapping[str, Mapping[str, Any]], designed: Mapping[str, Any]) -> dict[str, str]:
     """Return the attachments of a bag of a run started by hand, by name: parameters and certificate.
 
-    Args:
-        values: Flat parameters of every node, by its role.
-        designed: Parameters of the node that has the design.
+    ``values`` are the flat parameters of every node by its role, ``designed`` those of the node that has the design.
     """
     sections = ParameterSections.gathered(values)
     design = {parameter.name for parameter in DESIGN_PARAMETERS}

@@ -19,14 +19,14 @@ _HEADER = """# Parameters of the nodes
 Made by `python -m hsv.graph.reference > docs/parameters.md` from the tables that the nodes declare. All values are in
 SI units. A value of the wrong type or outside its range ends the node before it joins the graph, with one line and exit
 code 2; floats need a decimal point (`-p duration:=200.0`). So does an unknown parameter, and the line
-names the most similar one; only the sections of a file for all nodes (`/**`) may contain parameters of other nodes.
+names the most similar one; a file, unlike `-p`, may contain parameters of other nodes.
 Parameters cannot be changed once a node runs, unless the last column says otherwise.
 
 The output of `ros2 param dump` for a node can be passed to it with `--params-file` and gives the same flight; the
 recorder then needs another `bag.directory`, and the files of `bag.attachments` must still exist.
 
-`use_sim_time` may be true for every node except the plant, which publishes the clock; it does not change a bit, because
-nodes react to messages only. ROS takes the time from `/clock`; in a namespace, also pass `-r /clock:=/veh1/clock`.
+`use_sim_time` may be true for every node; it does not change a bit, because nodes react to messages only. ROS takes the
+time from `/clock`; in a namespace, also pass `-r /clock:=/veh1/clock`.
 """
 
 _LOOP = """## The loop
@@ -48,55 +48,52 @@ Their channels and parameters, as in `fault.parameters`. Every type also has the
 
 def reference() -> str:
     """Return the page: the loop, its signals, one table per node, and the types of faults."""
-    parts = [_HEADER, _LOOP + _loop() + _SIGNALS + _signals(), "## Every node\n" + _table(LOCKSTEP_PARAMETERS)]
-    parts += [f"## {node}\n" + _table(table) for node, table in NODE_PARAMETERS.items()]
+    parts = [_HEADER, _LOOP + _loop() + _SIGNALS + _signals(), "## Every node\n" + _parameters(LOCKSTEP_PARAMETERS)]
+    parts += [f"## {node}\n" + _parameters(table) for node, table in NODE_PARAMETERS.items()]
     return "\n".join([*parts, _FAULTS + _faults()])
 
 
+def _table(columns: str, rows: Iterable[tuple[object, ...]]) -> str:
+    titles = columns.split(", ")
+    lines = [titles, ["---"] * len(titles), *rows]
+    return "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines)
+
+
 def _loop() -> str:
-    rows = [
-        "| block | inputs of the step | inputs of the previous step | outputs | state |",
-        "| --- | --- | --- | --- | --- |",
-    ]
-    for block in LOOP:
-        groups = block.inputs, block.delayed, block.outputs, block.state
-        rows.append(f"| {block.name} | {' | '.join(', '.join(s.name for s in group) for group in groups)} |")
-    return "\n".join(rows) + "\n"
+    columns = "block, inputs of the step, inputs of the previous step, outputs, state"
+    groups = [(block.inputs, block.delayed, block.outputs, block.state) for block in LOOP]
+    words = [[", ".join(signal.name for signal in signals) for signals in row] for row in groups]
+    return _table(columns, [(block.name, *row) for block, row in zip(LOOP, words, strict=True)])
 
 
 def _signals() -> str:
-    rows = ["| signal | numbers | unit | topics |", "| --- | --- | --- | --- |"]
+    rows = []
     for signal in (signal for block in LOOP for signal in block.outputs):
         topics = ", ".join(f"`{topic}`" for topic, carried in CARRIED.items() if signal in carried)
-        rows.append(f"| {signal.name} | {'' if signal.size == VARYING else signal.size} | {signal.unit} | {topics} |")
-    return "\n".join(rows) + "\n"
+        rows.append((signal.name, "" if signal.size == VARYING else signal.size, signal.unit, topics))
+    return _table("signal, numbers, unit, topics", rows)
 
 
-def _table(parameters: Iterable[Parameter]) -> str:
+def _parameters(parameters: Iterable[Parameter]) -> str:
     vehicle = {p.name for p in VEHICLE_PARAMETERS if p.name != "vehicle.name"}
     brought = {p.name for p in (*DESIGN_PARAMETERS, *NOMINAL_PARAMETERS)}
-    rows = ["| parameter | default | expected | meaning | in flight |", "| --- | --- | --- | --- | --- |"]
+    rows = []
     for p in parameters:
-        default = {"[]": "from the design" if p.name in brought else "empty", "": "empty"}.get(
-            str(p.default), f"`{p.default}`"
-        )
-        if p.name in vehicle:
-            default = "from the vehicle"
-        rows.append(f"| {p.name} | {default} | {p.constraint} | {p.description} | {'' if p.read_only else 'yes'} |")
-    return "\n".join(rows) + "\n"
+        words = {"[]": "from the design" if p.name in brought else "empty", "": "empty"}
+        default = "from the vehicle" if p.name in vehicle else words.get(str(p.default), f"`{p.default}`")
+        rows.append((p.name, default, p.constraint, p.description, "" if p.read_only else "yes"))
+    return _table("parameter, default, expected, meaning, in flight", rows)
 
 
 def _faults() -> str:
-    rows = ["| type | channel | parameter | default | expected |", "| --- | --- | --- | --- | --- |"]
-    for name, kind in FAULT_KINDS.items():
-        own = [(channel, p, p.of(channel)) for channel in kind.channels for p in kind.parameters]
-        rows += [
-            f"| {name} | {on} | {p.name} | {p.default if p.default is not None else ''} | {q.constraint} |"
-            for on, p, q in own
-        ]
-    for p in OCCURRENCE_PARAMETERS:
-        rows.append(f"| any | any | {p.name} | {p.default} | {p.of('engine').constraint} |")
-    return "\n".join(rows) + "\n"
+    rows: list[tuple[object, ...]] = [
+        (name, on, p.name, "" if p.default is None else p.default, p.of(on).constraint)
+        for name, kind in FAULT_KINDS.items()
+        for on in kind.channels
+        for p in kind.parameters
+    ]
+    rows += [("any", "any", p.name, p.default, p.of("engine").constraint) for p in OCCURRENCE_PARAMETERS]
+    return _table("type, channel, parameter, default, expected", rows)
 
 
 if __name__ == "__main__":

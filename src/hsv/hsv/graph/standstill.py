@@ -7,10 +7,7 @@ standing still: no step, no message, no processor time used.
 from __future__ import annotations
 
 import ctypes
-import os
 import time
-from collections.abc import Collection
-from pathlib import Path
 
 HUNG_AFTER = 5.0
 """Seconds without any progress after which a process is called hung."""
@@ -49,16 +46,3 @@ def processor_time(pid: int) -> float | None:
         return time.clock_gettime(clock.value)
     except OSError:
         return None
-
-
-def processor_time_of(executables: Collection[str]) -> float:
-    """Return the processor time (s) of all processes on this machine that run a program or script of these names."""
-    total = 0.0
-    for entry in Path("/proc").glob("[0-9]*"):
-        try:
-            words = os.fsdecode((entry / "cmdline").read_bytes()).split("\0")
-        except OSError:
-            continue  # it has just ended
-        if any(Path(word).name in executables for word in words[:2]):
-            total += processor_time(int(entry.name)) or 0.0
-    return total
