@@ -6,6 +6,7 @@ best-effort, so that no graph waits for it.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from functools import partial
@@ -18,7 +19,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from hsv.bags.description import ACTUATOR, MARKERS, STATE
 from hsv.base.parameters import Parameter
 from hsv.model.airframe.geometry import airframe
-from hsv.model.airframe.pose import LEVEL, Sample, Transform, composed, transforms
+from hsv.model.airframe.pose import LEVEL, Sample, Transform, transforms
 from hsv.model.airframe.solids import LABEL_COLOUR, LABEL_HEIGHT, LABEL_SIZE, Colour, label, solids
 from hsv_node.main import run_node
 from hsv_node.middleware import LATEST
@@ -89,6 +90,17 @@ class AirframeNode(ProcessNode):
         look = {"scale": Vector3(z=LABEL_SIZE), "color": _colour(LABEL_COLOUR), "text": text}
         markers.append(Marker(ns="label", type=Marker.TEXT_VIEW_FACING, pose=pose, **look, **common))
         return MarkerArray(markers=markers)
+
+
+def composed(chain: Sequence[Transform]) -> dict[str, Transform]:
+    """Return the transforms of all frames relative to the level frame; ``chain`` lists parents first."""
+    found = {LEVEL: Transform(LEVEL, LEVEL)}
+    for inner in chain:
+        outer = found[inner.parent]
+        cos, sin = math.cos(outer.pitch), math.sin(outer.pitch)
+        x, z = outer.x + inner.x * cos - inner.z * sin, outer.z + inner.x * sin + inner.z * cos
+        found[inner.child] = Transform(LEVEL, inner.child, x, z, outer.pitch + inner.pitch)
+    return found
 
 
 def _stamped(stamp: object, transform: Transform) -> TransformStamped:
