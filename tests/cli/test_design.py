@@ -1,15 +1,22 @@
-"""Where ``hsv design`` writes, what it does not write over, and whether a design comes out as it was shipped."""
+"""The commands on designs: hsv design, certify, govern and export-controller."""
 
+import dataclasses
 import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from numpy.testing import assert_allclose
 
 from hsv.control.checks import load_subject
-from hsv.control.design import find_design, read_parameters
+from hsv.control.design import find_design, read_design, read_parameters, write_design
+from hsv.control.export import controller_files, step_bounds
 from hsv.design.inputs import find_inputs
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
 from hsv.flight.verification import verify
 
 
@@ -85,3 +92,131 @@ def test_a_file_that_exists_is_kept_and_named_before_anything_is_computed(hsv, t
         assert (ran.code, ran.out) == (2, "")
         assert ran.error == f"out = '{name}': exists, expected a new file, or --force to overwrite it"
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "mine")]
+
+
+BASELINE = Path(__file__).parents[2] / "offline_design" / "baseline.yaml"
+
+
+@pytest.mark.long
+def test_a_design_is_certified_as_it_was_and_with_a_small_gust(hsv):
+    certificate = load_subject(BASELINE).certificate["tube"]
+    alone, gust = hsv("certify", str(BASELINE), "--gust", "0.5 ft/s", "--json").json["verdicts"]
+    assert (alone["name"], gust["name"]) == ("as certified", "gust 0.5 ft/s")
+    assert alone["certified"] and gust["certified"]
+    assert_allclose(alone["half_width"], certificate["invariant_set"]["half_width"][:5], rtol=1e-5)
+    margins = certificate["tightening"]["plan"]
+    assert_allclose(alone["room"], list(zip(margins["margin_to_lower"], margins["margin_to_upper"], strict=True)), 1e-4)
+    assert all(wide > narrow for wide, narrow in zip(gust["half_width"], alone["half_width"], strict=True))
+    assert min(min(row) for row in gust["room"]) < min(min(row) for row in alone["room"])
+
+
+@pytest.mark.long
+def test_the_sensors_of_a_scenario_are_added_and_what_is_not_covered_is_named(hsv, tmp_path):
+    mine = tmp_path / "mine.toml"
+    mine.write_text(
+        'extends = "case1"\ntitle = "x"\n[sensors.altitude]\nquantum = "1 ft"\n[sensors.velocity]\ndrop_out = 0.01\n'
+    )
+    ran = hsv("certify", str(BASELINE), "--scenario", str(mine), "--json")
+    assert ran.code == 1
+    assert ran.json["not_covered"] == [
+        "sensors.altitude.quantum: 1 ft; the certificate is for an ideal one",
+        "sensors.velocity.drop_out: 0.01; the certificate is for an ideal one",
+    ]
+    verdicts = {verdict["name"]: verdict["certified"] for verdict in ran.json["verdicts"]}
+    assert verdicts["sensor quantisation"] and verdicts["all"] and not verdicts["drop-out of a sensor"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--sensors", "coarse"), "sensors = 'coarse': expected one of ideal, fine, ghv, inertial"),
+        (("--bias", "velocity=1 deg"), "bias velocity = '1 deg': wrong unit"),
+        (("--gust", "2"), "gust = '2': the unit is missing"),
+        (("--reach", "9"), "reach = 9: expected more than 0, up to 8.572, beyond which no noise is"),
+        (("--actuators", "servo"), "actuators = 'servo': expected ideal, or names from elevator_50, "),
+        (("--actuators", "elevator_50,elevator_20"), "actuators = 'elevator_50,elevator_20': expected at most one a"),
+    ],
+)
+def test_bad_input_is_one_line(hsv, arguments, message):
+    ran = hsv("certify", str(BASELINE), *arguments)
+    assert ran.code == 2
+    assert ran.error.startswith(message)
+
+
+def test_the_file_that_it_writes_flies_the_reference_inside_the_inputs(hsv, tmp_path):
+    path = tmp_path / "governed.toml"
+    found = json.loads(hsv("govern", "case1", "--blend", "4 s", "--out", str(path), "--json").out)
+    flight = fly(assemble_flight(load_scenario(str(path))))
+    metrics = flight.metrics
+    assert metrics["saturated_steps"] == 0
+    (_, first), (_, last) = ((c["time_s"], c["altitude_m"]) for c in (found["corners"][0], found["corners"][-1]))
+    assert flight.reference[[0, -1], 0] == pytest.approx([first, last], rel=1e-12)
+    assert found["end_s"] == found["corners"][-1]["time_s"] + found["blend_s"]
+    for name, plan in found["plan"].items():
+        assert plan["lower_bound"] < plan["least"] < plan["largest"] < plan["upper_bound"], name
+    shown = hsv("govern", "case1", "--blend", "4 s", "--units", "paper").out
+    assert f"at rest from {found['end_s']:g} s on" in shown
+
+
+def test_a_file_that_exists_is_kept(hsv, tmp_path):
+    path = tmp_path / "kept.toml"
+    path.write_text("mine")
+    refused = hsv("govern", "case1", "--out", str(path))
+    assert (refused.code, path.read_text()) == (2, "mine")
+    assert "exists, expected a new file, or --force" in refused.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (("case1", "--blend", "0 s"), "blend = 0 s: expected above 0"),
+        (("case1", "--blend", "1e9 s"), "blend = 1e+09 s: expected above 0 s, up to 600 s"),
+        (("case1_rmpc",), "controller = 'robust_mpc', design = 'baseline_single_k': expected tube_mpc"),
+        (("case1_qp",), "nominal.law = 'qp': expected 'family'"),
+    ],
+)
+def test_what_cannot_be_governed_is_refused_in_one_line(hsv, arguments, why):
+    refused = hsv("govern", *arguments)
+    assert refused.code == 2
+    assert why in refused.err and refused.err.startswith("hsv: error: ") and refused.err.count("\n") == 1
+
+
+DESIGN = read_design(find_design("baseline"))
+
+
+def test_it_writes_source_numbers_and_headers_and_prints_the_cost_of_a_step(hsv, tmp_path):
+    ran = hsv("export-controller", "baseline", "--out", "new/controller", "--json")
+    assert ran.code == 0
+    folder = tmp_path / "new" / "controller"
+    texts = controller_files(DESIGN)
+    assert {path.name: path.read_text() for path in folder.iterdir()} == texts
+    assert {row["path"]: row["size_bytes"] for row in ran.json["written"]} == {
+        f"new/controller/{name}": (folder / name).stat().st_size for name in texts
+    }
+    bounds = {name: dataclasses.asdict(bound) for name, bound in step_bounds(DESIGN).items()}
+    assert ran.json["most_in_a_step"] == bounds
+    assert bounds["nominal_trajectory"]["multiplications"] > 1000
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("nothing", "--out", "new"), "design = 'nothing': no such file"),
+        (("tubeless.yaml", "--out", "new"), "tube.shape: empty, expected a design with a tube"),
+        (("baseline", "--out", "full"), "out = 'full': holds notes.txt, expected a new folder"),
+        (("baseline", "--out", "full/notes.txt"), "out = 'full/notes.txt': cannot be written"),
+        (("baseline", "--out", "full/controller.c"), "out = 'full/controller.c': cannot be written"),
+        (("baseline",), "out, fmu: missing, expected --out FOLDER, --fmu FILE or both"),
+        (("baseline", "--fmu", "full/notes.txt"), "fmu = 'full/notes.txt': exists, expected a new file"),
+    ],
+)
+def test_wrong_input_is_one_line(hsv, tmp_path, words, expected):
+    write_design(tmp_path / "tubeless.yaml", dataclasses.replace(DESIGN, tube=None), "for this test")
+    (tmp_path / "full").mkdir()
+    for name in ("controller.c", "notes.txt"):
+        (tmp_path / "full" / name).touch()
+    ran = hsv("export-controller", *words)
+    assert ran.code == 2
+    assert expected in ran.error
+    assert not (tmp_path / "new").exists()
+    assert (tmp_path / "full" / "controller.c").read_text() == ""

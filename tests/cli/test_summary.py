@@ -1,5 +1,6 @@
-"""What a command prints for people: metrics in words and groups, one verdict, units, at most 80 columns."""
+"""What a command prints for people: metrics in words and groups, one verdict, units, at most 80 columns, no markup."""
 
+import io
 import re
 
 import pytest
@@ -7,7 +8,8 @@ from marking import long
 
 from hsv.api import fly
 from hsv.base.units import UnitSystem, duration_in_words, significant
-from hsv.cli.output import console
+from hsv.cli import output
+from hsv.cli.output import console, print_section
 from hsv.flight.limits import verdict_sentence, verdicts
 from hsv.flight.metrics import Group
 from hsv.flight.scenario import load_scenario
@@ -84,10 +86,27 @@ def test_the_verdict_is_one_sentence(metrics, ended, sentence):
     assert verdict_sentence(judged, metrics, UnitSystem.metric) == sentence
 
 
-def test_colours_are_for_terminals_and_not_where_they_are_not_wanted(hsv, monkeypatch):
-    assert "\x1b" not in hsv("simulate", "case1").out
-    monkeypatch.setattr(console, "_force_terminal", True)
-    monkeypatch.setattr(console, "_color_system", 1)
-    assert "\x1b[32m" in hsv("simulate", "case1").out
-    monkeypatch.setattr(console, "no_color", True)
-    assert "\x1b[32m" not in hsv("simulate", "case1").out
+NAME = "run[old] [/x] :bug:"
+
+
+def test_lines_of_nodes_and_titles_are_printed_as_they_are(capsys):
+    output.report_line("plant", f"[WARN] {NAME}")
+    output.report_error(NAME)
+    output.report_line("hsv: warning", NAME)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [f"plant: [WARN] {NAME}", f"hsv: error: {NAME}", f"hsv: warning: {NAME}"]
+    output.print_table(NAME, {"altitude": (1.0, "m")}, UnitSystem.si)
+    assert capsys.readouterr().out.splitlines()[0].strip() == NAME
+    print_section(NAME, {NAME: NAME})
+    title, line = capsys.readouterr().out.splitlines()
+    assert title == NAME and line.split("  ")[1:] == [NAME, NAME]
+
+
+def test_control_characters_are_shown_and_not_sent_to_the_terminal(capsys):
+    title = "\x1b[31mred\x1b]0;title\x07 \x9b2J \x08\r\x7f\u202e\u200b\u2028\u2066\tend"
+    terminal = type(output.console)(file=io.StringIO(), force_terminal=True, highlight=False, width=200)
+    terminal.print(title, soft_wrap=True)
+    output.report_error(title)
+    for shown in (terminal.file.getvalue(), capsys.readouterr().err):
+        assert not set("\x1b\x07\x08\x9b\x7f\r\u202e\u200b\u2028\u2066") & set(shown)
+        assert r"\x1b[31mred\x1b]0;title" in shown and r"\x9b2J" in shown

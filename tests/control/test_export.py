@@ -1,17 +1,20 @@
 import ctypes
 import dataclasses
+import math
 import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
+import pint
 import pytest
 from flights import components
 from marking import long
 from numpy.testing import assert_array_equal
 
 import hsv.core
+from hsv.control import fmu_export
 from hsv.control.design import find_design, read_design
 from hsv.control.export import NUMBERS, SOURCE, controller_files, design_header, step_bounds
 from hsv.control.library import load_block
@@ -69,6 +72,13 @@ def test_it_is_c99_that_calls_nothing_and_keeps_nothing(design, level, compiler,
     # Functions and constants: nothing is kept from step to step but in the state.
     assert {kind for _, kind in symbols} <= {"T", "t", "R", "r", "U"}
     assert {name for name, kind in symbols if kind in "TR"} == {*BLOCKS}
+
+
+def test_units_of_an_fmu_are_their_exponents_in_base_units():
+    registry = pint.UnitRegistry()
+    for unit, powers in fmu_export._BASE_UNITS.items():
+        base = math.prod((registry.Unit(name) ** power for name, power in powers.items()), start=registry.Unit(""))
+        assert registry.get_base_units("" if unit == "1" else unit.replace(" ", "*")) == (1.0, base), unit
 
 
 @needs_compiler

@@ -9,7 +9,7 @@ from hsv.base.errors import DesignError, ParameterError
 from hsv.control.design import find_design, read_design, read_parameters
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
-from hsv.control.qp_law import BLOCKS, NEAR_BLOCKS, QpLaw
+from hsv.control.qp_law import BLOCK_TIME, BLOCKS, CHECKED_FAR, CHECKED_NEAR, NEAR_BLOCKS, QpLaw
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
@@ -77,6 +77,11 @@ def test_plan_of_the_step_keeps_the_bounds_between_block_ends_too(law):
     room = 0.05 * (high - low)
     assert min(first) > low - room and max(first) < high + room
     assert max(first) > high - room
+
+
+def test_bounds_are_imposed_at_control_steps():
+    steps = np.array([*CHECKED_NEAR, *CHECKED_FAR]) * BLOCK_TIME / DESIGN.period
+    assert_allclose(steps, steps.round())
 
 
 def test_where_the_solver_fails_the_plan_before_goes_on_and_then_the_family(law):

@@ -163,6 +163,14 @@ def test_a_falsified_certificate_is_refused_field_by_field(baseline):
     assert failed >= set(false)
 
 
+def test_a_closed_loop_whose_modes_are_just_unstable_is_refused(baseline):
+    design, A = baseline.design, baseline.design.polytope.A.copy()
+    A[:, 5:, 5:] *= 1.005 / np.abs(np.linalg.eigvals(A[:, 5:, 5:])).max()
+    unstable = dataclasses.replace(design, polytope=dataclasses.replace(design.polytope, A=A))
+    failed = [check.name for check in made(dataclasses.replace(baseline, design=unstable)) if not check.ok]
+    assert "spectral radius of A + BK, gain 0" in failed
+
+
 def test_what_is_stated_only_is_named(baseline):
     stated = unchecked(baseline, made(baseline))
     assert {"nominal.*.gamma", "inputs.feedback", "tube.disturbance.boxes"} <= set(stated)

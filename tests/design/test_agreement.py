@@ -1,5 +1,11 @@
+"""Designs agree with what is shipped, on other processors too; wrong inputs are named."""
+
 import copy
 import dataclasses
+import json
+import os
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -71,3 +77,27 @@ def test_a_missing_field_is_named(table):
     del table["nominal"]["target"]["velocity"]
     with pytest.raises(DesignError, match=r"nominal.target.velocity: missing"):
         parse_inputs(table)
+
+
+DESIGNS = sorted(path.stem for path in Path(__file__).parents[2].glob("offline_design/*.toml"))
+
+AGREED = 1e-4
+"""In scaled coordinates; `hsv design --check` itself asks for ten times less."""
+
+WITHOUT_FMA = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2_Usable,-FMA_Usable,-AVX2,-FMA"}
+PROCESSORS = {
+    "Haswell, two threads": {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_NUM_THREADS": "2"},
+    "Nehalem, libm without FMA": {"OPENBLAS_CORETYPE": "Nehalem", "OPENBLAS_NUM_THREADS": "1"} | WITHOUT_FMA,
+}
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("processor", PROCESSORS)
+@pytest.mark.parametrize("name", DESIGNS)
+def test_a_shipped_design_comes_out_as_shipped(name, processor):
+    words = [sys.executable, "-m", "hsv.cli.entry", "design", name, "--check", "--json"]
+    ran = subprocess.run(words, env=os.environ | PROCESSORS[processor], capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    found = {d["parameter"]: d["scaled"] for d in json.loads(ran.stdout)["deviations"]}
+    assert {parameter: scaled for parameter, scaled in found.items() if scaled > AGREED} == {}

@@ -1,11 +1,18 @@
-"""Links and pictures of every page of the repository, without a network."""
+"""Links and pictures of every page of the repository, without a network; the equation map; the site builds."""
 
+import json
 import re
 import subprocess
+import sys
+from importlib import import_module
 from pathlib import Path
 
 import page_blocks
 import pytest
+import yaml
+
+import hsv
+from hsv.core import lib
 
 ROOT = page_blocks.ROOT
 PAGES = [ROOT / page for page in page_blocks.PAGES]
@@ -43,6 +50,12 @@ def test_what_is_where_is_there():
     assert [name for name in named if not any((folder / name).exists() for folder in folders)] == []
 
 
+def test_the_hosted_workflow_builds_the_site_and_tests_with_a_full_installation():
+    jobs = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))["jobs"]
+    commands = " ".join(step.get("run", "") for job in jobs.values() for step in job["steps"])
+    assert "make docs" in commands and "make test-ros" in commands
+
+
 def test_every_page_of_the_documentation_is_in_a_table_of_contents():
     listed = {"index.md"}
     for index in (ROOT / "docs").rglob("index.md"):
@@ -59,3 +72,73 @@ def test_what_the_commands_of_the_readme_write_is_ignored_by_git():
     names = [path if Path(path).suffix else f"{path}/" for path in written]
     ignored = subprocess.run(["git", "check-ignore", *names], cwd=ROOT, capture_output=True, text=True).stdout
     assert ignored.splitlines() == names
+
+
+@pytest.mark.long
+def test_the_documentation_builds_without_a_warning(tmp_path):
+    for tool in ("sphinx", "myst_parser", "furo"):
+        pytest.importorskip(tool, reason=f"{tool} is not installed: make docs installs it")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", str(ROOT / "docs")]
+    built = subprocess.run([*command, str(tmp_path / "site")], capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    assert (tmp_path / "site" / "claims.html").is_file()
+    index = (tmp_path / "site" / "searchindex.js").read_text(encoding="utf-8")
+    search = json.loads(index.removeprefix("Search.setIndex(").removesuffix(")"))
+
+    def found(word):
+        hits = [table.get(word, []) for table in (search["terms"], search["titleterms"])]
+        return {search["docnames"][i] for hit in hits for i in (hit if isinstance(hit, list) else [hit])}
+
+    # Written by hand, and generated from the commands, from the messages and from docstrings.
+    assert "explanation/tube" in found("ellipsoid")
+    assert "reference/commands" in found("montecarlo")
+    assert "reference/messages" in found("fuel_equivalence_ratio")
+    assert "fly" in {entry[4] for entry in search["objects"]["hsv.api"]}
+
+
+SOURCES = Path(hsv.__file__).parent
+TEXT = (Path(__file__).parents[2] / "docs" / "equations.md").read_text()
+
+
+def found(name):
+    parts = name.split(".")
+    for length in range(len(parts), 0, -1):
+        try:
+            thing = import_module(".".join(parts[:length]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[length:]:
+            thing = getattr(thing, part)
+        return thing
+    raise AssertionError(f"{name}: no such module")
+
+
+def test_every_name_on_the_page_exists():
+    names = set(re.findall(r"`(hsv\.[\w.]+)`", TEXT))
+    assert len(names) > 30
+    for name in names:
+        assert found(name) is not None
+    for name in re.findall(r"`(hsv_\w+)`", TEXT):
+        assert hasattr(lib, name)
+    for name, header in re.findall(r"`(\w+)` of `(core/\w+\.h)`", TEXT):
+        assert f"{name}(" in (SOURCES / header).read_text(encoding="utf-8")
+
+
+def test_every_numbered_equation_of_the_paper_is_on_the_page():
+    rows = [line.split("|")[1] for line in TEXT.splitlines() if line.startswith("| (")]
+    numbers = {int(number) for row in rows for number in re.findall(r"\((\d+)\)", row)}
+    assert numbers == set(range(1, 55))
+
+
+@pytest.mark.parametrize("number", range(1, 55))
+def test_one_search_finds_every_equation_where_it_is_computed(number):
+    [*rows] = [line for line in TEXT.splitlines() if line.startswith("| (") and f"({number})" in line.split("|")[1]]
+    named = {name.rpartition(".")[0] for row in rows for name in re.findall(r"`(hsv\.[\w.]+)`", row)}
+    modules = {
+        name if Path(SOURCES, *name.split(".")[1:]).with_suffix(".py").is_file() else name.rpartition(".")[0]
+        for name in named
+    }
+    headers = [SOURCES / header for row in rows for header in re.findall(r"`(core/\w+\.h)`", row)]
+    paths = [*headers, *(Path(SOURCES, *name.split(".")[1:]).with_suffix(".py") for name in modules)]
+    texts = [path.read_text(encoding="utf-8") for path in paths]
+    assert any(re.search(rf"eq\. {number}\b", text) for text in texts), sorted(modules)

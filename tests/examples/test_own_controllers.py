@@ -1,4 +1,4 @@
-"""The examples of custom controllers, installed as packages and flown."""
+"""The examples of custom controllers, installed as packages and flown; the exported one on an emulated Cortex-M7."""
 
 import json
 import os
@@ -15,13 +15,10 @@ import numpy
 import pytest
 from marking import long
 from node_processes import Processes
+from page_blocks import blocks
 from printed_commands import printed
 from pyarrow import parquet
 from ros_domain import own_environment
-
-from hsv.flight.assembly import assemble_flight
-from hsv.flight.closed_loop import fly
-from hsv.flight.scenario import load_scenario
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -92,8 +89,8 @@ def test_it_flies_without_a_design_and_holds_the_commands(installed, example, sc
 @pytest.mark.parametrize("example", ["compiled", "lqr", "c_gain_scheduled"])
 def test_its_page_is_true_to_the_last_command(installed, tmp_path, example):
     shutil.copytree(EXAMPLES / example, tmp_path / "examples" / example, ignore=shutil.ignore_patterns("*.so"))
-    # A study takes ten minutes, beside all shipped controllers: tests/cli/test_study.py flies a short one.
-    script = "\n".join(line for line in printed(f"examples/{example}/README.md") if " study " not in line)
+    # A study takes ten minutes, beside all shipped controllers: tests/hsv_paper/test_cli.py flies a short one.
+    script = "\n".join(line for line in printed(f"examples/{example}/README.md") if " sensitivity " not in line)
     with own_environment() as environment:
         path = {} if example == "c_gain_scheduled" else {"PYTHONPATH": installed(example).path}
         processes = Processes(environment | path, tmp_path)
@@ -135,22 +132,58 @@ def test_the_example_in_c_is_built_flown_and_compared_as_its_page_says(checkout,
     assert len(parquet.read_table(result)) == 100
 
 
-COMPILED = """
-import json, sys
-from hsv.flight.assembly import assemble_flight
-from hsv.flight.closed_loop import fly
-from hsv.flight.scenario import load_scenario
-parts = assemble_flight(load_scenario(sys.argv[1], {"controller": "hsv_scheduled:Scheduled"}))
-print(json.dumps([parts.controller.kernel.parameters[2:].tolist(), fly(parts).fingerprint]))
-"""
+EXAMPLE = Path("examples", "cortex_m")
+PAGE = str(EXAMPLE / "README.md")
+TOOLS = ("arm-none-eabi-gcc", "qemu-system-arm")
+MISSING = [tool for tool in TOOLS if shutil.which(tool) is None]
+
+
+@pytest.fixture
+def board(tmp_path):
+    """A folder with the example as in the checkout, not built."""
+    shutil.copytree(Path(__file__).parents[2] / EXAMPLE, tmp_path / EXAMPLE, ignore=shutil.ignore_patterns("build"))
+    return tmp_path
 
 
 @pytest.mark.long
-def test_the_example_in_c_flies_the_same_bits_as_the_one_that_numba_compiles(checkout, installed):
-    path = str(checkout / "examples" / "c_gain_scheduled" / "c_gain_scheduled.toml")
-    ran = installed("compiled").python("-c", COMPILED, path)
-    assert ran.returncode == 0, ran.stderr
-    # Computed on another machine, the gains may differ in last bits from those that the C source has.
-    gains, fingerprint = json.loads(ran.stdout)
-    changes = {"scheduled.low_gain": gains[:10], "scheduled.high_gain": gains[10:]}
-    assert fly(assemble_flight(load_scenario(path, changes))).fingerprint == fingerprint
+@pytest.mark.skipif(bool(MISSING), reason=f"no {' and no '.join(MISSING)}")
+def test_the_page_of_the_board_is_true_to_the_last_command(board):
+    install, *script = printed(PAGE)
+    assert install.startswith("sudo apt-get install")
+    environment = {"PYTHONPATH": f"{board / EXAMPLE}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
+    with own_environment() as own:
+        processes = Processes(own | environment, board)
+        done = processes.run("bash", "-e", "-c", "\n".join(script))
+        processes.stop()
+    assert done.returncode == 0, done.stdout
+    assert len(re.findall(r"fingerprint\W+as published", done.stdout)) == 2
+    [shown] = blocks(PAGE, "text")
+    fingerprint = shown.text.splitlines()[0]
+    assert fingerprint in done.stdout
+    # Another compiler gives other counts; those of the page are of the same size.
+    for found, printed_number in zip(counts(done.stdout), counts(shown.text), strict=True):
+        assert 0.5 < found / printed_number < 2.0
+
+
+def counts(text):
+    """Return instructions, stack and code in the report of a flight."""
+    lines = re.findall(r"^(?:instructions per step|stack|code and constants): .*", text, re.MULTILINE)
+    return [int(number) for line in lines for number in re.findall(r"[1-9]\d*", line)]
+
+
+def test_without_cross_compiler_or_emulator_there_is_one_line(board):
+    ran = subprocess.run(
+        ["make", "-s", "-C", EXAMPLE, "CC_ARM=no-such-gcc"], cwd=board, capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 2
+    assert ran.stderr.splitlines()[0] == (
+        "there is no no-such-gcc: sudo apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi"
+    )
+    path = os.pathsep.join((str(board / EXAMPLE), os.environ.get("PYTHONPATH", "")))
+    command = [sys.executable, "-m", "hsv.cli.entry", "simulate", EXAMPLE / "cortex_m.toml"]
+    flown = subprocess.run(
+        command, cwd=board, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=False
+    )
+    assert flown.returncode == 2
+    [line] = flown.stderr.splitlines()
+    assert "not there, expected as examples/cortex_m/README.md says" in line

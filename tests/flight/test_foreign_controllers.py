@@ -8,6 +8,7 @@ from hsv.base.parameters import Parameter, validate
 from hsv.control.controllers import controller_class
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
+from hsv.flight.flight import step_statistics, step_times_in_words
 from hsv.flight.scenario import parse_scenario
 from hsv.model.vehicle import load_vehicle
 
@@ -86,6 +87,12 @@ def test_answers_are_limited_and_the_limits_are_told(monkeypatch):
 def test_a_flight_has_the_wall_times_of_a_law_in_python_step_by_step():
     assert {name: len(times) for name, times in fly(flight()).law_times.items()} == {"controller": 201}
     assert not fly(flight("tube_mpc", "baseline", table="tube")).law_times
+
+
+def test_the_times_of_steps_are_told_by_node_beside_the_period():
+    times = step_statistics(1e-3 * np.arange(1, 102))
+    told = step_times_in_words({"nodes": {"tube_mpc": times}, "period_ms": 20.0})
+    assert told == "tube_mpc 51 ms in the median, 99 % 100, largest 101; a period has 20 ms"
 
 
 def test_settings_reach_the_controller_in_si_units():

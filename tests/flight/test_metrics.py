@@ -141,24 +141,6 @@ def test_a_flight_that_was_recorded_has_the_same_metrics_in_every_bit(scenario, 
     assert flight_metrics(flown) == flight_metrics(recorded)
 
 
-def test_sums_and_extremes_are_those_of_numpy_over_whole_columns():
-    flown = fly(components("case1", duration=110.0)).data()
-    m = flight_metrics(flown)
-    before, after = flown.time < 100.0 - 1e-9, flown.time >= 100.0 - 1e-9
-    for axis, column in (("altitude", 0), ("velocity", 1)):
-        error = np.abs(flown.state[:, column] - flown.reference[:, column])
-        integral = np.sum(0.5 * (error[1:] + error[:-1]) * np.diff(flown.time))
-        assert m[f"{axis}_integral_absolute_error"] == integral
-        assert m[f"{axis}_error_maximum"] == error.max()
-    attitude = flown.state[:, 2:4]
-    nominal = np.abs(attitude - flown.reference[:, 2:4] - flown.deviation[:, 2:4])
-    assert m["attitude_from_nominal"] == nominal.max()
-    assert m["post_fault_attitude_from_nominal"] == nominal[after].max()
-    mean = attitude[before & (flown.time >= 95.0 - 1e-9)].mean(axis=0)
-    assert m["post_fault_attitude_deviation"] == np.abs(attitude[after] - mean).max()
-    assert m["saturated_steps"] == np.any(flown.flight_curves.saturated, axis=1).sum()
-
-
 @pytest.mark.parametrize(
     ("value", "ended", "words"),
     [

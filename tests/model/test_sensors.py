@@ -54,8 +54,9 @@ def test_constants_are_drawn_once_a_flight():
 
 
 def test_drift_begins_with_its_standard_deviation_and_decays_with_its_time():
-    data = sensor_data({"sensors.pitch_rate.drift_sigma": [1.0], "sensors.pitch_rate.drift_time": [0.5]}, T)
-    assert (data.drift_sigma[Q], data.drift_decay[Q]) == (1.0, pytest.approx(math.exp(-T / 0.5)))
+    for time in (0.5, 1e5):
+        data = sensor_data({"sensors.pitch_rate.drift_sigma": [1.0], "sensors.pitch_rate.drift_time": [time]}, T)
+        assert (data.drift_sigma[Q], data.drift_decay[Q]) == (1.0, pytest.approx(math.exp(-T / time), rel=1e-12))
 
 
 def test_lag_latency_quantum_and_range_are_those_of_their_fields():

@@ -1,8 +1,9 @@
-"""What the package declares: dependencies and extras that hold every import, bounds that hold every pin."""
+"""What the package declares and how it is built: dependencies, extras and bounds; the compiler that it needs."""
 
 from __future__ import annotations
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -122,3 +123,13 @@ def test_every_shipped_scenario_has_its_design_in_the_package():
 
     designs = {path.stem for path in (SOURCES / "designs").glob("*.yaml")}
     assert {load_scenario(name).design for name in scenario_names()} - {None, ""} <= designs
+
+
+PACKAGE = Path(__file__).parents[2] / "src" / "hsv"
+
+
+def test_without_a_compiler_one_line_names_the_packages_to_install():
+    command = [sys.executable, "setup.py", "--version"]
+    ran = subprocess.run(command, cwd=PACKAGE, env=os.environ | {"CC": "absent"}, capture_output=True, text=True)
+    needed = "hsv needs a C compiler and Python's header files: sudo apt-get install g++ python3-dev\n"
+    assert (ran.returncode, ran.stdout, ran.stderr) == (1, "", needed)

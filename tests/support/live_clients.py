@@ -25,7 +25,6 @@ class FoxgloveClient:
         self._socket = create_connection(f"ws://127.0.0.1:{port}", LATER, subprotocols=["foxglove.sdk.v1"])
         self.protocol = self._socket.getsubprotocol()
         self.channels = {}
-        self.sessions = []
         self.messages = defaultdict(list)
         """Log time (ns) and bytes, by topic."""
         self._thread = threading.Thread(target=self._read, daemon=True)
@@ -56,9 +55,7 @@ class FoxgloveClient:
                 self.messages[self.channels[number]["topic"]].append((time, data[_MESSAGE.size :]))
             return
         said = json.loads(data)
-        if said["op"] == "serverInfo":
-            self.sessions.append(said["sessionId"])
-        elif said["op"] == "advertise":
+        if said["op"] == "advertise":
             self.channels |= {channel["id"]: channel for channel in said["channels"]}
             wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in said["channels"]]
             self._socket.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))

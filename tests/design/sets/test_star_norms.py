@@ -8,6 +8,7 @@ import pytest
 from hsv.base.errors import DesignError
 from hsv.control.design import find_design
 from hsv.design.certified import load_certified
+from hsv.design.compare import compare_sets
 from hsv.design.sets.counter_example import counter_examples
 from hsv.design.sets.star_norms import StarNorms
 
@@ -73,3 +74,15 @@ def test_what_is_checked_is_what_bounds(tight, change, named):
     change(report)
     with pytest.raises(DesignError, match=f"star_norms.{named}"):
         StarNorms.from_report(report, tight.problem)
+
+
+@pytest.mark.long
+def test_star_norms_lie_between_the_ellipsoid_and_the_counter_examples(found, subject):
+    inputs = subject.inputs.invariant_set.model_copy(update={"contraction": [found.contraction]})
+    rows = compare_sets(subject.design, found.problem, inputs)
+    assert [row.name for row in rows] == ["ellipsoid", "star norms", "counter-examples"]
+    ellipsoid, narrowed, driven = rows
+    assert ellipsoid.size > narrowed.size > driven.size
+    assert np.all(narrowed.feedback <= ellipsoid.feedback) and np.all(driven.feedback < narrowed.feedback)
+    # docs/certified_bounds.md: half-widths of the pitch angle.
+    assert np.degrees([row.half_width[3] for row in rows]) == pytest.approx([1.92, 1.76, 1.48], abs=0.01)

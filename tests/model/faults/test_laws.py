@@ -10,7 +10,17 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.base.errors import ParameterError
 from hsv.model.faults.schedule import fault_rows
-from hsv.model.faults.table import CHANNELS, COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, FAULT_KINDS, SENSOR, Fault
+from hsv.model.faults.table import (
+    CHANNELS,
+    COMMAND,
+    DYNAMICS,
+    EFFECTOR,
+    ENGINE_SIDE,
+    FAULT_KINDS,
+    SENSOR,
+    Fault,
+    read_fault,
+)
 from hsv.model.faults.table import OCCURRENCE_PARAMETERS as OCCURRENCE
 
 T = 0.02
@@ -133,6 +143,14 @@ def test_every_kind_is_described_and_may_be_scheduled_on_its_channels(name):
         for parameter in (*kind.parameters, *OCCURRENCE):
             described = parameter.of(channel)
             assert described.description and described.minimum <= described.default <= described.maximum
+
+
+def test_a_fault_is_written_with_units_and_its_one_due_parameter_without_name():
+    fault = elevator("loss_of_effectiveness", effectiveness=0.8, ramp_time=0.5)
+    for first in ("80 %", "effectiveness=0.8"):
+        assert read_fault(ELEVATOR, "loss_of_effectiveness", [first, "ramp_time=500 ms"]) == fault
+    with pytest.raises(ParameterError, match=r"^fault\.0\.1 Hz: unknown parameter, expected "):
+        read_fault(ELEVATOR, "oscillation", ["0.1 Hz"])
 
 
 CROSSED = {"lower": math.radians(10.0), "upper": math.radians(5.0)}

@@ -15,6 +15,7 @@ from hsv.model.lpv.actuated import actuator_system, held_behind, respond, sample
 from hsv.model.lpv.linearisation import (
     Filter,
     bode,
+    bode_difference,
     extended_derivative,
     extended_jacobian,
     extended_state,
@@ -123,6 +124,7 @@ def test_second_order_system_at_resonance():
     magnitude, phase = bode(response[:, 0, 0])
     assert_allclose(magnitude, [0.0, 20.0 * np.log10(5.0)], atol=1e-5)
     assert_allclose(phase, [0.0, -90.0], atol=0.02)
+    assert_allclose(bode_difference(2j * response, response), [np.full((2, 2, 1), x) for x in (20.0 * np.log10(2), 90)])
 
 
 def test_frequencies_above_nyquist_are_refused():

@@ -76,7 +76,7 @@ BREAKPOINTS = np.linspace(-1.0, 3.0, 21)
 POWERS = np.stack([BREAKPOINTS**k for k in range(1, 5)], axis=1)
 
 
-@pytest.mark.parametrize("r", [2, 3, 4, 5])
+@pytest.mark.parametrize("r", [1, 2, 3, 4, 5])
 def test_weights_are_non_negative_and_sum_to_one_between_breakpoints_too(r):
     weights = hull_weights(BREAKPOINTS, POWERS[:, : r - 1])
     between = CubicSpline(BREAKPOINTS, weights)(np.linspace(-1.0, 3.0, 50_001))

@@ -1,15 +1,22 @@
-"""The server of the page: access, data, commands, and clients that do not read."""
+"""The servers of the page and for Foxglove: ports, access, data, commands, and clients that do not read."""
 
 import json
+import socket
 import urllib.error
 import urllib.request
+from pathlib import Path
 
 import pytest
-from live_clients import PageClient
+from live_clients import FoxgloveClient, PageClient
 from waiting import wait_until
 from websocket import WebSocketBadStatusException
 
+from hsv.bags.definitions import definition
+from hsv.bags.description import TOPICS, resolved
+from hsv.base.errors import ParameterError
 from hsv.pages.live.commands import Clear
+from hsv.pages.live.foxglove_server import FoxgloveServer
+from hsv.pages.live.server import PageServer
 from hsv.pages.panels import LIVE_CURVES
 
 A_STEP = 9
@@ -105,3 +112,81 @@ def test_whoever_comes_late_gets_all_and_then_what_is_new(hub, server, messages)
     assert rows(late, hub, 201)[:100].tolist() == first.tolist()
     assert rows(early, hub, 201).tolist() == late.times(len(LIVE_CURVES)).tolist()
     assert late.status["title"] == "a flight" and late.status["run"]["last_step"] == 200
+
+
+@pytest.fixture(params=["live.port", "live.page_port"])
+def serve(request, hub):
+    """Return the parameter that a server's port is, and what starts it on one."""
+    if request.param == "live.page_port":
+        return request.param, lambda port: PageServer(port, hub, "{}")
+    return request.param, lambda port: FoxgloveServer(port, {resolved(topic): kind for topic, kind in TOPICS.items()})
+
+
+def test_it_listens_on_this_machine_only(serve):
+    server = serve[1](0)
+    port = server.port
+    tables = "".join(Path("/proc/net", name).read_text() for name in ("tcp", "tcp6"))
+    listening = [line.split() for line in tables.splitlines()]
+    places = [words[1] for words in listening if words[1].endswith(f":{port:04X}") and words[3] == "0A"]
+    server.close()
+    assert places == [f"0100007F:{port:04X}"]
+
+
+def test_a_port_in_use_is_named(serve):
+    name, start = serve
+    with socket.socket() as held:
+        held.bind(("127.0.0.1", 0))
+        held.listen()
+        port = held.getsockname()[1]
+        expected = rf"^{name} = {port}: .*in use, expected a free port of this machine$"
+        with pytest.raises(ParameterError, match=expected):
+            start(port)
+
+
+NAMES = {resolved(topic): kind for topic, kind in TOPICS.items()}
+
+
+@pytest.fixture
+def foxglove():
+    server = FoxgloveServer(0, NAMES, ["/hsv/actuator"])
+    yield server
+    server.close()
+
+
+def test_topics_come_with_their_definitions_and_bytes(foxglove, messages):
+    client = FoxgloveClient(foxglove.port)
+    assert client.protocol == "foxglove.sdk.v1"
+    assert {channel["topic"]: channel["schemaName"] for channel in client.channels.values()} == NAMES
+    for channel in client.channels.values():
+        assert (channel["encoding"], channel["schemaEncoding"]) == ("cdr", "ros2msg")
+        assert channel["schema"] == definition(channel["schemaName"])
+
+    def subscribed():
+        # A message that is sent before the subscription has come is nobody's.
+        foxglove.send("/clock", 0, b"first")
+        return client.messages["/clock"]
+
+    wait_until(subscribed)
+    sent = [(topic, time, data) for topic, time, data in messages[:900] if topic != "clock"]
+    for topic, time, data in sent:
+        foxglove.send(resolved(topic), time, data)
+    wait_until(lambda: sum(len(kept) for topic, kept in client.messages.items() if topic != "/clock") == len(sent))
+    for topic in NAMES:
+        if topic != "/clock":
+            assert client.messages[topic] == [(t, data) for name, t, data in sent if resolved(name) == topic]
+
+
+def test_a_latched_topic_is_sent_to_a_client_that_comes_late_and_to_no_other(foxglove):
+    foxglove.send("/hsv/actuator", 1, b"earlier run")
+    foxglove.start_run()
+    sent = [(2, b"one"), (3, b"two")]
+    for time, data in sent:
+        foxglove.send("/hsv/actuator", time, data)
+    clients = []
+    for _ in range(2):
+        clients.append(FoxgloveClient(foxglove.port))
+        wait_until(lambda: len(clients[-1].messages["/hsv/actuator"]) == len(sent))
+    foxglove.send("/hsv/actuator", 4, b"three")
+    for client in clients:
+        wait_until(lambda client=client: client.messages["/hsv/actuator"][-1][0] == 4)
+        assert client.messages["/hsv/actuator"] == [*sent, (4, b"three")]
