@@ -68,7 +68,8 @@ def _drawing(plot: Plot, numbers: Numbers, end: float, kinds: Sequence[str]) -> 
     paths = []
     for kind in kinds:
         for curve in curves[kind]:
-            x, y = numbers.array(curve["x"]), numbers.array(curve["y"])
+            y = numbers.array(curve["y"])
+            x = numbers.array(curve["x"])[: len(y)]  # a flight may end before the others
             look, run = kind, curve["run"]
             if kind == "high":
                 look, x = "band", np.append(x, x[::-1])
