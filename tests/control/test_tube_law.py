@@ -52,6 +52,17 @@ def test_feedback_uses_the_filtered_rate_but_the_error_the_true_one():
     assert result.error[4] == 0.02
 
 
+@pytest.mark.parametrize("component", range(9))
+@pytest.mark.parametrize("value", [1e9, -1e9, 1111.1])
+def test_absurd_states_stay_within_the_limits_and_are_marked(component, value):
+    state = REFERENCE.copy()
+    state[component] = value
+    result = step(TubeLaw(DESIGN), state, rate=state[4])
+    assert np.all((result.input >= LIMITS.input_minimum) & (result.input <= LIMITS.input_maximum))
+    assert_array_equal(result.saturated, result.input != result.u_unsaturated)
+    assert np.any(result.saturated) == (component < 5)
+
+
 SIGNALS = {"state": 9, "rate": 1, "deviation": 9, "nominal_input": 2}
 
 

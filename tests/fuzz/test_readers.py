@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from zlib import crc32
 
@@ -22,6 +23,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.recover import recover
 from hsv.bags.steps import bag_warnings
 from hsv.base.errors import HsvError
+from hsv.base.units import parse_quantity
 from hsv.control.design import certificate_path, find_design, read_design
 from hsv.control.verification import preflight
 from hsv.flight.assembly import uncovered_of
@@ -102,6 +104,13 @@ def test_a_vehicle(fuzz: Fuzz, tmp_path: Path) -> None:
         load_vehicle(str(path))
 
     fuzz(mutated(*(vehicle_text(name).encode() for name in vehicle_names())), read)
+
+
+@hypothesis.given(st.text("0123456789.e+-*/^() ftsdegradN%", max_size=60))
+@settings(max_examples=200, derandomize=True, database=None)
+def test_a_quantity(text: str) -> None:
+    with suppress(HsvError):
+        parse_quantity(text, "m", "altitude")
 
 
 def test_a_design(fuzz: Fuzz, tmp_path: Path) -> None:

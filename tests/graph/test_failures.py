@@ -171,6 +171,7 @@ def test_a_hung_node_is_named_and_ends_the_run(processes, name):
         if Path(f"/proc/{pid}").exists():
             os.kill(pid, signal.SIGCONT)
     assert run.returncode == 1
+    assert f"{name}: [WARN] hangs: no progress for 5 s" in output
     assert ("plant hangs: no progress for 6." if name == "plant" else f"no answer from {name}") in output
     assert Bag(bag).complete
 

@@ -95,7 +95,7 @@ SHELLS = [
     pytest.param(name, marks=pytest.mark.skipif(shutil.which(name) is None, reason=f"{name} is not installed"))
     for name in ("bash", "zsh")
 ]
-pytestmark = pytest.mark.skipif(
+is_set_up = pytest.mark.skipif(
     not (ROOT / ".venv/hsv-setup").exists(), reason="this checkout has not been set up by make setup"
 )
 
@@ -107,6 +107,7 @@ def shell(name, script, cwd="/", **variables):
     )
 
 
+@is_set_up
 @pytest.mark.parametrize("name", SHELLS)
 def test_it_activates_the_workspace_from_any_directory(name):
     result = shell(
@@ -120,6 +121,7 @@ def test_it_activates_the_workspace_from_any_directory(name):
     assert directories == f"{ROOT} {ROOT}/offline_design"
 
 
+@is_set_up
 @pytest.mark.parametrize("name", SHELLS)
 def test_sourcing_it_again_changes_nothing(name):
     once, twice = (shell(name, f"{n * f'source {str(ROOT)!r}/env.sh; '} env | grep -v ^_= | sort") for n in (1, 2))
@@ -127,6 +129,7 @@ def test_sourcing_it_again_changes_nothing(name):
     assert twice.stderr == ""
 
 
+@is_set_up
 @pytest.mark.parametrize("name", SHELLS)
 def test_what_the_user_has_set_stays(name):
     script = f"source '{ROOT}/env.sh'; echo $ROS_AUTOMATIC_DISCOVERY_RANGE $HSV_DESIGN_PATH ${{ROS_LOG_DIR:-none}}"
@@ -135,10 +138,12 @@ def test_what_the_user_has_set_stays(name):
     assert mine.stdout == "SUBNET /mine none\n"
 
 
+@is_set_up
 def test_nodes_have_a_place_for_their_logs_without_a_home():
     assert shell("bash", f"source '{ROOT}/env.sh'; echo $ROS_LOG_DIR").stdout == f"{ROOT}/ros_ws/log/nodes\n"
 
 
+@is_set_up
 def test_another_sourced_ros_is_refused():
     humble = {"ROS_DISTRO": "humble", "AMENT_PREFIX_PATH": "/opt/ros/humble"}
     result = shell("bash", f"source '{ROOT}/env.sh'", **humble)
@@ -146,6 +151,7 @@ def test_another_sourced_ros_is_refused():
     assert "humble" in result.stderr or "Jazzy" in result.stderr
 
 
+@is_set_up
 @pytest.mark.parametrize("name", SHELLS)
 def test_a_distribution_that_is_named_but_not_sourced_does_not_count(name):
     script = f"source '{ROOT}/env.sh' && source '{ROOT}/env.sh' && python3 -c 'import rclpy, hsv_msgs'"
@@ -153,6 +159,7 @@ def test_a_distribution_that_is_named_but_not_sourced_does_not_count(name):
     assert (result.returncode, result.stderr) == (0, "")
 
 
+@is_set_up
 @pytest.mark.parametrize("name", SHELLS)
 def test_a_checkout_that_is_not_set_up_says_so(name, tmp_path):
     shutil.copy(ROOT / "env.sh", tmp_path)
@@ -162,6 +169,7 @@ def test_a_checkout_that_is_not_set_up_says_so(name, tmp_path):
     assert result.stderr.count("\n") == 1
 
 
+@is_set_up
 @pytest.mark.parametrize("name", SHELLS)
 def test_an_interactive_shell_completes_the_words_of_the_command(name):
     asked = "complete -p hsv" if name == "bash" else "echo $_comps[hsv]"

@@ -24,9 +24,9 @@ from hsv_node.parameters import declare
 
 
 class PeerEmulatorNode(LockstepNode):
-    """A node that emulates the peers of ``peer_emulator.node``, all that it is linked with, with the messages in a bag.
+    """A node that stands in for all peers of the node ``peer_emulator.node``, with the messages of a bag.
 
-    The types of its messages make it all peers at once.
+    It publishes what they publish, and so the node under test is linked to it alone.
     """
 
     def __init__(self) -> None:

@@ -144,7 +144,10 @@ class RecorderNode(PeerNode):
         silent = self._peers.silent()
         if not silent:
             self._keep_parameters(self._run, self._peers.values)
-        return [f"{role} ({service})" for role, service in silent.items()]
+        missing = [f"{role} ({service})" for role, service in silent.items()]
+        if missing:
+            self.log_waiting(missing, decides=True)
+        return missing
 
     def _keep_parameters(self, run: Run, values: dict[str, dict[str, Any]]) -> None:
         # Not at the top: the components' tables take their time, and a prepared run does without.

@@ -181,7 +181,7 @@ class PlantNode(LockstepNode):
                 return
             numbers = zip(INPUT_NAMES, signals.actuator.tolist(), strict=True)
             if wrong := ", ".join(f"{key} = {value}" for key, value in numbers if not math.isfinite(value)):
-                name = self.node_in_role(controller_node(self.controller)) or "the controller"
+                name = self._controller_name
                 self._broken_off = self.fail(f"{name}, step {signals.step}: {wrong}, expected a finite number")
                 return
             self._answered = True
@@ -267,6 +267,8 @@ class PlantNode(LockstepNode):
         missing = [f"{name} ({self.resolve_topic_name(READY)})" for name in unready] or self.missing_links()
         if not missing:
             self._started = True
+            # Looked up now: a controller that has ended is found no more.
+            self._controller_name = self.node_in_role(controller_node(self.controller)) or "the controller"
             self._paced_from = time.monotonic(), 0
             self._standstill = Standstill()
             self.get_logger().info(f"starts {run_in_words(self._run)}")
@@ -284,9 +286,8 @@ class PlantNode(LockstepNode):
         here = {node.get_fully_qualified_name() for node in self.process_nodes}
         elsewhere = [peer for peer in self._peers if self.node_in_role(peer) not in here]
         silent, slowest = unresponsive(self, elsewhere)
-        controller = controller_node(self.controller)
-        if not silent and not behind_recorder and controller.foreign:
-            silent = [self.node_in_role(controller) or "the controller"]
+        if not silent and not behind_recorder and controller_node(self.controller).foreign:
+            silent = [self._controller_name]
         if silent:
             self._broken_off = f"no answer from {', '.join(silent)}"
         else:

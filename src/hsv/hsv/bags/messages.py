@@ -202,7 +202,7 @@ class StepMessages:
     """Conversion of the signals of a step to and from the messages of one topic."""
 
     def __init__(self, topic: str, store: Typestore | None = None) -> None:
-        """Prepare for a topic of a step; ``store`` has the definitions of its messages, or the installed ones count."""
+        """Prepare for a topic of a step; ``store`` has the definitions of its messages, by default the installed."""
         self.type = TOPICS[topic]
         self._store = store or installed_types(self.type)
         carried = CARRIED.get(topic, {})

@@ -45,7 +45,10 @@ _Dumper.add_representer(
 def information(
     file: str, topics: Sequence[Topic], span: tuple[int, int], custom: Mapping[str, str], distro: str = DISTRO
 ) -> dict[str, Any]:
-    """Return the metadata of a bag with one file, with all keys that rosbag2 requires; ``span`` as EMPTY_SPAN."""
+    """Return the metadata of a bag with one file, with all keys that rosbag2 requires.
+
+    ``span``: time of the first and the last message, ns; EMPTY_SPAN if there is none.
+    """
     start, duration = {"nanoseconds_since_epoch": span[0]}, {"nanoseconds": max(span[1] - span[0], 0)}
     count = sum(topic.count for topic in topics)
     return {

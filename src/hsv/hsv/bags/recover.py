@@ -21,7 +21,7 @@ RECOVERED = {"recovered": "true"}
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """Result of a recovery of ``bag``: the directory of a new bag with so many messages, or its own if unchanged."""
+    """Result of a recovery: the directory of the new bag, or of ``bag`` itself if it needs none, and its messages."""
 
     bag: Bag
     path: Path

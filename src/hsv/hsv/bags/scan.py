@@ -1,4 +1,4 @@
-"""Scan of an MCAP file that goes on after damages, at which the readers of the ``mcap`` package end."""
+"""Scan of an MCAP file that goes on after damages, where the readers of the ``mcap`` package end."""
 
 from __future__ import annotations
 
@@ -14,12 +14,11 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
-from hsv.bags.files import Unpacker
+from hsv.bags.files import COMPRESSIONS, Unpacker
 
 _FRAME = struct.Struct("<BQ")
 """Opcode and length at the start of a record."""
-# The start of a chunk, an attachment or an end of data with a length below 2^40.
-_CANDIDATE = re.compile(rb"(?=[\x06\x09\x0f].{5}\x00{3})", re.DOTALL)
+_CANDIDATE = re.compile(rb"(?=[\x06\x09\x0f].{5}\x00{3})", re.DOTALL)  # a chunk, an attachment, an end of data
 # What the package raises for wrong lengths and texts.
 _DAMAGE = (EndOfFile, struct.error, UnicodeDecodeError, OverflowError, MemoryError)
 _KINDS = {opcode: getattr(kinds, opcode.name.title().replace("_", "")) for opcode in Opcode}
@@ -41,9 +40,9 @@ class Scan:
         self._data = memoryview(file.data)
 
     def records(self) -> Iterator[kinds.McapRecord]:
-        """Yield every intact record of the data section; chunks are replaced by their records.
+        """Yield every intact record, those of chunks in place of the chunks; damaged data are skipped and listed.
 
-        Damaged data are skipped and listed, a record cut off at the end, as left by a killed writer, is not listed.
+        A record cut off at the end, as left by a killed writer, is skipped and not listed.
         """
         data, position, chunks = self._data, len(MCAP0_MAGIC), set[int]()
         if not MCAP0_MAGIC.startswith(bytes(data[:position])):
@@ -57,10 +56,10 @@ class Scan:
                 case kinds.Chunk():
                     new = (digest := hash(record.data)) not in chunks  # a doubled chunk is read once
                     chunks.add(digest)
-                    found, whole = self._unpacked(record) if new else ([], True)
+                    found, what = self._unpacked(record) if new else ([], "")
                     yield from found
-                    if not whole:
-                        self.damages.append((position, "a chunk"))
+                    if what:
+                        self.damages.append((position, what))
                         end = min(end, self._next(position + 1))  # an intact chunk may begin inside
                 case kinds.MessageIndex():
                     self.indexed += new * len(record.records)
@@ -86,21 +85,22 @@ class Scan:
         candidates = (match.start() for match in _CANDIDATE.finditer(self._data, position))
         return next((at for at in candidates if _record(self._data, at)[1]), len(self._data))
 
-    def _unpacked(self, chunk: kinds.Chunk) -> tuple[list[kinds.McapRecord], bool]:
-        """Return the records of a chunk, up to a damage if it has no checksum, and whether it is whole."""
+    def _unpacked(self, chunk: kinds.Chunk) -> tuple[list[kinds.McapRecord], str]:
+        """Return the records of a chunk, up to a damage if it has no checksum, and what is damaged, if anything."""
+        if chunk.compression not in ("", *COMPRESSIONS.values()):
+            return [], f"a chunk (unsupported compression type {chunk.compression}, expected zstd, lz4 or none)"
         data, whole = self._file.unpacked(chunk.data, chunk.compression)
         whole = whole and chunk.uncompressed_crc in (0, zlib.crc32(data))
-        found: list[kinds.McapRecord] = []
-        position = 0
+        found, position = list[kinds.McapRecord](), 0
         while whole and position < len(data):
             record, position = _record(memoryview(data), position)
-            whole = position > 0
-            found += [record] if record else []
-        return found, whole
+            whole = position > 0 and isinstance(record, kinds.Message | kinds.Channel | kinds.Schema | None)
+            found += [record] if record and whole else []
+        return found, "" if whole else "a chunk"
 
 
 def _record(data: memoryview, position: int) -> tuple[kinds.McapRecord | None, int]:
-    """Return the record at ``position``, which its fields fill, and its end, 0 for a damage; None is a private one."""
+    """Return the record at ``position`` (None for a private one) and its end, 0 unless its fields fill it."""
     start = position + _FRAME.size
     opcode, length = _FRAME.unpack_from(data, position) if start <= len(data) else (0, 0)
     end = start + length

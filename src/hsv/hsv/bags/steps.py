@@ -24,7 +24,7 @@ def cut_off(bag: Bag) -> bool:
 
 
 def joined(bag: Bag, topics: Sequence[str]) -> dict[str, Columns]:
-    """Return the columns of ``topics`` for the steps that all have, row by row; raise a RecordingError without any."""
+    """Return the columns of ``topics`` for the steps that all of them have; without such a step, a RecordingError."""
     columns = {topic: bag.columns(topic) for topic in topics}
     steps = [found["step"] for found in columns.values()]
     common = steps[0]

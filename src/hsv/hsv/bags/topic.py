@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
-from rosbags.rosbag2.metadata import parse_qos
+from rosbags.rosbag2.metadata import dump_qos_v9, parse_qos
 
 from hsv.base.errors import DocumentError
 from hsv.base.files import parse_yaml
@@ -21,12 +21,16 @@ def usual_qos(depth: int = 10, *, latched: bool = False) -> Qos:
 
 
 def recorded_qos(text: str, *, latched: bool) -> Qos:
-    """Return the first profile in the YAML text of an MCAP channel, or the usual one if it has none."""
+    """Return the first profile in the YAML text of an MCAP channel; what it lacks or misspells is as usual."""
+    usual = usual_qos(latched=latched)
     try:
-        qos = parse_qos(parse_yaml(text))[0]
-    except (DocumentError, LookupError, TypeError, AttributeError):
-        return usual_qos(latched=latched)
-    return qos if isinstance(qos.depth, int) else usual_qos(latched=latched)
+        first, *_ = parse_yaml(text)
+        [qos] = parse_qos([dump_qos_v9([usual])[0] | first])
+    except (DocumentError, ValueError, LookupError, TypeError, AttributeError):
+        return usual
+    unknown = {name for name in ("history", "reliability", "durability") if getattr(qos, name).name == "UNKNOWN"}
+    qos = qos._replace(**{name: getattr(usual, name) for name in unknown})
+    return qos if isinstance(qos.depth, int) else usual
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Options that commands share; numbers with their units as tables for people, as JSON for programs; check targets."""
+"""Output of the commands: numbers with their units as tables for people and as JSON for programs."""
 
 from __future__ import annotations
 

@@ -171,14 +171,14 @@ class NodeController(Controller):
 
     @property
     def kernel(self) -> Any:
-        """Refuse."""
+        """Raise :meth:`refusal`."""
         raise self.refusal()
 
     def reset(self) -> None:
         """Do nothing."""
 
     def step(self, inputs: ControllerInput) -> ControllerResult:
-        """Refuse."""
+        """Raise :meth:`refusal`."""
         raise self.refusal()
 
     def refusal(self) -> ParameterError:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.base.parameters import validate
+from hsv.base.parameters import one_or, validate
 from hsv.base.units import UnitSystem, in_system
 from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
@@ -80,7 +80,8 @@ def uncovered_hardware(values: Mapping[str, Any], design: ControlDesign) -> list
             found.append(f"{parameter.name}: {shown}; the certificate is for {certified}")
     for channel, unit, reach in zip(INPUT_NAMES, INPUT_UNITS, commanded(design), strict=True):
         chosen = ACTUATOR_SETS.get(v[f"actuator.{channel}.set"])
-        [stop] = v[f"actuator.{channel}.stop"] or [chosen.stop if chosen else np.inf]
+        name = f"actuator.{channel}.stop"
+        stop = one_or(name, v[name], chosen.stop if chosen else np.inf)
         if stop < reach:
             largest = _written(reach, unit)
             found.append(

@@ -100,7 +100,7 @@ def under_load(scenario: Scenario, first: Flight) -> Finding:
             for _, flown in executor.fly(partial(_fly_at_once, scenario), "", range(processes)):
                 histories += pickle.loads(flown)
     except HsvError as error:
-        return Finding(name, processes * _FLIGHTS, str(error))
+        return Finding(name, processes * _FLIGHTS, "a process died" if isinstance(error, RunError) else str(error))
     differences = (_difference(first.history, history) for history in histories)
     return Finding(name, len(histories), next(filter(None, differences), ""))
 

@@ -94,6 +94,7 @@ class _Process:
     words: deque[str] = field(default_factory=lambda: deque(maxlen=10))
     reader: threading.Thread | None = None
     standstill: Standstill = field(default_factory=Standstill)
+    hung: bool = False
 
     def idle(self) -> float:
         """Return the time (s) for which the process has used no processor time; 0 if unknown."""
@@ -154,7 +155,8 @@ class Launcher:
     def wait(self) -> int:
         """Wait for the last node to finish and return its exit code: 0, or that of a flight that diverged.
 
-        In flight the plant itself detects a peer that does not answer, and ends.
+        A process that hangs is reported, and also when it continues. In flight the plant itself detects a peer that
+        does not answer, and ends.
 
         Raises:
             RunError: It failed, or another ended before it (a plant that has landed may). Or it hung, or another
@@ -171,11 +173,15 @@ class Launcher:
                     raise RunError(f"{process.description.label} {reason}")
                 self._on_line(process.description.label, WARNING + reason)
                 others.remove(process)
-            for process in (last,) if self._flying else (*others, last):
-                idle = process.idle()
-                if idle > self._wait_timeout and process.description is not LIVE:
-                    name = process.description.label
+            for process in (*others, last):
+                idle, name = process.idle(), process.description.label
+                decides = process is last or not self._flying
+                if idle > self._wait_timeout and decides and process.description is not LIVE:
                     raise RunError(f"{name} hangs: no progress for {idle:.1f} s, not even processor time used")
+                if process.hung != (idle > HUNG_AFTER):
+                    process.hung = not process.hung
+                    state = f"hangs: no progress for {HUNG_AFTER:g} s" if process.hung else "goes on"
+                    self._on_line(name, WARNING + state)
             code = last.popen.poll()
             if code is not None:
                 if code == 0 or _landed(last, code):

@@ -151,10 +151,12 @@ class Vehicle:
         return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
 
     def condition(self, altitude: float | str, velocity: float | str) -> tuple[float | str, float | str]:
-        """Return a flight condition; empty texts become the published one, or the middle of an envelope without it."""
-        low, high = self.altitude_range
-        known = low <= parse_quantity(PUBLISHED_ALTITUDE, "m", "altitude") <= high
-        at = (PUBLISHED_ALTITUDE, PUBLISHED_VELOCITY) if known else self.centre
+        """Return a flight condition; empty texts become the published one, or the centre if that is outside."""
+        published_altitude = parse_quantity(PUBLISHED_ALTITUDE, "m", "altitude")
+        published_velocity = parse_quantity(PUBLISHED_VELOCITY, "m/s", "velocity")
+        (h_low, h_high), (v_low, v_high) = self.altitude_range, self.velocity_range
+        inside = h_low <= published_altitude <= h_high and v_low <= published_velocity <= v_high
+        at = (PUBLISHED_ALTITUDE, PUBLISHED_VELOCITY) if inside else self.centre
         return at[0] if altitude == "" else altitude, at[1] if velocity == "" else velocity
 
     def coupling_name(self, coupling: object = "") -> str:

@@ -107,7 +107,7 @@ def compressed(data: bytes) -> Markup:
 
 
 def render(template: str, *, plots: Sequence[Plot] = (), numbers: Numbers | None = None, **values: Any) -> str:
-    """Return a page of ``plots`` and their ``numbers``; ``described`` of the ``values`` is for the script, too."""
+    """Return a page of ``plots`` and their ``numbers``; the page's script receives ``described`` among ``values``."""
     environment = Environment(
         loader=PackageLoader("hsv.pages", "template"),
         autoescape=template.endswith(".html.j2"),

@@ -108,13 +108,14 @@ class _PoolExecutor(Executor, ABC):
 
     def _alone(self, job: Job, text: str, batch: int, label: Callable[[int], str]) -> bytes:
         """Return the result of a batch that is flown with no other batch in flight."""
-        future = self._submit(job, text, batch)
-        try:
-            self._first({future: batch}, label)
-            return self._result(future)
-        except BrokenProcessPool as error:
-            self._renew()
-            raise RunError(f"campaign: {label(batch)}: the worker process ended; {_KEPT}") from error
+        for _ in range(2):  # the first time, it may have been a process that had nothing to do
+            future = self._submit(job, text, batch)
+            try:
+                self._first({future: batch}, label)
+                return self._result(future)
+            except BrokenProcessPool:
+                self._renew()
+        raise RunError(f"campaign: {label(batch)}: the worker process ended; {_KEPT}")
 
     def _first(self, flying: dict[Future[bytes], int], label: Callable[[int], str]) -> Collection[Future[bytes]]:
         """Wait for the first results, and return their futures."""
