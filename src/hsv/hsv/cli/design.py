@@ -336,11 +336,7 @@ def verify(
                 output.say(Text(part, "bold"))
             for check in made:
                 expected = f", expected {check.expected}" if check.expected else ""
-                # In full, if three digits hide on which side of a bound the number is.
-                value = check.value
-                hides = isinstance(value, str) or not check.ok or (short := significant(value)) in ("1", "-1")
-                found = check.shown if hides else short
-                line = output.folded(f"{'ok' if check.ok else 'FAIL':4}  {check.name}: {found}{expected}", 8)
+                line = output.folded(f"{'ok' if check.ok else 'FAIL':4}  {check.name}: {check.shown}{expected}", 8)
                 output.say(line if check.ok else Text(line, "bold red"))
         if stated:
             output.say(output.folded(f"stated, not checked: {', '.join(stated)}"))

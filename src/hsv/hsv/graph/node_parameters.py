@@ -17,7 +17,7 @@ from hsv.bags.description import (
     graph,
 )
 from hsv.bags.infrastructure_parameters import LIVE_PARAMETERS, PACE_PARAMETERS, RECORDER_PARAMETERS
-from hsv.base.errors import ParameterError
+from hsv.base.errors import ParameterError, did_you_mean
 from hsv.base.parameters import Parameter
 from hsv.base.units import parse_quantity
 from hsv.control.controllers import controller_class
@@ -68,7 +68,8 @@ def find(name: str) -> tuple[NodeDescription, Parameter]:
     """Return the node and the parameter that a full name, or the last word of one, means."""
     found = [entry for full, entry in SETTABLE.items() if name in (full, full.rpartition(".")[2])]
     if len(found) != 1:
-        raise ParameterError(f"name = {name!r}: expected a parameter that may change in flight, {', '.join(SETTABLE)}")
+        names = ", ".join(SETTABLE) + did_you_mean(name, SETTABLE)
+        raise ParameterError(f"name = {name!r}: expected a parameter that may change in flight, {names}")
     return found[0]
 
 
