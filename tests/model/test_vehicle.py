@@ -62,6 +62,7 @@ WRONG = [
     ("rigid_body.weight", {}, "rigid_body.weight: unknown key, expected one of mass, moment_of_inertia, gravity"),
     ("wings", {}, "wings: unknown key, expected one of title, structure, rigid_body, geometry"),
     ("structure", "parkr", "structure = 'parkr': expected one of parker, winged_cone (did you mean 'parker'?)"),
+    ("structure", {}, "structure = {}: expected one of parker, winged_cone"),
     ("title", " ", "title = ' ': expected a text that is not empty"),
     ("rigid_body.mass.uncertainty", "-1 %", "rigid_body.mass.uncertainty = '-1 %': expected from 0 to 90 %"),
     ("envelope.altitude.minimum", "90000 ft", "altitude_range: 27432.0 to 26365.2, expected a range that increases"),

@@ -379,7 +379,7 @@ def parse_vehicle(tables: Mapping[str, Any], name: str) -> Vehicle:
 
 def _parsed(tables: Mapping[str, Any], name: str) -> Vehicle:
     structure = tables.get("structure", DEFAULT_STRUCTURE)
-    if structure not in STRUCTURES:
+    if structure not in [*STRUCTURES]:  # a list: a table is no key
         raise QuantityError(f"structure = {structure!r}: expected {one_of(STRUCTURES, str(structure))}")
     form = STRUCTURES[structure]
     sets = tables.get("inertial_coupling", {}) if form.elastic else {}
