@@ -269,13 +269,18 @@ def test_faults_and_factors_come_and_go_in_flight(processes: Processes) -> None:
         ("ros2 param dump", "tau: - 0.9 "),
         ("ros2 topic echo", "tau: - 0.9 "),
     ):
-        done = processes.run("bash", "-c", the_printed(PAGE, beginning))
+        for _ in range(20):  # the tools do not know every node and topic at once
+            done = processes.run("bash", "-c", the_printed(PAGE, beginning))
+            if done.returncode == 0:
+                break
         assert done.returncode == 0 and said in " ".join(done.stdout.split()), done.stdout
     # It looks for half a second, in which it does not find everybody: what is wrong is found every time.
-    reports = [processes.run("bash", "-c", the_printed(PAGE, "ros2 doctor")) for _ in range(5)]
-    assert all(report.returncode == 0 for report in reports)
-    alone = [set(re.findall(r"detected on (/hsv/\w+)", report.stdout)) for report in reports]
-    assert not set.intersection(*alone), reports[-1].stdout
+    alone: list[set[str]] = []
+    while len(alone) < 20 and (not alone or set.intersection(*alone)):
+        report = processes.run("bash", "-c", the_printed(PAGE, "ros2 doctor"))
+        assert report.returncode == 0
+        alone.append(set(re.findall(r"detected on (/hsv/\w+)", report.stdout)))
+    assert not set.intersection(*alone), alone
     finish(flight)
     # Commands on parameters and topics leave one that waits for more of them.
     assert processes.run("ros2", "daemon", "stop").returncode == 0
