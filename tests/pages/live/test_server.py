@@ -162,7 +162,7 @@ def test_topics_come_with_their_definitions_and_bytes(foxglove, messages):
         assert channel["schema"] == definition(channel["schemaName"])
 
     def subscribed():
-        # A message that is sent before the subscription has come is nobody's.
+        # A message that is sent before the server knows the subscription reaches nobody.
         foxglove.send("/clock", 0, b"first")
         return client.messages["/clock"]
 
