@@ -84,8 +84,8 @@ def detected(group: str, path: Path, place: int, token: str) -> str:
             build = [sys.executable, "setup.py", "-q", "build_ext", "--inplace", "--force"]
             if subprocess.run(build, cwd=copy, env=environment, capture_output=True).returncode:
                 return "it does not compile"
-        command = ["timeout", "3600", sys.executable, "-m", "pytest", "-qx", "-m", "not (long or graph or fuzz)", *tests]
-        ran = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+        words = ["timeout", "3600", sys.executable, "-m", "pytest", "-qx", "-m", "not (long or graph or fuzz)", *tests]
+        ran = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True)
         failed = re.search(r"^(?:FAILED|ERROR) (.*?)(?: - |$)", ran.stdout, re.MULTILINE)
         return failed[1] if failed else f"exit code {ran.returncode}" if ran.returncode else ""
 
