@@ -10,11 +10,7 @@ from hsv.api import fly
 from hsv.base.units import UnitSystem, duration_in_words, significant
 from hsv.cli import output
 from hsv.cli.output import console, print_section
-from hsv.flight.limits import verdict_sentence, verdicts
 from hsv.flight.metrics import Group
-from hsv.flight.scenario import load_scenario
-
-DECAY = {"elastic_decay_time": 67.1, "altitude_overshoot": 0.04}
 
 
 @pytest.mark.parametrize(
@@ -68,22 +64,6 @@ def test_a_number_has_three_digits_and_all_before_its_point():
     assert [significant(v) for v in values] == ["0.0123", "1.23", "12.3", "123", "26060", "1.23e+07", "-100", "0"]
     seconds = (0.42, 64.0, 97.0, 900.0, 20000.0)
     assert [duration_in_words(s) for s in seconds] == ["0.42 s", "64 s", "2 min", "15 min", "5 h 33 min"]
-
-
-@pytest.mark.parametrize(
-    ("metrics", "ended", "sentence"),
-    [
-        ({"saturated_steps": 0.0}, True, "within its limit"),
-        ({"saturated_steps": 0.0, **DECAY}, True, "within its limit; not judged: elastic decay time (67.1 s), 1 other"),
-        ({"saturated_steps": 3.0}, True, "1 of 1 limits not kept: saturated steps 3 (limit 0)"),
-        ({}, True, "1 of 1 limits not kept: saturated steps not reached"),
-        ({"saturated_steps": 0.0}, False, "not flown to the end"),
-        ({"saturated_steps": 3.0}, False, "not flown to the end; 1 of 1 limits not kept: saturated steps 3 (limit 0)"),
-    ],
-)
-def test_the_verdict_is_one_sentence(metrics, ended, sentence):
-    judged = verdicts(load_scenario("case1_rmpc"), metrics, ended=ended)
-    assert verdict_sentence(judged, metrics, UnitSystem.metric) == sentence
 
 
 NAME = "run[old] [/x] :bug:"

@@ -6,9 +6,11 @@ import pytest
 from flights import components
 from numpy.testing import assert_allclose
 
+from hsv.base.units import UnitSystem
 from hsv.flight.closed_loop import fly
-from hsv.flight.limits import Verdict
+from hsv.flight.limits import Verdict, verdict_sentence, verdicts
 from hsv.flight.metrics import METRICS, FlightData, flight_metrics
+from hsv.flight.scenario import load_scenario
 
 PERIOD = 0.02
 REFERENCE = np.array([1000.0, 500.0, 0.02, 0.03, 0.0, 1.0, 0.0, 0.8, 0.0])
@@ -156,3 +158,22 @@ def test_a_limit_is_kept_only_by_a_flight_that_came_to_its_end(value, ended, wor
     verdict = Verdict(2.0, value, ended)
     assert verdict.words == words
     assert verdict.within == (words == "within")
+
+
+DECAY = {"elastic_decay_time": 67.1, "altitude_overshoot": 0.04}
+
+
+@pytest.mark.parametrize(
+    ("metrics", "ended", "sentence"),
+    [
+        ({"saturated_steps": 0.0}, True, "within its limit"),
+        ({"saturated_steps": 0.0, **DECAY}, True, "within its limit; not judged: elastic decay time (67.1 s), 1 other"),
+        ({"saturated_steps": 3.0}, True, "1 of 1 limits not kept: saturated steps 3 (limit 0)"),
+        ({}, True, "1 of 1 limits not kept: saturated steps not reached"),
+        ({"saturated_steps": 0.0}, False, "not flown to the end"),
+        ({"saturated_steps": 3.0}, False, "not flown to the end; 1 of 1 limits not kept: saturated steps 3 (limit 0)"),
+    ],
+)
+def test_the_verdict_is_one_sentence(metrics, ended, sentence):
+    judged = verdicts(load_scenario("case1_rmpc"), metrics, ended=ended)
+    assert verdict_sentence(judged, metrics, UnitSystem.metric) == sentence
