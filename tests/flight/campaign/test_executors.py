@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
@@ -180,6 +181,22 @@ def test_a_batch_that_ends_its_worker_is_named_and_ends_the_campaign_and_not_the
         assert dict(workers.fly(length_of, "text", range(2))) == dict.fromkeys(range(2), b"4")
         pids = workers.pids()
     assert dict(os.environ) == before and not any(map(alive, pids))
+
+
+def begin_and_never_end(text, batch):
+    """Fly a batch that says in the folder named in the text that it has begun."""
+    Path(text.split()[0], str(batch)).touch()
+    time.sleep(1e6)
+    return b""
+
+
+def test_a_campaign_with_a_long_text_is_interrupted_while_batches_wait(tmp_path):
+    """On Python 3.11 the pool's own pipe, full with the texts of waiting batches, once held up the end for ever."""
+    with pytest.raises(KeyboardInterrupt), make_executor(2) as workers:
+        for batch in range(4):
+            workers._submit(begin_and_never_end, f"{tmp_path} {'x' * 1_000_000}", batch)
+        wait_until(lambda: len([*tmp_path.iterdir()]) == 2)
+        raise KeyboardInterrupt
 
 
 @pytest.mark.long

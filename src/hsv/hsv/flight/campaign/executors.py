@@ -21,6 +21,7 @@ from concurrent.futures import Executor as Pool
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
+from hashlib import sha256
 from importlib.metadata import version
 from itertools import islice
 from multiprocessing.process import BaseProcess
@@ -147,8 +148,8 @@ class _PoolExecutor(Executor, ABC):
 class ProcessExecutor(_PoolExecutor):
     """Flies the batches in processes of this machine, which are replaced when one of them dies.
 
-    Results come in files: if a process were killed while it writes a long one to the pipe, the pool would wait for the
-    rest for ever.
+    Campaigns and results travel in files: if a process were killed while a long one is on its way through a pipe, the
+    pool would wait for ever, for the rest of it or to get rid of it.
     """
 
     def __init__(self, workers: int, notice: Notice = lambda words: None) -> None:
@@ -194,10 +195,17 @@ class ProcessExecutor(_PoolExecutor):
 
     def _submit(self, job: Job, text: str, batch: int) -> Future[bytes]:
         try:
-            return self._call(_to_file, self._folder.name, job, text, batch)
+            return self._call(_to_file, job, self._written(text), batch)
         except BrokenProcessPool:  # a process died while it had nothing to do
             self._renew()
-            return self._call(_to_file, self._folder.name, job, text, batch)
+            return self._call(_to_file, job, self._written(text), batch)
+
+    def _written(self, text: str) -> Path:
+        """Return the file with the text of a campaign."""
+        path = Path(self._folder.name, sha256(text.encode()).hexdigest())
+        if not path.exists():
+            path.write_text(text, encoding="utf-8")
+        return path
 
     def _result(self, future: Future[bytes]) -> bytes:
         path = Path(future.result().decode())
@@ -214,10 +222,10 @@ class ProcessExecutor(_PoolExecutor):
         return f": stopped worker process {', '.join(stopped)}" if stopped else ""
 
 
-def _to_file(folder: str, job: Job, text: str, batch: int) -> bytes:
-    """Fly a batch, and return the path of the file with its result."""
-    path = Path(folder, str(batch))
-    path.write_bytes(job(text, batch))
+def _to_file(job: Job, campaign: Path, batch: int) -> bytes:
+    """Fly a batch of the campaign in a file, and return the path of the file with its result."""
+    path = campaign.with_name(f"{batch}")
+    path.write_bytes(job(campaign.read_text(encoding="utf-8"), batch))
     return bytes(path)
 
 
