@@ -91,7 +91,7 @@ def tampered_certificate(subject, field, draw):
     """Return ``subject`` with one entry of a field of its certificate changed by a thousandth, or another text.
 
     The accuracy of a model that agrees to rounding has a tolerance of 5 %, and multipliers are right if they prove
-    (27), which others do as well: one becomes nearly zero, with which it holds for no set.
+    (27), which others do as well: all of a vertex become nearly zero, with which it holds for no set.
     """
     share = 0.5 if field.startswith("model.accuracy") else -1.0 if field.endswith("multipliers") else 1e-3
     certificate = copy.deepcopy(subject.certificate)
@@ -99,7 +99,7 @@ def tampered_certificate(subject, field, draw):
     value = table[last]
     if isinstance(value, list) and not isinstance(value[0], str):
         values = np.array(value, object)
-        entry = tuple(int(draw.integers(n)) for n in values.shape)
+        entry = tuple(int(draw.integers(n)) for n in (values.shape[:1] if share == -1.0 else values.shape))
         values[entry] += 1 if isinstance(values[entry], int) else share * abs(values[entry]) + 1e-6
         table[last] = values.tolist()
     elif isinstance(value, float):

@@ -98,6 +98,11 @@ def test_a_wrong_field_is_named_with_what_was_expected(field, value, message):
     assert "\n" not in str(caught.value)
 
 
+def test_a_mode_may_be_undamped():
+    vehicle = parse_vehicle(changed("elastic_modes.damping_ratio_1.value", 0.0), "mine")
+    assert vehicle.decoupled.damping_ratio_1 == 0.0
+
+
 def test_no_more_parameters_are_uncertain_than_a_design_can_fly_the_corners_of():
     tables = vehicle_tables("parker")
     for row in tables["drag"].values():

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 
 from hsv.base.errors import DesignError
+from hsv.model.lpv.polytope import axis_weights, evaluate
 from hsv.model.lpv.tensor_product import hull_weights, smallest_weight, tensor_product
 
 ALTITUDES = np.linspace(100.0, 300.0, 17)
@@ -84,6 +85,15 @@ def test_weights_are_non_negative_and_sum_to_one_between_breakpoints_too(r):
     assert_allclose(between.sum(axis=1), 1.0, atol=1e-12)
     # Close to normal: the curve comes near every vertex.
     assert weights.max(axis=0).min() > 0.6
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 6])
+def test_weights_are_interpolated_by_splines_that_are_exact_for_polynomials(count):
+    """A line through two points, a parabola through three, and cubics through more."""
+    breakpoints, between = np.linspace(-1.0, 3.0, count), np.linspace(-1.0, 3.0, 31)
+    powers = np.arange(min(count, 4))
+    weights = axis_weights(breakpoints, breakpoints[:, None] ** powers, "cubic")
+    assert_allclose(evaluate(weights, between), between[:, None] ** powers, rtol=0.0, atol=1e-12)
 
 
 def test_smallest_weight_sees_between_breakpoints():
