@@ -2,14 +2,10 @@ import pytest
 
 
 @pytest.mark.long
-def test_a_figure_is_drawn_with_its_page(hsv_paper, tmp_path):
+def test_a_figure_is_drawn(hsv_paper, tmp_path):
     ran = hsv_paper("figures", "--only", "4", "--out", "drawn")
     assert ran.code == 0 and ran.err == "about 4 s on one processor\n"
-    assert sorted(path.name for path in (tmp_path / "drawn").iterdir()) == [
-        "figure_04.md",
-        "figure_04.pdf",
-        "figure_04.png",
-    ]
+    assert sorted(path.name for path in (tmp_path / "drawn").iterdir()) == ["figure_04.pdf", "figure_04.png"]
     assert not (tmp_path / "bags").exists()
 
 

@@ -33,11 +33,12 @@ def main() -> None:
 
 def figures(
     only: Annotated[list[int] | None, typer.Option(help="Draw only this figure of the paper; can be repeated.")] = None,
-    out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page of each figure.")] = Path("figures"),
+    out: Annotated[Path, typer.Option(help="Folder for a PDF and a PNG of each figure.")] = Path("figures"),
 ) -> None:
     """Draw the paper's figures from this project's designs and flights, for comparison with the paper's.
 
     The flights are computed in this process; those of the nodes, hsv run NAME, have the same numbers bit for bit.
+    docs/figures compares each figure with the paper's.
 
     Example: hsv-paper figures --only 9 --only 11 --out figures
     """
@@ -49,15 +50,15 @@ def figures(
     for number in only or ():
         if number not in FIGURES:
             raise QuantityError(f"only = {number}: expected one of {', '.join(map(str, FIGURES))}")
-    chosen = [figure for number, figure in FIGURES.items() if not only or number in only]
+    chosen = {number: draw for number, draw in FIGURES.items() if not only or number in only}
     check_folder(out, "out")
     out.mkdir(parents=True, exist_ok=True)
     print_estimate(_FIGURE * len(chosen), as_json=False)
     written: list[Path] = []
     with stages() as progress, matplotlib.rc_context(RC):
-        for done, figure in enumerate(chosen):
+        for done, (number, draw) in enumerate(chosen.items()):
             progress("figures", done, len(chosen))
-            written += save(figure.draw(), out / figure.stem, figure.page)
+            written += save(draw(), out / f"figure_{number:02}")
         progress("figures", len(chosen), len(chosen))
     print_written(written, as_json=False)
 
@@ -133,7 +134,9 @@ def _make(study: Study, out: Path, coarseness: float) -> None:
     out.mkdir(parents=True, exist_ok=True)
     with stages() as progress, matplotlib.rc_context(RC):
         outcome = study.run(Scope(coarseness, progress))
-        written = save(outcome.figure, out / study.name, study.page(outcome))
+        written = save(outcome.figure, out / study.name)
+    page = out / f"{study.name}.md"
+    page.write_text(study.page(outcome), encoding="utf-8")
     for table in outcome.tables:
         console.print(markdown(table), soft_wrap=True, highlight=False)
-    print_written(written, as_json=False)
+    print_written([*written, page], as_json=False)

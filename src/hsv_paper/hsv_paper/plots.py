@@ -67,14 +67,13 @@ def plain_log(axis: Axes) -> None:
     axis.yaxis.set_minor_formatter(NullFormatter())
 
 
-def save(figure: Figure, stem: Path, page: str) -> list[Path]:
-    """Write ``figure`` as vector PDF and as PNG, with its page; equal figures give equal files."""
-    pdf, png, text = (stem.with_suffix(suffix) for suffix in (".pdf", ".png", ".md"))
+def save(figure: Figure, stem: Path) -> list[Path]:
+    """Write ``figure`` as vector PDF and as PNG; equal figures give equal files."""
+    pdf, png = stem.with_suffix(".pdf"), stem.with_suffix(".png")
     with matplotlib.rc_context(RC):
         figure.savefig(pdf, metadata={"CreationDate": None})
         figure.savefig(png, dpi=150, metadata={"Software": None})
-    text.write_text(page, encoding="utf-8")
-    return [pdf, png, text]
+    return [pdf, png]
 
 
 def bode_panels() -> tuple[Figure, Axes, Axes]:

@@ -4,8 +4,5 @@ from __future__ import annotations
 
 from hsv_paper.figures import frequency, invariant_set, over_time
 
-FIGURES = {
-    figure.number: figure
-    for figure in sorted((*frequency.FIGURES, invariant_set.FIGURE, *over_time.FIGURES), key=lambda each: each.number)
-}
-"""All figures by the paper's number."""
+FIGURES = dict(sorted({**frequency.FIGURES, 6: invariant_set.figure_06, **over_time.FIGURES}.items()))
+"""The function that draws each figure, by the paper's number."""

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from hsv.base.units import FOOT
 from hsv.control.notch_filter import notch_response
 from hsv.model.lpv.linearisation import bode, frequency_response, linearise, zero_order_hold
 from hsv.model.signals import PITCH_RATE
@@ -22,7 +21,6 @@ from hsv_paper.designs import (
     extended_model,
     inputs_of,
 )
-from hsv_paper.figures.figure import PaperFigure
 from hsv_paper.linear_loop import ELEVATOR
 from hsv_paper.modes import elastic_modes, linearised, pitch_rate_response
 
@@ -30,7 +28,6 @@ POLE_FREQUENCIES = (10.0, 15.0, 20.0)
 POLE_DAMPINGS = (0.2, 0.5, 0.8)
 """Poles of the notch filters in Figure 3."""
 
-_BETWEEN = f"{BETWEEN[0] / FOOT:.0f} ft and {BETWEEN[1] / FOOT:.0f} ft/s"
 _POLYTOPIC: dict[str, Any] = {"color": plots.BLUE, "linestyle": ":", "linewidth": 2.0}
 _WITHOUT = {"color": plots.RED, "linestyle": "--"}
 
@@ -77,7 +74,7 @@ def figure_04() -> Figure:
         ("paper_like", plots.BLUE, "x", (12, -10), "left"),
         ("derived", plots.RED, "+", (-9, -3), "right"),
     ):
-        poles, style = _poles(name), {"color": color, "markersize": 7, "markeredgewidth": 1.4}
+        poles, style = np.linalg.eigvals(linearised(name)[0]), {"color": color, "markersize": 7, "markeredgewidth": 1.4}
         for axis in (whole, near):
             axis.plot(poles.real, poles.imag, marker, label=f"{name.replace('_', '-')} coupling", **style)
         for mode in elastic_modes(name).values():
@@ -92,15 +89,6 @@ def figure_04() -> Figure:
     whole.set_xlim(-2.4, 2.6)
     near.set_xlim(-0.02, 0.02)
     near.set_ylim(-0.1, 0.1)
-    rigid = sorted((p for p in _poles("paper_like") if abs(p) < 5.0), key=lambda p: -abs(p.real))
-    label = {"textcoords": "offset points", "fontsize": 8}
-    for pole in rigid[:2]:
-        whole.annotate(f"{pole.real:+.2f}", (pole.real, 0.0), (0, 8), ha="center", **label)
-    for pole in rigid[2:]:
-        text = (
-            f"{pole.real:+.4f}{pole.imag:+.3f}j" if pole.imag else f"|s| < {10.0 ** np.ceil(np.log10(abs(pole))):.0e}"
-        )
-        near.annotate(text, (pole.real, pole.imag), (10, -3), **label)
     for axis in (whole, near):
         axis.axvline(0.0, color="black", linewidth=0.5)
         axis.set_xlabel("Real part (1/s)")
@@ -157,69 +145,4 @@ def _compared(
     return figure
 
 
-def _poles(coupling: str) -> np.ndarray:
-    return np.linalg.eigvals(linearised(coupling)[0]).astype(complex)
-
-
-FIGURES = (
-    PaperFigure(
-        2,
-        "Bode diagram comparison of polytopic LPV and DM. (a) Amplitude frequency characteristic. (b) Phase frequency "
-        "characteristic.",
-        figure_02,
-        f"The response is from elevator deflection to pitch rate at {_BETWEEN}, between the samples of the model. Both "
-        "models are discrete, with the period of the design.",
-        "The two lines overlap.",
-        "The paper does not say which point, input and output it shows. Both lines belong to the decoupled model, so "
-        "the comparison says nothing about the effect of the neglected coupling (Figure 4).",
-    ),
-    PaperFigure(
-        3,
-        "Bode diagram of notch filter's effect on flexible hypersonic vehicle. (a) Effect of omega_p when epsilon_p = "
-        "0.5. (b) Effect of epsilon_p when omega_p = 15.",
-        figure_03,
-        "The response is from elevator to filtered pitch rate of the coupled model, with the paper-like coupling, "
-        "where Case 1 starts. The zeros are those of the design's filter.",
-        "The filter suppresses the peak of the first mode. A larger damping of the poles widens the notch.",
-        "The filter also acts away from its centre: below, it costs phase. If omega_p differs from omega_z, the gain "
-        "above the notch changes by (omega_p/omega_z)^2, 2.4 dB per 15 %; both should be moved together. The paper "
-        "gives neither its zeros nor the channel that it shows.",
-    ),
-    PaperFigure(
-        4,
-        "Open-loop pole distribution.",
-        figure_04,
-        "The figure shows the poles of the coupled model linearised where Case 1 starts (85500 ft, 7900 ft/s), for "
-        "both sets of inertial coupling.",
-        "There are five poles of the rigid body and two lightly damped pairs, the paper's seven motion modes. With the "
-        "paper-like coupling, the pairs are close to the structural frequencies. The rigid body is unstable.",
-        "With the coupling derived from a beam model, the first pair is not close to its structural frequency: the "
-        "paper-like set is a quarter of the derived one in order to agree with the paper's statement. The number seven "
-        "counts the slow pair of the rigid body as two modes.",
-    ),
-    PaperFigure(
-        5,
-        "Bode diagram of Notch filter on flexible modes.",
-        figure_05,
-        "The response is from elevator to pitch rate of the coupled model, with the paper-like coupling, where Case 1 "
-        "starts, without and with the design's filter.",
-        "The peak near the first mode falls far; that of the second mode, at the edge of the notch, falls partially.",
-        "The notch is centred at the value of the paper's Figure 3, and not at the mode itself, so that a dip at the "
-        "centre and a small peak at the mode remain next to each other. The lower centre also suits the derived "
-        "coupling, whose first mode is lower.",
-    ),
-    PaperFigure(
-        8,
-        "Bode diagram comparison of codesigned polytopic LPV model and ECM. (a) Amplitude frequency characteristics. "
-        "(b) Phase frequency characteristics.",
-        figure_08,
-        f"The response is from elevator deflection to filtered pitch rate at {_BETWEEN}, between the samples of the "
-        "model.",
-        "The co-designed model, which includes the notch, agrees with the ECM without its coupling.",
-        "With the ECM as the paper writes it, including the coupling (grey, paper-like), the co-designed model agrees "
-        "only below the elastic modes. No control-oriented model of the paper contains these modes: neglecting the "
-        "weak coupling is part of the design, and the price is that stability with flexibility must be shown by other "
-        "means.",
-    ),
-)
-"""Figures 2 to 5, and 8."""
+FIGURES = {2: figure_02, 3: figure_03, 4: figure_04, 5: figure_05, 8: figure_08}

@@ -13,7 +13,6 @@ from hsv.control.design import TubeSet
 from hsv.flight.metrics import FlightData
 from hsv.model.signals import N_RIGID
 from hsv_paper.designs import tube_of
-from hsv_paper.figures.figure import PaperFigure
 from hsv_paper.flights import flight_of
 from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, GREY, letter, new_figure
 
@@ -80,20 +79,3 @@ def _projection(axis: Axes, tube: TubeSet, plane: Plane) -> None:
     axis.fill(x, y, color=GREY, alpha=0.08, linewidth=0.0)
     axis.plot(*centre, "+", color=GREY, label="its centre")
     axis.set(xlabel=plane.labels[0], ylabel=plane.labels[1])
-
-
-FIGURE = PaperFigure(
-    6,
-    "The state of system in the mRPI set at the same time.",
-    figure_06,
-    f"The errors e = x - x_r - x_n with uncertain parameters are shown at the same {len(INSTANTS)} instants, from "
-    f"{INSTANTS[0]:g} s to {INSTANTS[-1]:g} s after the fault, in three projections of the certified ellipsoid. "
-    "Half of the lost elevator shifts the errors to the set's centre, so that the fault brings them closer to it.",
-    "The rigid-body errors stay inside the set, both with the notch and without it. The pitch-rate error is mostly "
-    "smaller with the notch.",
-    "The statement that the states are closer to the nominal trajectory with the notch is true of the pitch rate, "
-    "in which the vibration is visible. It is hardly true of the other states, which are determined by the lost "
-    "elevator and the parameters. The set is certified for the loop with the notch; without the notch, the figure "
-    "is no proof.",
-    (WITH, WITHOUT),
-)
