@@ -28,26 +28,10 @@ FREQUENCIES = np.geomspace(10.0, 25.0, 15001)
 
 
 class Peak(NamedTuple):
-    """A local maximum of a response: frequency (rad/s) and magnitude (dB)."""
+    """A local maximum of a response: magnitude (dB) and frequency (rad/s)."""
 
-    frequency: float
     magnitude: float
-
-
-class PeakFall(NamedTuple):
-    """The peak of a mode without the filter and the remaining peak with it; ``None``: no local maximum remains.
-
-    The peak lies beside the mode's natural frequency (rad/s), because the rest of the response adds to it.
-    """
-
-    natural_frequency: float
-    before: Peak
-    after: Peak | None
-
-    @property
-    def decibel(self) -> float:
-        """Reduction from peak to peak, dB; infinite if no peak remains."""
-        return float("inf") if self.after is None else self.before.magnitude - self.after.magnitude
+    frequency: float
 
 
 @cache
@@ -74,25 +58,23 @@ def pitch_rate_response(coupling: Coupling, frequencies: np.ndarray) -> np.ndarr
     return frequency_response(*linearised(coupling), frequencies)[:, PITCH_RATE, ELEVATOR]
 
 
-def highest_peak(frequencies: np.ndarray, response: np.ndarray, low: float, high: float) -> Peak | None:
-    """Return the highest local maximum of a response (f) between two frequencies (rad/s), ``None`` without one.
+def peaks(sections: Sequence[NotchSection]) -> dict[str, Peak]:
+    """Return the peak of each mode, elevator to pitch rate filtered by ``sections``; -inf dB if none remains.
 
-    The largest value would not do: at the edge of a window it is the flank of the other mode.
+    A peak lies beside the mode's natural frequency, because the rest of the response adds to it.
     """
-    magnitude = bode(response)[0]
-    found = [i for i in find_peaks(magnitude)[0] if low < frequencies[i] < high]
-    top = max(found, key=lambda i: magnitude[i], default=None)
-    return None if top is None else Peak(float(frequencies[top]), float(magnitude[top]))
-
-
-def peak_falls(sections: Sequence[NotchSection]) -> dict[str, PeakFall]:
-    """Return the effect of filter ``sections`` in series on the peak of each mode, elevator to filtered pitch rate."""
-    plain = pitch_rate_response("paper_like", FREQUENCIES)
-    filtered = plain * notch_response(sections, FREQUENCIES)
-    falls = {}
+    magnitude, _ = bode(pitch_rate_response("paper_like", FREQUENCIES) * notch_response(sections, FREQUENCIES))
+    # The largest value of a window would not do: at its edge it is the flank of the other mode.
+    maxima = find_peaks(magnitude)[0]
+    found = {}
     for name, mode in elastic_modes("paper_like").items():
-        window = ((1.0 - WINDOW) * mode.natural_frequency, (1.0 + WINDOW) * mode.natural_frequency)
-        before = highest_peak(FREQUENCIES, plain, *window)
-        assert before is not None
-        falls[name] = PeakFall(mode.natural_frequency, before, highest_peak(FREQUENCIES, filtered, *window))
-    return falls
+        near = [i for i in maxima if abs(FREQUENCIES[i] / mode.natural_frequency - 1.0) < WINDOW]
+        highest = (Peak(float(magnitude[i]), float(FREQUENCIES[i])) for i in near)
+        found[name] = max(highest, default=Peak(-np.inf, np.nan))
+    return found
+
+
+def peak_falls(sections: Sequence[NotchSection]) -> dict[str, float]:
+    """Return the reduction (dB) of each mode's :func:`peaks` by ``sections``; infinite if no peak remains."""
+    remaining = peaks(sections)
+    return {name: peak.magnitude - remaining[name].magnitude for name, peak in peaks(()).items()}

@@ -116,12 +116,6 @@ def shown(value: float, unit: str, digits: int = 4) -> str:
     return f"{number:.{digits}g}" + ("" if name == "1" else f" {name}")
 
 
-def nominal(table: Table, measure: str) -> float:
-    """Return a measure of the nominal vehicle."""
-    return float(table[measure][0])
-
-
-def worst(table: Table, measure: str) -> float:
-    """Return the largest magnitude over all vehicles; infinite where one diverged or does not define it."""
-    values = np.abs(table[measure])
+def worst(values: np.ndarray) -> float:
+    """Return the largest of the values of all vehicles; infinite where one diverged or does not define it."""
     return float(np.inf) if np.any(np.isnan(values)) else float(values.max())

@@ -30,7 +30,8 @@ from hsv.flight.side_by_side import fly_perturbed
 from hsv.model.lpv.linearisation import bode, bode_difference, frequency_response
 from hsv.model.signals import N_RIGID, PITCH_RATE
 from hsv.model.vehicle import Vehicle, load_vehicle
-from hsv_paper.claims.evidence import Evidence, nominal, worst
+from hsv_paper import modes
+from hsv_paper.claims.evidence import Evidence, worst
 from hsv_paper.designs import (
     CODESIGN_FREQUENCIES,
     certificate,
@@ -43,7 +44,6 @@ from hsv_paper.designs import (
 from hsv_paper.figures.frequency import POLE_DAMPINGS, POLE_FREQUENCIES
 from hsv_paper.flights import Point, flight_of, fly_over
 from hsv_paper.linear_loop import ELEVATOR, TARGET, Feedback, phase_margins
-from hsv_paper.modes import FREQUENCIES, elastic_modes, linearised, open_loop_modes, peak_falls, pitch_rate_response
 
 Numbers = dict[str, Any]
 
@@ -60,10 +60,9 @@ FAMILY = "case1_rmpc_fourth_k"
 # Section 3.1: the polytopic model and its disturbances.
 
 
-def vertices(evidence: Evidence, name: str = "baseline") -> Numbers:
-    """Return the number of vertices of a design's model."""
-    rows, columns = certificate(name)["model"]["vertices"]
-    return {"count": float(rows * columns)}
+def vertices(evidence: Evidence) -> Numbers:
+    """Return the numbers of vertices of the models of both designs."""
+    return {name: float(len(design(name).polytope.A)) for name in ("baseline", "adjustable")}
 
 
 def coupling(evidence: Evidence) -> Numbers:
@@ -75,7 +74,7 @@ def coupling(evidence: Evidence) -> Numbers:
     structural = {"first": vehicle.natural_frequency_1, "second": vehicle.natural_frequency_2}
 
     def shift(name: str) -> float:
-        return max(abs(mode.natural_frequency / structural[n] - 1.0) for n, mode in elastic_modes(name).items())
+        return max(abs(mode.natural_frequency / structural[n] - 1.0) for n, mode in modes.elastic_modes(name).items())
 
     return {
         "raised": float(np.abs(_rise()).max()),
@@ -87,7 +86,7 @@ def coupling(evidence: Evidence) -> Numbers:
 
 def _rise() -> np.ndarray:
     """Return the increase (dB) by coupling of the pitch-rate response to the elevator, about the elastic modes."""
-    coupled, alone = (bode(pitch_rate_response(name, FREQUENCIES))[0] for name in ("paper_like", 0.0))
+    coupled, alone = (bode(modes.pitch_rate_response(name, modes.FREQUENCIES))[0] for name in ("paper_like", 0.0))
     return coupled - alone
 
 
@@ -183,7 +182,7 @@ def nominal_inputs(evidence: Evidence) -> Numbers:
 
 def seven_modes(evidence: Evidence) -> Numbers:
     """Return the numbers of elastic and rigid-body modes of the coupled model, and of the rigid body's poles."""
-    found = open_loop_modes("paper_like")
+    found = modes.open_loop_modes("paper_like")
     rigid = [mode for mode in found if mode.natural_frequency < SLOWEST_ELASTIC]
     poles = sum(1 + (mode.pole.imag > 0.0) for mode in rigid)
     return {"elastic": len(found) - len(rigid), "rigid": len(rigid), "poles": poles}
@@ -192,9 +191,9 @@ def seven_modes(evidence: Evidence) -> Numbers:
 def underdamped(evidence: Evidence) -> Numbers:
     """Return the damping of the elastic modes, and the rise at their peaks."""
     raised = _rise()
-    first, second = (float(np.interp(fall.before.frequency, FREQUENCIES, raised)) for fall in peak_falls(()).values())
+    first, second = (float(np.interp(peak.frequency, modes.FREQUENCIES, raised)) for peak in modes.peaks(()).values())
     return {
-        "damping": max(mode.damping_ratio for mode in elastic_modes("paper_like").values()),
+        "damping": max(mode.damping_ratio for mode in modes.elastic_modes("paper_like").values()),
         "first": first,
         "second": second,
     }
@@ -203,10 +202,10 @@ def underdamped(evidence: Evidence) -> Numbers:
 def coupling_in_pitch_rate(evidence: Evidence) -> Numbers:
     """Return the shares of the pitch rate in the effects of coupling."""
     scale = np.array(list(certificate("baseline")["inputs"]["model"]["tensor_product"]["state_scale"].values()))
-    models = [linearised(name) for name in ("paper_like", 0.0)]
+    models = [modes.linearised(name) for name in ("paper_like", 0.0)]
     change = ((models[0][0] - models[1][0]) * scale / scale[:, None]) ** 2
     onto_rigid, onto_elastic = change[:N_RIGID, N_RIGID:], change[N_RIGID:, :N_RIGID]
-    answer, alone = (frequency_response(*model, FREQUENCIES)[:, :N_RIGID, ELEVATOR] for model in models)
+    answer, alone = (frequency_response(*model, modes.FREQUENCIES)[:, :N_RIGID, ELEVATOR] for model in models)
     moved = np.abs((answer - alone) / scale[:N_RIGID]) ** 2
     return {
         "onto_rigid": onto_rigid[PITCH_RATE].sum() / onto_rigid.sum(),
@@ -215,31 +214,18 @@ def coupling_in_pitch_rate(evidence: Evidence) -> Numbers:
     }
 
 
-def _falls(sections: Sequence[NotchSection]) -> dict[str, float]:
-    """Return the reduction (dB) of the peak of each mode."""
-    return {name: fall.decibel for name, fall in peak_falls(sections).items()}
-
-
-def peaks(evidence: Evidence) -> Numbers:
-    """Return the reductions (dB) of both peaks, with the design's filter and with one centred at each mode."""
-    section = design("baseline").notch[0]
-    fall = peak_falls([section])
-    at = fall["first"].natural_frequency
-    other = _falls(flown_sections(flight_parameters(load_scenario("case1_second_mode_notch"))))
-    return {
-        "first": fall["first"].decibel,
-        "second": fall["second"].decibel,
-        "first_centred": _falls([replace(section, zero_frequency=at, pole_frequency=at)])["first"],
-        "second_centred": other["second"],
-    }
-
-
 def falls(evidence: Evidence) -> Numbers:
-    """Return the reductions (dB) of both peaks, and the smallest of the first with Figure 3's poles."""
-    section = design("baseline").notch[0]
+    """Return the reductions (dB) of both peaks, with the design's filter and with one centred at each."""
+    section, at = design("baseline").notch[0], modes.elastic_modes("paper_like")["first"].natural_frequency
     changed = [replace(section, pole_frequency=w) for w in POLE_FREQUENCIES]
     changed += [replace(section, pole_damping=damping) for damping in POLE_DAMPINGS]
-    return _falls([section]) | {"least": min(_falls([one])["first"] for one in changed)}
+    second_mode = flown_sections(flight_parameters(load_scenario("case1_second_mode_notch")))
+    return {
+        **modes.peak_falls([section]),
+        "least": min(modes.peak_falls([one])["first"] for one in changed),
+        "first_centred": modes.peak_falls([replace(section, zero_frequency=at, pole_frequency=at)])["first"],
+        "second_centred": modes.peak_falls(second_mode)["second"],
+    }
 
 
 def passed(evidence: Evidence) -> Numbers:
@@ -251,7 +237,7 @@ def passed(evidence: Evidence) -> Numbers:
     above, *unmatched = (abs(bode(notch_response([one], far))[0][0]) for one in (section, *changed))
     return {
         "crossover": crossover,
-        "second": _falls([section])["second"],
+        "second": modes.peak_falls([section])["second"],
         "lag": lag,
         "slow_lag": slow_lag,
         "above": above,
@@ -273,7 +259,7 @@ def unit_circle(evidence: Evidence) -> Numbers:
         "ideal": distance(ideal),
         "ours": distance(ours),
         "zero_damping": ours.zero_damping,
-        "gained": _falls([ideal])["first"] - _falls([ours])["first"],
+        "gained": modes.peak_falls([ideal])["first"] - modes.peak_falls([ours])["first"],
     }
 
 
@@ -361,11 +347,6 @@ def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.
 # Section 4: the co-designed model, its gains and its sets.
 
 
-def codesign_vertices(evidence: Evidence) -> Numbers:
-    """Return the vertices of the co-designed model."""
-    return vertices(evidence, "adjustable")
-
-
 def conforms(evidence: Evidence) -> Numbers:
     """Return the differences between the co-designed model and the ECM, and where they are largest."""
     frequencies, inputs = CODESIGN_FREQUENCIES, inputs_of("adjustable")
@@ -424,14 +405,14 @@ def adjustable_step(evidence: Evidence) -> Numbers:
     """Return the settling time of velocity on the step of Case 1 relative to the baseline."""
     values = {**read_parameters(find_design("adjustable")), **load_scenario("case1").parameters()}
     tables = fly_over(Point(values, [{}])), evidence.corners("case1")
-    adjustable, baseline = (nominal(table, "velocity_settling_time") for table in tables)
+    adjustable, baseline = (float(table["velocity_settling_time"][0]) for table in tables)
     return {"tau": _tau(), "velocity": adjustable / baseline}
 
 
 def less_robust(evidence: Evidence) -> Numbers:
     """Return the ratio between the worst vehicle with tau and the worst one with the whole feedback."""
     ramp, whole = (
-        worst(evidence.corners(name), "post_fault_attitude_from_nominal") for name in ("case2", "case2_tau1")
+        worst(evidence.magnitudes(name, "post_fault_attitude_from_nominal")) for name in ("case2", "case2_tau1")
     )
     return {"tau": _tau(), "attitude": ramp / whole}
 

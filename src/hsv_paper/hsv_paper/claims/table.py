@@ -16,7 +16,7 @@ from hsv.base.processes import Progress
 from hsv.base.units import parse_quantity
 from hsv.model.actuators import IDEAL
 from hsv_paper.claims import numbers
-from hsv_paper.claims.evidence import Evidence, certified, shown
+from hsv_paper.claims.evidence import Evidence, certified, shown, worst
 
 Vehicle = Literal["uncertain", "nominal", "worst"]
 Actuators = Literal["none", "ideal", "elevator_150", "elevator_50", "elevator_20"]
@@ -191,9 +191,7 @@ class _Measured:
             return float(np.count_nonzero(~(values <= self.named(row.beyond))))
         if vehicle == "nominal":
             return float(values[0])
-        if row.at_least is not None:
-            return float(values.min())
-        return float(np.inf) if np.any(np.isnan(values)) else float(values.max())
+        return float(values.min()) if row.at_least is not None else worst(values)
 
     def _of_flights(self, row: Row, measured: Callable[..., Any]) -> Any:
         values = measured(row.flight, row.measure, *row.changes.items())

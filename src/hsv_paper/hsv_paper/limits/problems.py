@@ -13,11 +13,10 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from scipy.optimize import minimize
 
 from hsv.base.errors import TrimError
 from hsv.flight.metrics import SETTLING_BAND
-from hsv.model.dynamics import VehicleParameters, advance, derivative, forces, in_model_range
+from hsv.model.dynamics import VehicleParameters, advance, in_model_range
 from hsv.model.signals import N_STATES
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
@@ -32,10 +31,6 @@ LONGEST, TYPICAL = 60.0, 12.0
 
 REST = 0.4
 """Time from settling to rest, as a share of the time to settling: a longer one changes nothing."""
-
-MARGIN, GRID_ERROR = np.array([100.0, 10.0]), 5e-4
-"""Altitude (m) and velocity (m/s) beyond the trims, and relative margin for the rate between grid points, which its
-curvature lets exceed the largest rate at them by less."""
 
 DELAYS = (0.0, 0.1, 0.2)
 """Times (s) after which the effectiveness is known."""
@@ -63,11 +58,9 @@ def transfer(vehicle: VehicleParameters, periods: int, *, settling: bool, rest: 
         low[periods:, :2], high[periods:, :2] = target.state[:2] - band, target.state[:2] + band
     low[-1] = high[-1] = target.state
     inputs = np.tile([[vehicle.input_minimum], [vehicle.input_maximum]], (1, total, 1))
-    substeps, slope = (
-        np.full(total, max(2, round(TYPICAL / periods * SUBSTEPS / PERIOD))),
-        np.full(total, 1.0 / periods),
-    )
-    none, states, scalar = np.zeros(total), np.stack((low, high)), (1.0, LONGEST)
+    substeps = np.full(total, max(2, round(TYPICAL / periods * SUBSTEPS / PERIOD)))
+    none, slope = np.zeros(total), np.full(total, 1.0 / periods)
+    states, scalar = np.stack((low, high)), (1.0, LONGEST)
     return Problem(vehicle, none, slope, substeps, inputs, np.zeros_like(inputs), states, False, scalar)
 
 
@@ -87,43 +80,6 @@ def straight(problem: Problem, time: float) -> Point:
     state = start.state + share * (target.state - start.state)
     inputs = (start.input + share * (target.input - start.input))[:-1]
     return Point(time, state, inputs, np.zeros((len(inputs), N_STATES)))
-
-
-def time_bound(vehicle: VehicleParameters) -> float:
-    """Return a time (s) below which no input within U brings the vehicle from rest at the start to rest at the target.
-
-    Over such a transfer, the velocity changes by the difference of both trims and the altitude likewise; the path
-    angle does not change, nor do pitch rate and elastic rates, so that the pitching moment, too, is zero on average.
-    For any weights, the integral of R = dV/dt + a dh/dt + b dgamma/dt + c M / I is thus known, and the time is at least
-    that integral over the largest R. The weights are those of the best such bound. The largest R is that over U, over
-    angles of attack within the model's range, path angles up to 5 deg, and altitudes and velocities up to
-    :data:`MARGIN` outside those of the trims: the bound is for transfers that stay in there.
-    """
-    start, target = trim(vehicle, *START).state, trim(vehicle, *TARGET).state
-    change = target[:2] - start[:2]
-    altitudes, velocities = np.linspace(start[:2] - MARGIN, target[:2] + MARGIN, 3).T
-    fuel = np.array([vehicle.fuel_equivalence_ratio_minimum, vehicle.fuel_equivalence_ratio_maximum])
-    elevator = np.linspace(vehicle.elevator_deflection_minimum, vehicle.elevator_deflection_maximum, 121)
-    alpha = np.linspace(-vehicle.angle_limit, vehicle.angle_limit, 241)
-    path = np.radians([-5.0, 0.0, 5.0])
-    scale = np.array([vehicle.gravity / start[1], start[1], 1.0])
-    rows = []
-    # R is affine in the fuel, the thrust being so: its two limits are enough.
-    grid = product(*(axis.tolist() for axis in (altitudes, velocities, alpha, path, fuel, elevator)))
-    for h, V, angle, gamma, phi, delta in grid:
-        x, u = np.array([h, V, angle, angle + gamma, *[0.0] * 5]), np.array([phi, delta])
-        rates = derivative(x, u, vehicle)
-        rows.append((rates[0], rates[1], rates[2], forces(x, u, vehicle)[3]))
-    climb, acceleration, turn, moment = np.array(rows).T.copy()
-
-    def inverse(weights: np.ndarray) -> float:
-        a, b, c = weights * scale
-        largest = (acceleration + a * climb - b * turn + c * moment / vehicle.moment_of_inertia).max()
-        return -float((change[1] + a * change[0]) / largest)
-
-    simplex = np.array([[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.0, 0.2, 0.0], [1.0, 0.2, -10.0]])
-    found = minimize(inverse, simplex[0], method="Nelder-Mead", options={"initial_simplex": simplex, "fatol": 1e-3})
-    return -float(found.fun) * (1.0 - GRID_ERROR)
 
 
 def recovery(vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizon: float, divide: int = 1) -> Problem:

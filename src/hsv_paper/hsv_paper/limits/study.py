@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -101,7 +100,6 @@ def run(scope: Scope) -> Outcome:
     periods = PERIODS if whole else PERIODS // 2
     scope.progress("fastest transfers", 0, 4)
     rest, settled = (fastest_transfer(vehicle, periods, settling=settling) for settling in (False, True))
-    bound = problems.time_bound(vehicle)
     scope.progress("flights of the controllers", 1, 4)
     flights = {name: fly(assemble_flight(load_scenario(name))).data() for name in SCENARIOS}
     along = parse_scenario(governed("case1", BLEND).text, "case1")
@@ -133,9 +131,7 @@ def run(scope: Scope) -> Outcome:
             rest_mesh=rest.change,
             settled=settled.found.scalar,
             settled_mesh=settled.change,
-            bound=math.floor(100.0 * bound) / 100.0,
             periods=periods,
-            gap=100.0 * (rest.found.scalar / bound - 1.0),
         ),
         [settling(name, data) for name, data in flights.items()],
         _FAULT,
@@ -227,12 +223,7 @@ The fuel is at its upper limit nearly all the way, and the elevator keeps the an
 largest, first above and then below the trim's, so that the altitude changes by what is asked: velocity takes the time.
 Between 2 % and rest many inputs are as good, and those in the figure are one choice.
 
-The optimum is a local one, to which the iteration comes from different guesses. Independently of it, no transfer takes
-less than {bound:.2f} s: of every transfer between two trims the changes of velocity, altitude and path angle are known,
-and the mean pitching moment is zero; for the best weights of the four, the largest weighted rate that U permits gives
-this bound, for transfers within 100 m, 10 m/s and 5 deg of path angle of the trims. The optimum is thus within
-{gap:.1f} % of the fastest.
-For the time to 2 %, where the vehicle is not at rest, there is no such bound."""
+The optimum is a local one, to which the iteration comes from different guesses."""
 
 _FAULT = """## The deepest loss of effectiveness
 The vehicle is in the trim of Case 1's target when the elevator's effectiveness falls to P, for good. Until it is known,

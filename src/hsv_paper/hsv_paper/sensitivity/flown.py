@@ -21,7 +21,6 @@ from hsv_paper.sensitivity.sweep import (
     ALL,
     LOSSES,
     RMPC_DECOUPLED,
-    WITHOUT_NOTCH,
     Columns,
     Controller,
     draw_losses,
@@ -78,20 +77,16 @@ def coupling(scope: Scope) -> Outcome:
     axes[0].text(0.995, 1.32, "derived", color=plots.GREY, fontsize=8, ha="right")
     plots.letter(axes)
     legend(figure, shares=False)
-    limit = WITHOUT_NOTCH.loop.critical_coupling()
-    unstable = WITHOUT_NOTCH.loop.growths(load_vehicle().coupled("paper_like"), scope.over) >= 0.0
     return Outcome(
         figure,
         f"Case 1 on the coupled model, {in_words(scope.over)}. (a) Growth of the linear loops. (b), (c) Flights; a "
         "decay time of 100 s means that the rates have not decayed by the end of the flight. With κ = 0 and without "
-        "notch, RMPC is the controller of the paper, which flies it on the decoupled model only.",
+        "notch, RMPC is the controller of the paper, which flies it on the decoupled model only. The paper-like "
+        f"coupling is κ = {PAPER_LIKE:.2f}.",
         [
             {"controller": c.label, **coupling_limits(c.loop, scope.over), **lost_where(kappas, columns)}
             for c, columns in results.items()
         ],
-        f"The paper-like coupling is κ = {PAPER_LIKE:.2f}. The loop of the {WITHOUT_NOTCH.label} becomes unstable "
-        f"at κ = {rounded(limit, 4) or '–'} (nominal vehicle); with the paper-like coupling, it is "
-        f"unstable at {unstable[1:].sum()} of the {len(scope.over) - 1} corners.",
     )
 
 
@@ -118,12 +113,9 @@ def sampling(scope: Scope) -> Outcome:
             draw_growth(axis, kappas, loop, scope.over, (1.0, 0.9), **style)
             row |= {f"{name}: {what}": limit for what, limit in coupling_limits(loop, scope.over).items()}
         columns = sweep(scope, [controller], [period], point)[controller]
-        for metric, head, factor, digits in (
-            ("post_fault_attitude_deviation", "attitude excursion, deg", plots.DEGREES, 3),
-            ("elastic_decay_time", "decay, s", 1.0, 1),
-        ):
-            for which in ("nominal", "worst"):
-                row[f"{head}, {which}"] = rounded(factor * columns[f"{metric}_{which}"][0], digits)
+        for which in ("nominal", "worst"):
+            excursion = plots.DEGREES * columns[f"post_fault_attitude_deviation_{which}"][0]
+            row[f"attitude excursion, deg, {which}"] = rounded(excursion, 3)
         rows.append(row | {"lost, %": rounded(100.0 * (1.0 - columns["finished"][0]))})
     for axis, name in zip(axes, ("with the notch", "without"), strict=True):
         axis.set_title(name, loc="right")
@@ -220,13 +212,10 @@ def ramp(scope: Scope) -> Outcome:
             )
             for which in ("nominal", "worst")
         }
-        attitude = plots.DEGREES * columns["post_fault_attitude_from_nominal_worst"]
         return {
             "controller": controller.label,
             "ramp, s": rounded(lengths[index]),
             **errors,
-            "worst attitude from nominal over all ramps, deg": f"{attitude.min():.3f} to {attitude.max():.3f}",
-            "saturated flights over all ramps, %": rounded(100.0 * (1.0 - columns["without_limits"].min())),
         }
 
     return Outcome(
