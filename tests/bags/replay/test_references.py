@@ -6,8 +6,7 @@ import pytest
 
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import controller_of, flown_parameters, refuse_vacuous
-from hsv.bags.replay.engine import replay, rerun
-from hsv.bags.replay.processes import processes_of
+from hsv.bags.replay.engine import processes_of, replay, rerun
 from hsv.flight.scenario import load_scenario
 
 ROOT = Path(__file__).parents[3]

@@ -10,8 +10,7 @@ from recorded_flight import record_flight
 
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import flown_parameters, refuse_vacuous
-from hsv.bags.replay.engine import replay, rerun
-from hsv.bags.replay.processes import processes_of
+from hsv.bags.replay.engine import processes_of, replay, rerun
 from hsv.base.errors import RecordingError
 from hsv.model.faults.table import Fault
 

@@ -21,7 +21,7 @@ def offer(hub, messages, every=A_STEP):
 
 def test_rows_are_the_curves_of_the_report(hub, messages, bag):
     offer(hub, messages)
-    rows = hub.history(0, 0).rows
+    rows = hub.history(0, 0)[2]
     drawn = flight_curves(bag)
     np.testing.assert_allclose(rows[:, 0], drawn.time, rtol=1e-6)
     assert len(rows) == STEPS
@@ -32,7 +32,7 @@ def test_rows_are_the_curves_of_the_report(hub, messages, bag):
 
 def test_a_controller_without_a_tube_is_shown_without(hub, messages):
     offer(hub, [message for message in messages if message[0] != TUBE_STATUS], A_STEP - 1)
-    rows = hub.history(0, 0).rows
+    rows = hub.history(0, 0)[2]
     tube = np.array([False, *(curve.topic == TUBE_STATUS for _, curve in LIVE_CURVES)])
     assert len(rows) == STEPS and np.isnan(rows[:, tube]).all() and np.isfinite(rows[:, ~tube]).all()
     assert hub.status()["tau"] is None
@@ -55,12 +55,12 @@ def test_a_long_flight_is_thinned_and_keeps_its_beginning(hub, messages, monkeyp
     hub.start_run("2f" * 16, 0.02, 200)
     period = 20_000_000
     [state] = [index for index, message in enumerate(messages[:A_STEP]) if message[0] == "hsv/state"]
-    generation = hub.history(0, 0).generation
+    generation = hub.history(0, 0)[0]
     step = messages[state : state + 1] + [m for i, m in enumerate(messages[:A_STEP]) if i != state]
     for number in range(2500):
         for topic, _, data in step:
             # The bytes are those of step 0: what is looked at here is how many rows are kept.
             hub.offer(topic, number * period, data)
         hub.sample()
-    history = hub.history(generation, 0)
-    assert history.generation > generation and len(hub._rows) >= len(history.rows) > len(hub._rows) // 2
+    later, first, rows = hub.history(generation, 0)
+    assert later > generation and first == 0 and len(hub._rows) >= len(rows) > len(hub._rows) // 2

@@ -36,12 +36,12 @@ from hsv.bags.infrastructure_parameters import LIVE_PARAMETERS
 from hsv.bags.messages import stamp_in
 from hsv.graph.node_parameters import SETTABLE, step_in
 from hsv.graph.standstill import Standstill
+from hsv.model.signals import INPUT_NAMES
 from hsv.pages.layouts import foxglove_layout
 from hsv.pages.live.commands import Change, Command, Inject
 from hsv.pages.live.foxglove_server import FoxgloveServer
 from hsv.pages.live.hub import Hub
 from hsv.pages.live.server import Answer, PageServer
-from hsv.pages.panels import INPUTS
 from hsv_bringup.client import ABSENT_AFTER, SILENT_AFTER
 from hsv_bringup.flow_executor import FlowExecutor
 from hsv_node.main import run_node
@@ -185,7 +185,7 @@ class LiveNode(ProcessNode):
 
     def _on_limits(self, values: dict[str, Any]) -> None:
         low, high = (list(values.get(f"input.{end}") or ()) for end in ("minimum", "maximum"))
-        self.hub.update(limits=dict(zip(INPUTS, zip(low, high, strict=False), strict=False)))
+        self.hub.update(limits=dict(zip(INPUT_NAMES, zip(low, high, strict=False), strict=False)))
 
     def _check_plant(self) -> None:
         """Record the end of a run if the plant, which had published, has disappeared without announcing it."""

@@ -19,8 +19,15 @@ from hsv.bags.description import (
     TUBE_MPC,
     TUBE_STATUS,
 )
-from hsv.bags.equipment import effectors, equipment_topics, held, measurement_errors, moving_air
-from hsv.bags.flight import flight_fingerprint, input_columns
+from hsv.bags.flight import (
+    effectors,
+    equipment_topics,
+    flight_fingerprint,
+    held,
+    input_columns,
+    measurement_errors,
+    moving_air,
+)
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.steps import bag_warnings, complete_stamps, cut_off, joined

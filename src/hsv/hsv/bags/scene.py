@@ -9,8 +9,7 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from hsv.bags.description import ACTUATOR, STATE
-from hsv.bags.equipment import effectors, equipment_topics
-from hsv.bags.flight import input_columns, state_columns
+from hsv.bags.flight import effectors, equipment_topics, input_columns, state_columns
 from hsv.bags.metadata import CUSTOM_DATA
 from hsv.bags.reader import Bag
 from hsv.bags.steps import joined

@@ -127,17 +127,11 @@ def irregularities(bag: Bag) -> list[str]:
     if len(nowhere):
         first = f"the first at t = {nowhere[0] * 1e-9:.2f} s"
         words.append(f"lacks {len(nowhere)} of {len(every)} steps on all topics, {first}")
-    # Group the topics that lack the same steps.
-    lacking: dict[tuple[int, ...], list[str]] = {}
     for topic, stamp in stamps.items():
         if len(missing := np.setdiff1d(found, stamp)):
-            lacking.setdefault(tuple(missing.tolist()), []).append(topic)
-    for missed, topics in lacking.items():
-        first = f"the first at t = {missed[0] * 1e-9:.2f} s"
-        more = "more " if len(nowhere) else ""
-        verb = "lacks" if len(topics) == 1 else "lack"
-        words.append(f"{', '.join(topics)} {verb} {len(missed)} {more}of {len(every)} steps, {first}")
-    for topic, stamp in stamps.items():
+            first = f"the first at t = {missing[0] * 1e-9:.2f} s"
+            more = "more " if len(nowhere) else ""
+            words.append(f"{topic} lacks {len(missing)} {more}of {len(every)} steps, {first}")
         if len(late := stamp[1:][stamp[1:] <= stamp[:-1]]):
             words.append(f"{topic} is out of order at t = {late[0] * 1e-9:.2f} s")
     return words

@@ -41,7 +41,6 @@ def replay(
     from hsv.bags.reader import Bag
     from hsv.bags.replay import engine
     from hsv.bags.replay.attached import controller_of, estimated, flown_parameters, refuse_vacuous, supply
-    from hsv.bags.replay.processes import processes_of
     from hsv.flight.assembly import require_trust
 
     opened = Bag(bag)
@@ -51,7 +50,7 @@ def replay(
     controller = controller_of(values)
     # Every section needs the controller: that of a single node in the bag's parameters may lack it.
     values = values.updated({"controller": controller})
-    processes = processes_of(controller, estimated(values))
+    processes = engine.processes_of(controller, estimated(values))
     if node and node not in processes:
         raise ParameterError(f"node = {node!r}: expected {one_of(processes, node)}")
     if node and rerun:

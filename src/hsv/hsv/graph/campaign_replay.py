@@ -62,8 +62,7 @@ def replay_over_dds(
         ParameterError: The results name code, or a design in another folder, and are not trusted.
         RunError: A process failed; its last words are in the message.
     """
-    from hsv.bags.equipment import equipment_topics, measurement_errors
-    from hsv.bags.flight import flight_data, flight_fingerprint
+    from hsv.bags.flight import equipment_topics, flight_data, flight_fingerprint, measurement_errors
     from hsv.bags.reader import Bag
     from hsv.bags.steps import joined
     from hsv.graph.flight import fly_graph

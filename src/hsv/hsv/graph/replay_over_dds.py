@@ -10,8 +10,7 @@ from hsv.bags.description import PEER_EMULATOR, PLANT, RUN, STATE, NodeDescripti
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import estimated
-from hsv.bags.replay.engine import ProcessComparison, compare_process, require
-from hsv.bags.replay.processes import processes_of
+from hsv.bags.replay.engine import ProcessComparison, compare_process, processes_of, require
 from hsv.base.errors import RecordingError
 from hsv.base.processes import Progress
 from hsv.graph.launcher import Launcher, parameter_arguments
@@ -28,7 +27,7 @@ def replay_all(
     """
     under_test = [processes_of(controller, estimated(values))[name] for name in names]
     for process in under_test:
-        require(bag, (*process.inputs, *process.outputs))
+        require(bag, (*process.inputs, *process.node.publishes))
     if not bag.messages(RUN):
         raise RecordingError(f"{bag.path}: topic {bag.name_of(RUN)}: no message, expected the announcement of the run")
     for process in under_test:
@@ -44,7 +43,7 @@ def replay_all(
             steps = len(bag.messages(STATE))
             _run((process.node, PEER_EMULATOR), run, Path(folder), name, steps, progress)
             made = Bag(answers)
-            yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
+            yield compare_process(bag, process, {topic: made.track(topic) for topic in process.node.publishes})
 
 
 def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progress) -> Iterator[ProcessComparison]:
@@ -57,7 +56,7 @@ def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progre
         _run(graph(controller, estimated(values)), values.updated(run), Path(folder), PLANT.name, steps, progress)
         made = Bag(repeated)
         for process in processes_of(controller, estimated(values)).values():
-            yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
+            yield compare_process(bag, process, {topic: made.track(topic) for topic in process.node.publishes})
 
 
 def _run(

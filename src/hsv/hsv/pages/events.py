@@ -12,7 +12,7 @@ from hsv.bags.columns import expecting_fields
 from hsv.bags.description import COMMAND, DIAGNOSTICS, PARAMETER_EVENTS, ROSOUT, STATE
 from hsv.bags.info import intervals, parameters_in_words
 from hsv.bags.reader import Bag
-from hsv.pages.panels import INPUTS
+from hsv.model.signals import INPUT_NAMES
 from hsv.pages.text import quantity
 
 JOIN_WITHIN = 0.5
@@ -91,7 +91,7 @@ def _saturation(bag: Bag) -> Iterator[Event]:
     if COMMAND not in bag.roles:
         return
     columns = bag.columns(COMMAND)
-    for column, name in enumerate(INPUTS):
+    for column, name in enumerate(INPUT_NAMES):
         text = f"command of {name.replace('_', ' ')} limited"
         limited = intervals(columns["header.stamp"], columns["saturated"][:, column])
         yield from _joined(Event(each["start_s"], each["end_s"], "saturation", text, name) for each in limited)

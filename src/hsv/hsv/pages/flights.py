@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from hsv.bags.description import STATE, TUBE_STATUS
-from hsv.bags.equipment import effectors, equipment_topics, measurement_errors, moving_air
-from hsv.bags.flight import flight_data, labels
+from hsv.bags.flight import effectors, equipment_topics, flight_data, labels, measurement_errors, moving_air
 from hsv.bags.info import describe
 from hsv.bags.reader import Bag
 from hsv.bags.steps import completeness, joined
@@ -19,8 +18,9 @@ from hsv.control.design import parse_parameters
 from hsv.flight.limits import Verdict, verdicts
 from hsv.flight.metrics import flight_metrics
 from hsv.flight.scenario import Scenario, parse_scenario
+from hsv.model.signals import INPUT_NAMES
 from hsv.pages.events import Event, flight_events
-from hsv.pages.panels import AIR_PANELS, INPUTS, MEASUREMENT_ERRORS, PANELS, Kind, Panel, error_panel
+from hsv.pages.panels import AIR_PANELS, MEASUREMENT_ERRORS, PANELS, Kind, Panel, error_panel
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class ReportedRun:
         """Minimum and maximum of each input by the design, SI; empty without a design."""
         design = self.parameters["design"]
         ends = zip(design.get("input.minimum", []), design.get("input.maximum", []), strict=False)
-        return dict(zip(INPUTS, ends, strict=False))
+        return dict(zip(INPUT_NAMES, ends, strict=False))
 
 
 def reported_runs(bags: Sequence[Bag]) -> list[ReportedRun]:

@@ -6,54 +6,13 @@ import json
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from hsv.bags.description import (
-    ACTUATOR,
-    COMMAND,
-    DIAGNOSTICS,
-    FORCES,
-    MARKERS,
-    NOMINAL,
-    ROSOUT,
-    TUBE_STATUS,
-    resolved,
-)
+from hsv.bags.description import ACTUATOR, COMMAND, DIAGNOSTICS, MARKERS, ROSOUT, TUBE_STATUS, resolved
 from hsv.model.airframe.pose import LEVEL, Sample, transforms
 from hsv.model.airframe.scene import SCENE_TOPIC
 from hsv.model.signals import N_RIGID
-from hsv.pages.panels import ERRORS, GROUPS, PANELS, Curve, Kind, Panel, error_panel
+from hsv.pages.panels import GROUPS, PANELS, Panel, error_panel
 
 COLOURS = ("#0072b2", "#d55e00", "#57606a")
-
-FORCE_PANELS = (
-    ("Lift, drag, thrust", "N", ("lift", "drag", "thrust")),
-    ("Pitching moment", "N m", ("pitching_moment",)),
-    ("Dynamic pressure", "Pa", ("dynamic_pressure",)),
-)
-"""Title, unit and fields of the plots of forces."""
-
-
-def _tabs() -> dict[str, list[Panel]]:
-    """Return the plots by the title of their tab."""
-    tabs: dict[str, list[Panel]] = {heading: [] for heading in GROUPS.values()}
-    for panel in PANELS:
-        tabs[GROUPS[panel.group]].append(panel)
-        if panel.group == "trajectory":
-            deviation = Curve(Kind.nominal, "nominal", NOMINAL, (f"deviation.{panel.name}",))
-            title = f"{panel.title}, deviation of the nominal"
-            tabs[GROUPS["trajectory"]].append(Panel(panel.name, title, panel.unit, panel.group, (deviation,)))
-    for component in range(len(ERRORS)):
-        error = error_panel(component)
-        tube = {"c": "tube_centre", "z": "tube_half_width"}
-        more = (Curve(Kind.bound, label, TUBE_STATUS, (field,), component) for label, field in tube.items())
-        curves = (error.curves[0], *more)
-        tabs[GROUPS["tube"]].append(Panel(error.name, error.title, error.unit, error.group, curves))
-    tabs["Forces"] = [
-        Panel(
-            title, title, unit, "forces", tuple(Curve(Kind.actual, f.replace("_", " "), FORCES, (f,)) for f in fields)
-        )
-        for title, unit, fields in FORCE_PANELS
-    ]
-    return {title: panels for title, panels in tabs.items() if panels}
 
 
 def foxglove_layout(name_of: Callable[[str], str]) -> str:
@@ -73,13 +32,14 @@ def foxglove_layout(name_of: Callable[[str], str]) -> str:
         return {"value": f"{name_of(role)}.{field}", "label": label, "enabled": True, "timestampMethod": "headerStamp"}
 
     def plot(panel: Panel) -> str:
-        # Viewers do not add fields.
-        single = [curve for curve in panel.curves if len(curve.fields) == 1]
-        paths = []
-        for curve, colour in zip(single, COLOURS, strict=False):
-            field = curve.fields[0] if curve.column is None else f"{curve.fields[0]}[{curve.column}]"
-            look = {"color": colour, "showLine": True, "lineSize": 1.2}
-            paths.append(path(curve.label, curve.topic, field) | look)
+        # Viewers do not add fields: centre and half-width of the tube are drawn instead of its ends, other sums not.
+        fields = {}
+        for curve in panel.curves:
+            for field in curve.fields if len(curve.fields) == 1 or panel.group == "tube" else ():
+                name, index = field.removeprefix("-"), "" if curve.column is None else f"[{curve.column}]"
+                fields[name] = path(curve.label if len(curve.fields) == 1 else name, curve.topic, name + index)
+        look = {"showLine": True, "lineSize": 1.2}
+        paths = [found | look | {"color": colour} for found, colour in zip(fields.values(), COLOURS, strict=False)]
         title = f"{panel.title} [{'-' if panel.unit == '1' else panel.unit}]"
         shown = ("isSynced", "showLegend", "showPlotValuesInLegend", "showXAxisLabels", "showYAxisLabels")
         values = {"title": title, "paths": paths, "xAxisVal": "timestamp", "legendDisplay": "top"}
@@ -101,15 +61,13 @@ def foxglove_layout(name_of: Callable[[str], str]) -> str:
     rigid = _split("column", list(map(plot, PANELS[:N_RIGID])))
     flight = _split("row", [placed("3D", _airframe()), rigid], first=62.0)
     log = placed("RosOut", {"topicToRender": ROSOUT, "searchTerms": [], "minLogLevel": 1})
-    diagnostics = {"topicToRender": name_of(DIAGNOSTICS), "minLevel": 0, "pinnedIds": [], "hardwareIdFilter": ""}
-    below = [
-        placed("DiagnosticSummary", diagnostics | {"sortByLevel": True}),
-        placed("RawMessages", {"topicPath": name_of(ACTUATOR), "diffEnabled": False}),
-    ]
+    diagnostics = placed("DiagnosticSummary", {"topicToRender": name_of(DIAGNOSTICS), "minLevel": 0})
+    panels = (*PANELS, *map(error_panel, range(N_RIGID)))
+    grouped = {heading: [panel for panel in panels if panel.group == group] for group, heading in GROUPS.items()}
     tabs = {
         "Flight": _split("column", [flight, states], first=80.0),
-        **{title: rows(panels) for title, panels in _tabs().items()},
-        "Messages": _split("column", [log, _split("row", below)]),
+        **{heading: rows(found) for heading, found in grouped.items() if found},
+        "Messages": _split("column", [log, diagnostics]),
     }
     listed = [{"title": title, "layout": layout} for title, layout in tabs.items()]
     tab = placed("Tab", {"activeTabIdx": 0, "tabs": listed})

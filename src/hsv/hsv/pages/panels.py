@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hsv.bags.description import ACTUATOR, COMMAND, FILTERED_STATE, NOMINAL, STATE, TUBE_STATUS
-from hsv.model.signals import STATE_NAMES, STATE_UNITS
+from hsv.model.signals import N_RIGID, STATE_NAMES, STATE_UNITS
 
 
 class Kind(StrEnum):
@@ -70,8 +70,6 @@ GROUPS = {
 }
 """Headings of the groups, in the order of the page."""
 
-INPUTS = ("fuel_equivalence_ratio", "elevator_deflection")
-
 
 def _state(group: str, title: str, unit: str, field: str, *more: Curve) -> Panel:
     curves = (
@@ -118,14 +116,6 @@ PANELS = (
 )
 """The panels that every flight has; that of the level only with an invariant set."""
 
-ERRORS = (
-    ("Error of altitude", "m"),
-    ("Error of velocity", "m/s"),
-    ("Error of angle of attack", "rad"),
-    ("Error of pitch angle", "rad"),
-    ("Error of pitch rate", "rad/s"),
-)
-
 MEASUREMENT_ERRORS = {
     name: Panel(f"measurement_error_{name}", f"Measured less true {name.replace('_', ' ')}", unit, "sensors")
     for name, unit in zip(STATE_NAMES, STATE_UNITS, strict=True)
@@ -142,10 +132,10 @@ AIR_PANELS = {
 
 def error_panel(component: int) -> Panel:
     """Return the panel of a component of the tube error: five rigid states, then pairs of notch-filter states."""
-    if component < len(ERRORS):
-        title, unit = ERRORS[component]
+    if component < N_RIGID:
+        title, unit = f"Error of {STATE_NAMES[component].replace('_', ' ')}", STATE_UNITS[component]
     else:
-        number = component - len(ERRORS)
+        number = component - N_RIGID
         title, unit = f"Error of notch state {number + 1}", ("rad", "rad s")[number % 2]
     curves = (
         Curve(Kind.actual, "e", TUBE_STATUS, ("error",), component),
@@ -155,5 +145,5 @@ def error_panel(component: int) -> Panel:
     return Panel(f"error_{component + 1}", title, unit, "tube", curves, shading="tube")
 
 
-LIVE_CURVES = [(panel, curve) for panel in (*PANELS, *map(error_panel, range(len(ERRORS)))) for curve in panel.curves]
+LIVE_CURVES = [(panel, curve) for panel in (*PANELS, *map(error_panel, range(N_RIGID))) for curve in panel.curves]
 """The curves of the live page with their panels, in the order of its columns."""

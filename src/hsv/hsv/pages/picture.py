@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 
 from hsv.base.units import UnitSystem, in_system
 from hsv.pages.engine import Numbers, Plot
 from hsv.pages.text import number
-
-STRETCHES = 400
-"""Number of intervals of the axis; a curve keeps its minimum and maximum in each, so that no peak is lost."""
 
 WIDTH, HEIGHT = 1000.0, 100.0
 """Size of a drawing; the page scales it."""
@@ -39,7 +37,6 @@ class Picture(NamedTuple):
     """Drawings over one axis; a shade has its start and its width in percent."""
 
     drawings: list[Drawing]
-    axis: str
     ticks: list[Tick]
     shades: list[tuple[float, float]]
 
@@ -49,13 +46,12 @@ def picture(
     numbers: Numbers,
     end: float,
     shades: Sequence[tuple[float, float]] = (),
-    axis: str = "time [s]",
     kinds: Sequence[str] = DRAWN,
 ) -> Picture:
-    """Return the picture of ``plots``, all over 0 ... ``end``, with stretches of the axis shaded."""
+    """Return the picture of ``plots``, all over the time 0 ... ``end`` (s), with stretches of it shaded."""
     marked = [(100.0 * start / end, 100.0 * (stop - start) / end) for start, stop in shades]
     drawings = [_drawing(plot, numbers, end, kinds) for plot in plots]
-    return Picture(drawings, axis, _ticks(0.0, end, 1.0, 8), marked)
+    return Picture(drawings, _ticks(0.0, end, 1.0, 8), marked)
 
 
 def _drawing(plot: Plot, numbers: Numbers, end: float, kinds: Sequence[str]) -> Drawing:
@@ -76,33 +72,17 @@ def _drawing(plot: Plot, numbers: Numbers, end: float, kinds: Sequence[str]) -> 
                 y = np.append(y, numbers.array(curves["low"][0]["y"])[::-1])
             elif run is not None:
                 look = f"run{run % 6} {kind}"
-            if kind != "high":
-                x, y = _thinned(x, y)
             paths.append((look, _path(WIDTH * x / end, HEIGHT * (high - y) / (high - low)), run))
     scales = {str(system): in_system(1.0, plot.unit, system, share=plot.share)[0] for system in UnitSystem}
     return Drawing(plot, paths, {system: _ticks(low, high, scale, 4) for system, scale in scales.items()})
 
 
-def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points of smallest and largest value of each stretch, in order, and both ends."""
-    if len(y) <= 2 * STRETCHES:
-        return x, y
-    kept = {0, len(y) - 1}
-    for rows in np.array_split(np.arange(len(y)), STRETCHES):
-        if np.isfinite(y[rows]).any():
-            kept |= {int(rows[np.nanargmin(y[rows])]), int(rows[np.nanargmax(y[rows])])}
-    found = sorted(kept)
-    return x[found], y[found]
-
-
 def _path(across: np.ndarray, down: np.ndarray) -> str:
-    """Return SVG path data through points, interrupted where one is not finite."""
-    parts, pen = [], "M"
-    for x, y in zip(across, down, strict=True):
-        if np.isfinite(y):
-            parts.append(f"{pen}{x:.4g} {y:.4g}")
-        pen = "L" if np.isfinite(y) else "M"
-    return "".join(parts)
+    """Return SVG path data through the finite points, without those that change less than a tenth of a pixel."""
+    drawn = Path(np.column_stack((across, down))).cleaned(remove_nans=True, simplify=True)
+    pens, points = {Path.MOVETO: "M", Path.LINETO: "L"}, np.asarray(drawn.vertices)
+    codes = np.asarray(drawn.codes).tolist()
+    return "".join(f"{pens[code]}{x:.4g} {y:.4g}" for code, (x, y) in zip(codes, points, strict=True) if code in pens)
 
 
 def _ticks(low: float, high: float, scale: float, count: int) -> list[Tick]:

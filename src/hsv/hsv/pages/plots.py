@@ -8,21 +8,15 @@ from pathlib import Path
 from textwrap import fill
 
 import matplotlib
+import numpy as np
 from matplotlib.figure import Figure
 
 from hsv.base.units import UnitSystem, in_system
 from hsv.flight.metrics import FlightData
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 
-_PANELS = (
-    ("altitude", "m", "state", 0),
-    ("velocity", "m/s", "state", 1),
-    ("angle of attack", "rad", "state", 2),
-    ("pitch rate", "rad/s", "state", 4),
-    ("elastic rate 1", "kg^0.5 m/s", "state", 6),
-    ("elastic rate 2", "kg^0.5 m/s", "state", 8),
-    ("fuel equivalence ratio", "1", "command", 0),
-    ("elevator deflection", "rad", "command", 1),
-)
+_NAMES, _UNITS = (*STATE_NAMES, *INPUT_NAMES), (*STATE_UNITS, *INPUT_UNITS)
+_STATES = ("altitude", "velocity", "angle_of_attack", "pitch_rate", "elastic_rate_1", "elastic_rate_2")
 
 _REMARK_WIDTH = 130
 """Characters in a line of a remark."""
@@ -38,25 +32,27 @@ def flight_figure(flights: Mapping[str, FlightData], system: UnitSystem, remarks
         system: Units that are drawn.
         remarks: Remarks on the flights, such as missing steps, printed above the panels.
     """
-    moving = [
-        (title, unit, group, column)
-        for title, unit, group, column in _PANELS
-        if not title.startswith("elastic") or any(flight.state[:, column].any() for flight in flights.values())
+    histories = {label: np.hstack((flight.state, flight.command)) for label, flight in flights.items()}
+    panels = [
+        column
+        for column in map(_NAMES.index, (*_STATES, *INPUT_NAMES))
+        if not _NAMES[column].startswith("elastic") or any(history[:, column].any() for history in histories.values())
     ]
-    rows = (len(moving) + 1) // 2
+    rows = (len(panels) + 1) // 2
     with matplotlib.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
         figure = Figure(figsize=(10, 2.25 * rows), layout="constrained")
         axes = figure.subplots(rows, 2, sharex=True).ravel()
-        for axis, (title, unit, group, column) in zip(axes, moving, strict=True):
-            factor, shown = in_system(1.0, unit, system)
+        first = next(iter(flights.values()))
+        for axis, column in zip(axes, panels, strict=True):
+            factor, shown = in_system(1.0, _UNITS[column], system)
             for name, flight in flights.items():
-                axis.plot(flight.time, factor * getattr(flight, group)[:, column], linewidth=1.1, label=name)
-            first = next(iter(flights.values()))
-            if group == "state" and column < 2:
+                axis.plot(flight.time, factor * histories[name][:, column], linewidth=1.1, label=name)
+            if _NAMES[column] in ("altitude", "velocity"):
                 axis.plot(first.time, factor * first.reference[:, column], "k:", linewidth=1.0, label="reference")
             if first.fault_start is not None:
                 axis.axvspan(first.fault_start, first.time[-1], color="tab:red", alpha=0.06, linewidth=0)
-            axis.set_title(f"{title}{'' if unit == '1' else f' [{_mathtext(shown)}]'}", loc="left", fontsize=9)
+            unit = "" if _UNITS[column] == "1" else f" [{_mathtext(shown)}]"
+            axis.set_title(_NAMES[column].replace("_", " ") + unit, loc="left", fontsize=9)
             axis.grid(alpha=0.25, linewidth=0.5)
             axis.margins(x=0)
         if remarks:

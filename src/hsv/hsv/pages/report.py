@@ -70,7 +70,6 @@ def report_page(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.m
         sections=sections,
         groups=groups,
         sentence=sentence(runs),
-        happened=happened(runs[0]) if len(runs) == 1 else "",
         verdict=verdict,
         step_times=step_times_in_words,
         picture=_picture(runs, plots, numbers),
@@ -125,21 +124,6 @@ def _one(run: ReportedRun, limits: str) -> str:
     if run.incomplete:
         parts.append(f"recorded are {run.incomplete}")
     return "; ".join(parts)
-
-
-def happened(run: ReportedRun) -> str:
-    """Return a summary of the events of a flight."""
-    faults, tube = run.description["faults"] or (), run.description["tube"]
-    text = "no fault"
-    if faults:
-        more = f" and {len(faults) - 1} more" if len(faults) > 1 else ""
-        kind, channel = in_words(faults[0]["type"]), in_words(faults[0]["channel"])
-        text = f"{kind} of the {channel} from {number(faults[0]['start_s'])} s{more}"
-    if tube and tube["checked_steps"]:
-        outside, checked = tube["outside_steps"], tube["checked_steps"]
-        where = f"left the invariant set in {outside} of {checked} steps" if outside else "stayed in the invariant set"
-        text += f"; the error {where}, largest level {number(tube['largest_level'], 3)}"
-    return f"{capitalised(text)}."
 
 
 def _plot(panel: Panel, runs: Sequence[ReportedRun], numbers: Numbers) -> Plot:

@@ -12,15 +12,12 @@ from hsv.pages.layouts import foxglove_layout
 
 
 class Viewer(NamedTuple):
-    """A program that opens an MCAP file."""
+    """A program that opens an MCAP file: where it comes from, and how it is called with the path of a file."""
 
     name: str
     programs: tuple[str, ...]
-    """Names under which it may be installed."""
     source: str
-    """Address of the download."""
     options: tuple[str, ...] = ()
-    """Words before the path of the file."""
     scene: bool = False
     """Whether it draws the vehicle in 3-D, from a copy of the bag, with the layout imported by hand."""
 

@@ -10,19 +10,71 @@ from rosbags.typesys.store import Typestore
 
 from hsv.bags.columns import Track, expecting_fields
 from hsv.bags.compare import Comparison, compare
-from hsv.bags.description import COMMAND, TOPICS, step_topics
+from hsv.bags.description import COMMAND, STATE, TOPICS, NodeDescription, graph, step_topics
 from hsv.bags.messages import StepMessages, stamp_in, stamp_of
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import broken_off, complete_steps, estimated
-from hsv.bags.replay.processes import Process, processes_of
 from hsv.base.errors import RecordingError
 from hsv.base.processes import Progress
-from hsv.flight.blocks import Signals
+from hsv.flight.blocks import LOOP, VEHICLE, Signals
 
 PROGRESS_INTERVAL = 200
 
 NOTHING: Mapping[str, Track] = {}
+
+_TOLERANCES = {
+    "plant": (
+        1e-10,
+        "one period from the recorded state: the vehicle alone is unstable, and a longer flight without its controller "
+        "would magnify a difference in the last bit",
+    ),
+    "notch_filter": (1e-12, "a stable filter, in which rounding errors decay"),
+    "nominal_trajectory": (
+        1e-10,
+        "a contracting system that runs on its own for the whole flight; laws solved in flight stop at a tolerance",
+    ),
+    "tube_mpc": (1e-10, "the level in the set is a quadratic form whose terms of both signs nearly cancel"),
+    "robust_mpc": (1e-12, "one matrix product without memory"),
+    "controller": (1e-10, "a custom controller may call libraries that round as their processor does"),
+    "fault_injector": (0.0, "one multiplication, the same on every processor"),
+}
+"""Absolute and relative tolerance of each node, and the reason for it."""
+
+
+@dataclass(frozen=True)
+class Process:
+    """A process under test: its node, and the tolerance, absolute and relative, within which numbers count as equal."""
+
+    node: NodeDescription
+    tolerance: float
+    reason: str
+
+    @property
+    def restarts(self) -> bool:
+        """Whether every step starts from the recorded state and input of the previous step, as for the plant."""
+        return self.node.block is VEHICLE
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Topics that a step subscribes to."""
+        return (*self.node.subscribes, STATE) if self.restarts else self.node.subscribes
+
+    @property
+    def delayed(self) -> tuple[str, ...]:
+        """Topics of which a step uses the message of the previous step; the first step has none."""
+        return self.inputs if self.restarts else self.node.delayed
+
+
+def processes_of(controller: str, estimator: bool = False) -> dict[str, Process]:
+    """Return the processes of a graph with ``controller``, by node, in the order in which a step passes through them.
+
+    A controller that is an external node is not among them, because it cannot be repeated here.
+    """
+    nodes = {node.block: node for node in graph(controller, estimator) if not node.foreign}
+    return {
+        nodes[block].name: Process(nodes[block], *_TOLERANCES[nodes[block].name]) for block in LOOP if block in nodes
+    }
 
 
 @dataclass(frozen=True)
@@ -47,11 +99,13 @@ class _Replica:
     """A process under test in this program: its component, and its messages as bytes."""
 
     def __init__(self, process: Process, values: ParameterSections, types: Typestore) -> None:
-        self.process = process
-        self.component = process.block.build(values.of(process.node.name))
+        assert process.node.block is not None
+        self.process, block = process, process.node.block
+        self.component = block.build(values.of(process.node.name))
+        self._step = block.step
         self._inputs = {topic: StepMessages(topic, types) for topic in process.inputs}
-        self._outputs = {topic: StepMessages(topic, types) for topic in process.outputs}
-        self.tracks = {topic: Track(topic, TOPICS[topic], types, [], [], "replay") for topic in process.outputs}
+        self._outputs = {topic: StepMessages(topic, types) for topic in process.node.publishes}
+        self.tracks = {topic: Track(topic, TOPICS[topic], types, [], [], "replay") for topic in process.node.publishes}
         self.ended = False
         """Whether the plant has reported the end of the flight."""
 
@@ -60,7 +114,7 @@ class _Replica:
         signals = Signals()
         for topic, message in inputs.items():
             self._inputs[topic].unpack(message, signals)
-        self.process.block.step(self.component, signals)
+        self._step(self.component, signals)
         if self.process.restarts:
             signals.stamp = stamp_of(signals.step, signals.period)
             self.ended = bool(signals.status)
@@ -78,7 +132,7 @@ def replay(bag: Bag, process: Process, values: ParameterSections, progress: Prog
         RecordingError: A topic is missing or recorded with another definition.
         ParameterError, DesignError: The component refuses its parameters.
     """
-    require(bag, process.outputs)
+    require(bag, process.node.publishes)
     recorded = {topic: bag.track(topic) for topic in process.inputs}
     steps = complete_steps(bag) if broken_off(bag) else complete_steps(bag, process.inputs)
     with expecting_fields(bag.path):
@@ -90,7 +144,7 @@ def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progre
     """Repeat the whole loop with the named ``controller`` and compare every step topic; it raises as :func:`replay`."""
     require(bag, step_topics(controller))
     processes = processes_of(controller, estimated(values))
-    known = any(COMMAND in process.outputs for process in processes.values())
+    known = any(COMMAND in process.node.publishes for process in processes.values())
     commands = {} if known else {COMMAND: bag.track(COMMAND)}
     limit = complete_steps(bag) if broken_off(bag) else None
     with expecting_fields(bag.path):
@@ -159,7 +213,7 @@ def compare_process(bag: Bag, process: Process, tracks: Mapping[str, Track]) -> 
     """Compare the outputs of ``process`` with those in ``bag``; of a run that was broken off, its complete steps."""
     limit = complete_steps(bag) if broken_off(bag) else None
     compared = []
-    for topic in process.outputs:
+    for topic in process.node.publishes:
         expected, actual = bag.track(topic), tracks[topic]
         if limit is not None:
             expected, actual = expected.cut(limit), actual.cut(limit)

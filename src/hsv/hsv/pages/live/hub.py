@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 from collections import defaultdict, deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from operator import attrgetter
 from typing import Any
@@ -25,16 +24,6 @@ _KEPT = 16
 
 _EVENTS = 200
 """Maximum number of events."""
-
-
-@dataclass(frozen=True)
-class History:
-    """Rows of the history from row ``first`` on; ``generation`` changes when the history restarts or is decimated."""
-
-    generation: int
-    first: int
-    rows: np.ndarray
-    """Time (s) and the values of :data:`hsv.pages.panels.LIVE_CURVES` (n, 1 + curves), single precision."""
 
 
 class Hub:
@@ -118,11 +107,15 @@ class Hub:
             self._count += 1
             self._update(self._status_of(messages))
 
-    def history(self, generation: int, first: int) -> History:
-        """Return the rows from ``first`` on for a reader of this ``generation``, or all rows if it is outdated."""
+    def history(self, generation: int, first: int) -> tuple[int, int, np.ndarray]:
+        """Return generation, first row and rows for a reader of ``generation``: those from ``first`` on, or all.
+
+        The generation changes when the history restarts or is decimated. Rows (n, 1 + curves; single precision) are
+        time (s) and the values of :data:`hsv.pages.panels.LIVE_CURVES`.
+        """
         with self._lock:
             first = first if generation == self._generation else 0
-            return History(self._generation, first, self._rows[first : self._count].astype("<f4"))
+            return self._generation, first, self._rows[first : self._count].astype("<f4")
 
     def status(self) -> dict[str, Any]:
         """Return all data except the rows, as plain data for JSON."""

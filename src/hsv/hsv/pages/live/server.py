@@ -156,20 +156,19 @@ class PageServer:
 
     async def _send(self, connection: ServerConnection) -> None:
         """Send changes of the hub, as fast as the client reads, and the last ones at the end."""
-        generation, rows, version, ended = 0, 0, -1, False
+        known, count, version, ended = 0, 0, -1, False
         with suppress(ConnectionClosed):
             while not ended:
                 ended = self._ended
                 if self._hub.version != version:
                     version = self._hub.version
                     await connection.send(json_text({"kind": "status", **self._hub.status()}))
-                history = self._hub.history(generation, rows)
-                if history.generation != generation:
-                    generation = history.generation
+                generation, first, rows = self._hub.history(known, count)
+                if generation != known:
                     await connection.send(json_text({"kind": "history"}))
-                rows = history.first + len(history.rows)
-                if len(history.rows):
-                    await connection.send(history.rows.tobytes())
+                known, count = generation, first + len(rows)
+                if len(rows):
+                    await connection.send(rows.tobytes())
                 await asyncio.sleep(PERIOD)
 
     def _receive(self, connection: ServerConnection, text: str | bytes) -> None:

@@ -102,17 +102,6 @@ async function inflate(id) {
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
 }
 
-/* An array as hsv.pages.engine packs it: bits as integers, each less the one before it, lowest bytes first. */
-function restored(buffer, offset, length) {
-  const bytes = new Uint8Array(buffer, offset, 4 * length), bits = new Uint32Array(length);
-  let last = 0;
-  for (let i = 0; i < length; i++) {
-    const step = bytes[i] | (bytes[i + length] << 8) | (bytes[i + 2 * length] << 16) | (bytes[i + 3 * length] << 24);
-    bits[i] = last = (last + step) >>> 0;
-  }
-  return new Float32Array(bits.buffer);
-}
-
 class Charts {
   /* `described` is the page's description of its plots; `buffer` holds their arrays, one after the other. */
   constructor(described, buffer, toolbar) {
@@ -120,7 +109,7 @@ class Charts {
     let offset = 0;
     this.arrays = (described.lengths || []).map((length) => {
       offset += 4 * length;
-      return restored(buffer, offset - 4 * length, length);
+      return new Float32Array(buffer, offset - 4 * length, length);
     });
     this.end = Math.max(1e-6, ...this.runs.map((run) => run.end));
     for (const panel of this.panels) Object.assign(panel, { element: document.getElementById(`plot-${panel.name}`), stale: true, y: null });

@@ -4,8 +4,8 @@
 const DEGREE = Math.PI / 180, FOOT = 0.3048;
 const QUANTITIES = ["altitude", "velocity", "angle_of_attack", "pitch_angle", "fuel_equivalence_ratio", "elevator_deflection"];
 const ELASTIC = ["elastic_coordinate_1", "elastic_coordinate_2"];
-/* Kinds of the curves that are drawn: of an input what moves the vehicle, as far as it is recorded. */
-const KINDS = { actual: ["effector", "actuator", "actual"], nominal: ["nominal"] };
+/* Kinds of the curves of the vehicle: of an input what moves it, as far as it is recorded. */
+const ACTUAL = ["effector", "actuator", "actual"];
 /* Pictures a second for readers who prefer little motion. */
 const CALM_RATE = 2;
 
@@ -99,16 +99,13 @@ class SideView {
   }
 }
 
-/* The pictures of a page: one for each flight, and one for the nominal trajectory if the figure has it. */
+/* The pictures of a page, one for each flight. */
 class Vehicle {
   constructor(charts, toolbar, slider) {
     Object.assign(this, { charts, time: 0, views: [] });
     for (const figure of document.querySelectorAll("#vehicle figure")) {
-      const run = Number(figure.dataset.run), own = this.series(run, figure.dataset.kind);
-      if (own) {
-        const nominal = figure.dataset.kind === "actual" && this.series(run, "nominal");
-        this.views.push({ view: new SideView(figure.querySelector(".side-view"), charts.airframe), run, own, nominal, at: figure.querySelector(".at") });
-      } else figure.remove();
+      const run = Number(figure.dataset.run), view = new SideView(figure.querySelector(".side-view"), charts.airframe);
+      this.views.push({ view, run, own: this.series(run, ACTUAL), nominal: this.series(run, ["nominal"]), at: figure.querySelector(".at") });
     }
     slider.addEventListener("input", () => this.change({ exaggeration: Number(slider.value) }));
     toolbar.listeners.push(() => this.change({ units: toolbar.units }));
@@ -121,10 +118,10 @@ class Vehicle {
   }
 
   /* The curves of a run by quantity, without elastic ones for a rigid vehicle; null unless all others are there. */
-  series(run, kind) {
+  series(run, kinds) {
     const found = Object.fromEntries([...QUANTITIES, ...ELASTIC].map((name) => {
       const curves = this.charts.panels.find((panel) => panel.name === name)?.curves.filter((curve) => curve.run === run) || [];
-      return [name, KINDS[kind].map((each) => curves.find((curve) => curve.kind === each)).find(Boolean)];
+      return [name, kinds.map((each) => curves.find((curve) => curve.kind === each)).find(Boolean)];
     }));
     return QUANTITIES.every((name) => found[name]) ? found : null;
   }
@@ -147,10 +144,8 @@ class Vehicle {
     for (const { view, run, own, nominal, at } of this.views) {
       const sample = this.sample(own);
       if (!sample) return;
-      if (nominal) {
-        sample.nominal = this.sample(nominal);
-        sample.faults = this.charts.runs[run].faults.filter((fault) => fault.from <= sample.time + 1e-6 && sample.time <= fault.to);
-      }
+      sample.nominal = nominal && this.sample(nominal);
+      sample.faults = this.charts.runs[run].faults.filter((fault) => fault.from <= sample.time + 1e-6 && sample.time <= fault.to);
       view.draw(sample);
       if (at) at.textContent = `${sample.time.toFixed(2)} s`;
     }
