@@ -1,20 +1,20 @@
 import re
+from functools import partial
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import GovernorError
-from hsv.control.design import find_design, read_design
+from hsv.control.design import PlanBounds, find_design, read_design
 from hsv.control.governor import (
     AT_REST,
     KEPT_FREE,
     NOTICE,
     Beginning,
-    CommandGovernor,
     Governor,
-    InputBounds,
     Leg,
+    command_in_flight,
     legs_of,
 )
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
@@ -29,9 +29,13 @@ LOW, HIGH = DESIGN.plan_bounds.input_minimum, DESIGN.plan_bounds.input_maximum
 BLEND = 4.0
 
 
+def governor(minimum, maximum, rate=(np.inf, np.inf)):
+    bounds = PlanBounds(np.array(minimum), np.array(maximum), np.empty(3), np.empty(3))
+    return Governor(nominal_data(DESIGN), VEHICLE, PERIOD, bounds, np.array(rate))
+
+
 def govern(*legs, blend=BLEND, minimum=LOW, maximum=HIGH, rate=(np.inf, np.inf)):
-    bounds = InputBounds(np.array(minimum), np.array(maximum), np.array(rate))
-    return Governor(nominal_data(DESIGN), VEHICLE, PERIOD, bounds).govern(START, legs, blend)
+    return governor(minimum, maximum, rate).govern(START, legs, blend)
 
 
 @pytest.fixture(scope="module")
@@ -53,9 +57,8 @@ def short_step():
 
 def problem(length, minimum=NARROW["minimum"], maximum=NARROW["maximum"], rate=(np.inf, np.inf), target=NEAR):
     """What is wrong with a ramp to a point near the start, of so many periods."""
-    governor = Governor(nominal_data(DESIGN), VEHICLE, PERIOD, InputBounds(minimum, maximum, np.array(rate)))
     corners = (SHORT_BLEND, *START), (SHORT_BLEND + length * PERIOD, *target)
-    return governor._problem([Corner(*corner, SHORT_BLEND) for corner in corners], AT_REST)
+    return governor(minimum, maximum, rate)._problem([Corner(*corner, SHORT_BLEND) for corner in corners], AT_REST)
 
 
 def column(found, name):
@@ -143,17 +146,17 @@ SHARP = [Corner(0.0, *START, 0.0), Corner(1.0, *START, 0.0), Corner(1.0, *NEAR, 
 
 
 def test_what_is_flown_stays_as_it_is_when_a_leg_is_added():
-    governor = Governor(nominal_data(DESIGN), VEHICLE, PERIOD, InputBounds(*NARROW.values(), np.full(2, np.inf)))
+    narrow = governor(**NARROW)
     deviation = np.array([0.5, 0.01, *np.zeros(7)])
     for known in ([Corner(0.0, *START, 0.0)], SHARP):
-        found, first = governor.continued(known, Leg(0.0, 1.5, *NEAR), SHORT_BLEND, Beginning(IN_FLIGHT, deviation))
+        found, first = narrow.continued(known, Leg(0.0, 1.5, *NEAR), SHORT_BLEND, Beginning(IN_FLIGHT, deviation))
         # It turns with the step that is flown next, or where the last corner before it is over.
         assert first == (IN_FLIGHT if len(known) == 1 else 200 + 1 - 10)
         assert list(found.corners[: len(known)]) == known
         assert found.end == pytest.approx((first + 10) * PERIOD + 1.5 + SHORT_BLEND)
         assert found.corners[-1][1:] == (*NEAR, SHORT_BLEND)
         assert np.array_equal(found.deviation[0], deviation)
-        before, after = (governor.trajectory(corners) for corners in (known, found.corners))
+        before, after = (narrow.trajectory(corners) for corners in (known, found.corners))
         rows = [trajectory.rows(500) for trajectory in (before, after)]
         pairs = ((getattr(each.data, name) for each in (before, after)) for name in ("state", "input", "defect"))
         for one, other in pairs:
@@ -162,19 +165,19 @@ def test_what_is_flown_stays_as_it_is_when_a_leg_is_added():
 
 
 def flying(values=None, design=DESIGN, steps=IN_FLIGHT):
-    """A nominal trajectory in level flight at the start after so many steps, and the governor of its commands."""
+    """A nominal trajectory in level flight at the start after so many steps, and the function that commands it."""
     reference = ReferenceTrajectory([0.0], *([value] for value in START), PERIOD, VEHICLE)
     trajectory = NominalTrajectory(design, reference)
     for _ in range(steps):
         trajectory.step(reference.final_state)
-    return trajectory, CommandGovernor.from_parameters(values or {}, design, trajectory)
+    return trajectory, partial(command_in_flight, values or {}, design, trajectory)
 
 
 def test_a_command_in_flight_is_flown_and_forgotten_with_the_run():
-    trajectory, governor = flying()
+    trajectory, command = flying()
     planned = trajectory.reference
     notice = round(NOTICE / PERIOD)
-    first, plan = governor.command(*NEAR, duration=1.5, blend=SHORT_BLEND)
+    first, plan = command(NEAR, duration=1.5, blend=SHORT_BLEND)
     assert first == IN_FLIGHT + notice
     # The flight goes on while the command is planned.
     flown = [trajectory.step(planned.final_state).reference[:2] for _ in range(notice)]
@@ -183,7 +186,7 @@ def test_a_command_in_flight_is_flown_and_forgotten_with_the_run():
     trajectory.change_reference(reference)
     flown += [trajectory.step(planned.final_state).reference[:2] for _ in range(120)]
     assert np.array_equal(flown[: notice + 1], [START] * (notice + 1)) and np.array_equal(flown[-1], NEAR)
-    next_first, _ = governor.command(*START, duration=1.5, blend=SHORT_BLEND)
+    next_first, _ = command(START, duration=1.5, blend=SHORT_BLEND)
     assert next_first == first + 120 + notice
     trajectory.reset()
     assert trajectory.reference is planned and trajectory.next_step == 0
@@ -200,21 +203,21 @@ def test_a_command_in_flight_is_flown_and_forgotten_with_the_run():
     ],
 )
 def test_a_wrong_command_changes_nothing(words, why):
-    trajectory, governor = flying(steps=1)
+    trajectory, command = flying(steps=1)
     planned = trajectory.reference
     with pytest.raises(GovernorError, match=why):
-        governor.command(*words)
+        command(words[:2], *words[2:])
     assert trajectory.reference is planned
 
 
 def test_only_a_certified_plan_in_flight_can_be_commanded():
-    trajectory, governor = flying(steps=0)
+    trajectory, command = flying(steps=0)
     with pytest.raises(GovernorError, match=r"no step is flown yet: expected a command in flight"):
-        governor.command(*NEAR)
+        command(NEAR)
     for values, design, why in (
         ({}, None, r"design = 'none': expected one that has tightened inputs"),
         ({"nominal.law": "qp"}, DESIGN, r"nominal\.law = 'qp': expected 'family'"),
         ({"reference.trim": "static"}, DESIGN, r"reference\.trim = 'static': expected 'climbing'"),
     ):
         with pytest.raises(GovernorError, match=why):
-            CommandGovernor.from_parameters(values, design, trajectory)
+            command_in_flight(values, design, trajectory, NEAR)

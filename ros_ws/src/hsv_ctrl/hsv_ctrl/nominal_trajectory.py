@@ -11,7 +11,7 @@ from hsv_msgs.srv import SetCommand
 from hsv.bags.description import NOMINAL_TRAJECTORY, REFERENCE, SET_COMMAND
 from hsv.bags.messages import FRAME, stamp_of
 from hsv.base.errors import GovernorError, HsvError
-from hsv.control.governor import CommandGovernor
+from hsv.control.governor import command_in_flight
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.reference_trajectory import ReferenceTrajectory
@@ -83,8 +83,8 @@ class NominalTrajectoryNode(BlockNode):
     def _command(self, request: SetCommand.Request) -> tuple[int, str]:
         if self._plan is not None:
             raise GovernorError("the command before is still being planned: expected one at a time")
-        governor = CommandGovernor.from_parameters(self._values, self._design, self._trajectory)
-        self._first, plan = governor.command(request.altitude, request.velocity, request.duration, request.blend)
+        flown, target = (self._values, self._design, self._trajectory), (request.altitude, request.velocity)
+        self._first, plan = command_in_flight(*flown, target, request.duration, request.blend)
         self._plan = self._planner.submit(plan)
         self._words = f"to {request.altitude:.6g} m and {request.velocity:.6g} m/s from step {self._first} on"
         self._publish_reference(self._first, Reference.PLANNING)

@@ -434,8 +434,9 @@ def govern(
             out.write_text(found.text, encoding="utf-8")
     reference, plan = found.reference, found.reference.plan
     rates = abs(plan[1:] - plan[:-1]).max(axis=0)
+    low, high = found.bounds.input_minimum, found.bounds.input_maximum
     inputs = [
-        (name, unit, (plan[:, i].min(), plan[:, i].max(), found.bounds.minimum[i], found.bounds.maximum[i], rates[i]))
+        (name, unit, (plan[:, i].min(), plan[:, i].max(), low[i], high[i], rates[i]))
         for i, (name, unit) in enumerate(zip(INPUT_NAMES, INPUT_UNITS, strict=True))
     ]
     if json:

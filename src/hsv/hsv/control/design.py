@@ -494,8 +494,8 @@ def write_design(path: Path, design: ControlDesign, comment: str) -> None:
     path.write_text(header + body, encoding="utf-8")
 
 
-def read_parameters(path: Path, node: str = "") -> dict[str, Any]:
-    """Return the flat parameters for ``node`` in a ROS 2 parameter YAML: its own section over the one for all nodes.
+def read_parameters(path: Path) -> dict[str, Any]:
+    """Return the flat parameters for all nodes in a ROS 2 parameter YAML.
 
     Raises:
         DesignError: The file is missing or is not parameter YAML.
@@ -504,22 +504,18 @@ def read_parameters(path: Path, node: str = "") -> dict[str, Any]:
         text = read_text(path)
     except DocumentError as error:
         raise DesignError(f"design {str(path)!r}: {error}, expected a parameter file") from error
-    return parse_parameters(text, str(path), node)
+    return parse_parameters(text, str(path))
 
 
-def parse_parameters(text: str, source: str, node: str = "") -> dict[str, Any]:
+def parse_parameters(text: str, source: str) -> dict[str, Any]:
     """Return the flat parameters in the ``text`` of a parameter YAML, as :func:`read_parameters`.
 
     Raises:
         DesignError: The text is not parameter YAML; the message names ``source``.
     """
-    sections = parse_sections(text, source)
-    flat: dict[str, Any] = {}
-    for section in ("/**", node, f"/{node}"):
-        flat |= sections.get(section, {})
-    if not flat:
-        raise _no_parameters(source)
-    return flat
+    if flat := parse_sections(text, source).get("/**"):
+        return flat
+    raise _no_parameters(source)
 
 
 def parse_sections(text: str, source: str) -> dict[str, dict[str, Any]]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,20 +50,6 @@ class Leg(NamedTuple):
     duration: float
     altitude: float
     velocity: float
-
-
-@dataclass(frozen=True)
-class InputBounds:
-    """Bounds of the total nominal input: smallest and largest u_r + u_n (2 each), and largest rates (2) per second."""
-
-    minimum: np.ndarray
-    maximum: np.ndarray
-    rate: np.ndarray
-
-
-def input_bounds(plan: PlanBounds, actuators: Struct) -> InputBounds:
-    """Return the bounds that a design has certified for its ``plan``, with the rates of the ``actuators`` flown."""
-    return InputBounds(plan.input_minimum, plan.input_maximum, actuators.rate_limit)
 
 
 @dataclass(frozen=True)
@@ -117,12 +103,13 @@ def legs_of(
 class Governor:
     """Finds references for the nominal system ``nominal`` of a design and the decoupled vehicle ``rigid``."""
 
-    def __init__(self, nominal: Struct, rigid: VehicleParameters, period: float, bounds: InputBounds) -> None:
-        """Plan with ``period`` (s) within ``bounds``."""
-        self._nominal, self._rigid, self._period = nominal, rigid, period
-        self._bounds = bounds
-        free = KEPT_FREE * (bounds.maximum - bounds.minimum)
-        self._low, self._high = bounds.minimum + free, bounds.maximum - free
+    def __init__(
+        self, nominal: Struct, rigid: VehicleParameters, period: float, bounds: PlanBounds, rate: np.ndarray
+    ) -> None:
+        """Plan with ``period`` (s) within the ``bounds`` of a design; actuators move by up to ``rate`` (2) a second."""
+        self._nominal, self._rigid, self._period, self._rate = nominal, rigid, period, rate
+        free = KEPT_FREE * (bounds.input_maximum - bounds.input_minimum)
+        self._low, self._high = bounds.input_minimum + free, bounds.input_maximum - free
 
     def govern(self, start: tuple[float, float], legs: Sequence[Leg], blend: float) -> GovernedReference:
         """Return the fastest reference from level flight at ``start``, altitude (m) and velocity (m/s), over ``legs``.
@@ -237,10 +224,10 @@ class Governor:
                     f"the plan needs {name} from {least:.6g} to {most:.6g} {unit}".rstrip()
                     + f", expected {self._low[i]:.6g} to {self._high[i]:.6g}, U minus F Z"
                 )
-            if fastest > self._bounds.rate[i]:
+            if fastest > self._rate[i]:
                 return (
-                    f"the plan moves {name} by {fastest:.6g} {unit or '1'}/s, expected at most "
-                    f"{self._bounds.rate[i]:.6g}, the limit of its actuator"
+                    f"the plan moves {name} by {fastest:.6g} {unit or '1'}/s, expected at most {self._rate[i]:.6g}, "
+                    "the limit of its actuator"
                 )
         return ""
 
@@ -266,80 +253,63 @@ class Governor:
         return round(step * self._period, 9)
 
 
-class CommandGovernor:
-    """A governor that turns commands in flight into references that continue from the current one."""
+def command_in_flight(
+    values: Mapping[str, object],
+    design: ControlDesign | None,
+    trajectory: NominalTrajectory,
+    target: tuple[float, float],
+    duration: float = 0.0,
+    blend: float = 0.0,
+) -> tuple[int, Callable[[], ReferenceTrajectory]]:
+    """Check a command that adds a leg to a point, as fast as the tightened inputs permit, after all earlier ones.
 
-    def __init__(self, governor: Governor, trajectory: NominalTrajectory, vehicle: Vehicle, period: float) -> None:
-        """Govern the commands of ``trajectory``, which flies the ``vehicle`` with this ``period`` (s)."""
-        self._governor, self._trajectory, self._vehicle, self._period = governor, trajectory, vehicle, period
+    Args:
+        values: Flat parameters that ``design`` and ``trajectory`` are made from.
+        design: Design with a certified plan.
+        trajectory: Nominal trajectory in flight.
+        target: Altitude (m) and velocity (m/s) of the point.
+        duration: Minimum length of the ramp, s.
+        blend: Half-width of the blend at a corner, s; 0: :data:`USUAL_BLEND`.
 
-    @classmethod
-    def from_parameters(
-        cls, values: Mapping[str, object], design: ControlDesign | None, trajectory: NominalTrajectory
-    ) -> Self:
-        """Build from the flat parameters ``values`` that ``design`` and ``trajectory`` are made from.
+    Returns:
+        The first step that the command changes, at least :data:`NOTICE` ahead, and the function that plans it. The
+        function takes 0.1 to 2 s and may be called in another thread while the flight goes on up to that step;
+        it returns the new reference, or raises a GovernorError if none fits.
 
-        Raises:
-            GovernorError: There is no certified plan to govern.
-        """
-        if design is None or design.plan_bounds is None:
-            name = design.name if design else "none"
-            raise GovernorError(f"design = {name!r}: expected one that has tightened inputs")
-        law = values.get("nominal.law", LAWS[0])
-        if law != LAWS[0]:
-            raise GovernorError(f"nominal.law = {law!r}: expected {LAWS[0]!r}")
-        trim = values.get("reference.trim", TRIMS[0])
-        if trim != TRIMS[0]:
-            raise GovernorError(f"reference.trim = {trim!r}: expected {TRIMS[0]!r}")
-        vehicle = Vehicle.from_parameters(values)
-        actuators = actuator_data(values, vehicle.decoupled, design.period)
-        bounds = input_bounds(design.plan_bounds, actuators)
-        governor = Governor(trajectory.data, vehicle.decoupled, design.period, bounds)
-        return cls(governor, trajectory, vehicle, design.period)
+    Raises:
+        GovernorError: There is no certified plan to govern, a number out of its range, or a command before the flight.
+    """
+    if design is None or design.plan_bounds is None:
+        name = design.name if design else "none"
+        raise GovernorError(f"design = {name!r}: expected one that has tightened inputs")
+    for name, governed in (("nominal.law", LAWS[0]), ("reference.trim", TRIMS[0])):
+        if (given := values.get(name, governed)) != governed:
+            raise GovernorError(f"{name} = {given!r}: expected {governed!r}")
+    vehicle, (altitude, velocity) = Vehicle.from_parameters(values), target
+    ranges = {
+        "altitude": (altitude, "m", vehicle.altitude_range),
+        "velocity": (velocity, "m/s", vehicle.velocity_range),
+        "duration": (duration, "s", (0.0, LONGEST)),
+        "blend": (blend, "s", (0.0, LONGEST)),
+    }
+    for name, (value, unit, (least, largest)) in ranges.items():
+        if not least <= value <= largest:
+            raise GovernorError(f"{name} = {value:.6g} {unit}: expected {least:.6g} to {largest:.6g} {unit}")
+    if trajectory.next_step == 0:
+        raise GovernorError("no step is flown yet: expected a command in flight")
+    corners = trajectory.reference.corners
+    if corners[-1][1:3] == target:
+        raise GovernorError(
+            f"altitude = {altitude:.6g} m, velocity = {velocity:.6g} m/s: expected another point than the command "
+            "before"
+        )
+    blend = blend or USUAL_BLEND
+    beginning = Beginning(trajectory.next_step, trajectory.deviation)
+    leg = Leg(beginning.step * design.period + NOTICE, duration, altitude, velocity)
+    rate = actuator_data(values, vehicle.decoupled, design.period).rate_limit
+    governor = Governor(trajectory.data, vehicle.decoupled, design.period, design.plan_bounds, rate)
 
-    def command(
-        self, altitude: float, velocity: float, duration: float = 0.0, blend: float = 0.0
-    ) -> tuple[int, Callable[[], ReferenceTrajectory]]:
-        """Check a command that adds a leg to a point, as fast as the tightened inputs permit, after all earlier ones.
+    def plan() -> ReferenceTrajectory:
+        return governor.trajectory(governor.continued(corners, leg, blend, beginning)[0].corners)
 
-        Args:
-            altitude: Altitude of the point, m.
-            velocity: Velocity of the point, m/s.
-            duration: Minimum length of the ramp, s.
-            blend: Half-width of the blend at a corner, s; 0: :data:`USUAL_BLEND`.
-
-        Returns:
-            The first step that the command changes, at least :data:`NOTICE` ahead, and the function that plans it. The
-            function takes 0.1 to 2 s and may be called in another thread while the flight goes on up to that step;
-            it returns the new reference, or raises a GovernorError if none fits.
-
-        Raises:
-            GovernorError: A number out of its range, or a command before the flight.
-        """
-        ranges = {
-            "altitude": (altitude, "m", self._vehicle.altitude_range),
-            "velocity": (velocity, "m/s", self._vehicle.velocity_range),
-            "duration": (duration, "s", (0.0, LONGEST)),
-            "blend": (blend, "s", (0.0, LONGEST)),
-        }
-        for name, (value, unit, (least, largest)) in ranges.items():
-            if not least <= value <= largest:
-                raise GovernorError(f"{name} = {value:.6g} {unit}: expected {least:.6g} to {largest:.6g} {unit}")
-        trajectory = self._trajectory
-        if trajectory.next_step == 0:
-            raise GovernorError("no step is flown yet: expected a command in flight")
-        corners = trajectory.reference.corners
-        if corners[-1][1:3] == (altitude, velocity):
-            raise GovernorError(
-                f"altitude = {altitude:.6g} m, velocity = {velocity:.6g} m/s: expected another point than the command "
-                "before"
-            )
-        blend = blend or USUAL_BLEND
-        beginning = Beginning(trajectory.next_step, trajectory.deviation)
-        leg = Leg(beginning.step * self._period + NOTICE, duration, altitude, velocity)
-
-        def plan() -> ReferenceTrajectory:
-            found, _ = self._governor.continued(corners, leg, blend, beginning)
-            return self._governor.trajectory(found.corners)
-
-        return self._governor.first_change(corners, leg.start, blend), plan
+    return governor.first_change(corners, leg.start, blend), plan

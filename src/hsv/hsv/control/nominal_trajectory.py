@@ -47,7 +47,7 @@ class NominalTrajectory:
     """Starts at x_n(0) = x(0) - x_r(0) and runs the nominal system, scheduled by the measured state, to rest."""
 
     PARAMETERS = (*NOMINAL_PARAMETERS, *VEHICLE_PARAMETERS, *ACTUATOR_PARAMETERS)
-    """The actuators limit what can be commanded in flight (:class:`hsv.control.governor.CommandGovernor`)."""
+    """The actuators limit what can be commanded in flight (:func:`hsv.control.governor.command_in_flight`)."""
 
     def __init__(
         self, design: ControlDesign | None, reference: ReferenceTrajectory, law: FamilyLaw | None = None

@@ -68,10 +68,6 @@ class Corner(NamedTuple):
     blend: float
 
 
-def _reference(first: int, state: np.ndarray, input: np.ndarray, defect: np.ndarray) -> Struct:
-    return Struct("hsv_reference", first=first, state=state, input=input, defect=defect)
-
-
 class ReferenceTrajectory:
     """The reference x_r(k), u_r(k) and its defect d_r(k) for every step k, computed once.
 
@@ -116,9 +112,8 @@ class ReferenceTrajectory:
         # A static trim has neither climb rate nor acceleration nor turn.
         rate, bend = (slope / period, bend / (period * period)) if trim == "climbing" else (0.0 * slope, 0.0 * bend)
         rows = len(steps)
-        self.data = _reference(
-            first, np.zeros((rows, N_STATES)), np.zeros((rows, N_INPUTS)), np.zeros((rows, N_STATES))
-        )
+        arrays = {name: np.zeros((rows, N_STATES)) for name in ("state", "defect")}
+        self.data = Struct("hsv_reference", first=first, input=np.zeros((rows, N_INPUTS)), **arrays)
         """x_r (r, 9), u_r (r, 2), d_r (r, 9); row 0 belongs to step ``first``. Before and after, nothing changes."""
         self._along: Struct | None = None
         self.corners = tuple(map(Corner, *(map(float, column) for column in (times, altitudes, velocities, blends))))
@@ -174,8 +169,8 @@ class ReferenceTrajectory:
     def along(self, steps: int) -> Struct:
         """Return the reference with one row for each of the first ``steps`` steps, cached; do not change it."""
         if self._along is None or len(self._along.state) != steps:
-            data, rows = self.data, self.rows(steps)
-            self._along = _reference(0, data.state[rows], data.input[rows], data.defect[rows])
+            arrays = {name: getattr(self.data, name)[self.rows(steps)] for name in ("state", "input", "defect")}
+            self._along = Struct("hsv_reference", first=0, **arrays)
         return self._along
 
     @property

@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -96,22 +96,15 @@ def no_tube(vehicle: VehicleParameters) -> Struct:
     return tube_data(np.zeros((1, N_INPUTS, N_STATES)), vehicle.input_minimum, vehicle.input_maximum)
 
 
-class TubeStep(NamedTuple):
-    """A step of the law: feedback, unsaturated input and limited input (2 each), and the index of the active gain."""
-
-    feedback: np.ndarray
-    unsaturated: np.ndarray
-    input: np.ndarray
-    gain: int
-
-
 def tube_memory() -> np.ndarray:
     """Return the memory of the law, a record that step 0 initialises."""
     return np.zeros((), dtype("hsv_tube_memory"))
 
 
-def tube_step(data: Struct, memory: np.ndarray, inputs: ControllerInput, *, monitored: bool = True) -> TubeStep:
-    """Return a step of the law (paper eq. 21, eq. 36), see ``core/tube_law.h``.
+def tube_step(
+    data: Struct, memory: np.ndarray, inputs: ControllerInput, *, monitored: bool = True
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Return feedback, unsaturated and limited input (2 each) of a step, and the index of its gain (eq. 21, eq. 36).
 
     Args:
         data: The law.
@@ -134,7 +127,7 @@ def tube_step(data: Struct, memory: np.ndarray, inputs: ControllerInput, *, moni
         *given,
         *map(doubles, (feedback, unsaturated, limited)),
     )
-    return TubeStep(feedback, unsaturated, limited, int(active))
+    return feedback, unsaturated, limited, int(active)
 
 
 def active_gain(data: Struct, step: int) -> int:

@@ -9,7 +9,8 @@ import tomli_w
 
 from hsv.base.errors import GovernorError
 from hsv.base.units import rounded, written
-from hsv.control.governor import GovernedReference, Governor, InputBounds, input_bounds, legs_of
+from hsv.control.design import PlanBounds
+from hsv.control.governor import GovernedReference, Governor, legs_of
 from hsv.control.tube_law import TubeLaw
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.scenario import load_scenario, scenario_table, scenario_text
@@ -21,7 +22,7 @@ class GovernedScenario:
 
     text: str
     reference: GovernedReference
-    bounds: InputBounds
+    bounds: PlanBounds
 
 
 def governed(name: str, blend: float) -> GovernedScenario:
@@ -42,9 +43,8 @@ def governed(name: str, blend: float) -> GovernedScenario:
     if not law.in_core:
         given = scenario.settings["nominal.law"]
         raise GovernorError(f"scenario {scenario.name!r}: nominal.law = {given!r}: expected 'family'")
-    design, allowed = controller.design, controller.design.plan_bounds
-    bounds = input_bounds(allowed, components.plant.data.actuators)
-    governor = Governor(law.data, scenario.vehicle.described.decoupled, design.period, bounds)
+    bounds, rate = controller.design.plan_bounds, components.plant.data.actuators.rate_limit
+    governor = Governor(law.data, scenario.vehicle.described.decoupled, controller.design.period, bounds, rate)
     start = rounded(scenario.initial.altitude), rounded(scenario.initial.velocity)
     reference = governor.govern(start, legs_of(start, *scenario.commands), blend)
     table = scenario_table(scenario_text(name), name)

@@ -52,7 +52,8 @@ def fault_rows(
         row["start"], row["stop"], row["channel"], row["code"] = start, stop, _place(fault.channel), fault.kind.code
         row["occurrence"], row["cycle"] = _occurrence(fault.values[own:], period)
         row["parameter"][:own] = fault.values[:own]
-    memory = fault_memory(len(rows))
+    memory = np.zeros(len(rows), dtype("hsv_fault_memory"))
+    memory["last"] = memory["onset"] = _NOT_YET
     kept: dict[Any, list[np.void]] = {}
     for row, before in zip(earlier.rows, earlier.memory, strict=True) if earlier else ():
         kept.setdefault(_identity(row), []).append(before)
@@ -61,13 +62,6 @@ def fault_rows(
         if same := kept.get(_identity(row)):
             memory[i] = same.pop(0)
     return Struct("hsv_faults", rows=rows, memory=memory, period=period)
-
-
-def fault_memory(count: int) -> np.ndarray:
-    """Return the initial memory of ``count`` faults."""
-    memory = np.zeros(count, dtype("hsv_fault_memory"))
-    memory["last"] = memory["onset"] = _NOT_YET
-    return memory
 
 
 def _identity(row: np.void) -> bytes:
