@@ -119,9 +119,9 @@ def test_a_flight_by_hand_is_told_and_can_be_repeated(processes):
 @pytest.mark.parametrize(
     ("words", "code", "expected"),
     [
-        ("fault list", 1, "hsv fault: error: no run in ROS_DOMAIN_ID="),
-        long("topic", 1, "hsv topic: error: no node of the graph in ROS_DOMAIN_ID="),
-        long("watch", 1, "hsv watch: error: no run in ROS_DOMAIN_ID="),
+        ("fault list", 1, "hsv: error: no run in ROS_DOMAIN_ID="),
+        long("topic", 1, "hsv: error: no node of the graph in ROS_DOMAIN_ID="),
+        long("watch", 1, "hsv: error: no run in ROS_DOMAIN_ID="),
         long("set tua 0.8", 2, "name = 'tua': expected a parameter that may change in flight, feedback.tau"),
         long("topic --every 0", 2, "--every"),
         long("topic /hsv//state", 2, "(topic name must not contain repeated '/')"),

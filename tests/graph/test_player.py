@@ -1,12 +1,10 @@
-"""The player at its end, and words and bags it cannot use."""
+"""The player beside a graph that flies or waits."""
 
 import pytest
 from changed_bags import changed_bag
 from recorded_flight import record_flight
-from ros_domain import own_domain
 from waiting import wait_until
 
-from hsv.bags.reader import Bag
 from hsv.graph.exclusive import claim
 
 pytestmark = pytest.mark.graph
@@ -20,31 +18,6 @@ def bag(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bags")
     flown = record_flight(folder / "flown", duration=1.0, fault=0.5).folder
     return changed_bag(flown, folder / "short", messages=lambda _, messages: messages[:STEPS])
-
-
-def test_a_step_at_the_end_is_refused(bag):
-    import rclpy
-    from rclpy.executors import SingleThreadedExecutor
-    from std_srvs.srv import Trigger
-
-    from hsv_bringup.player import PlayerNode
-
-    with own_domain() as number:
-        rclpy.init(domain_id=number)
-        try:
-            player = PlayerNode(Bag(bag), ["/hsv/state"], 1.0, paused=True, delay=0.0)
-            asking = rclpy.create_node("asking")
-            executor = SingleThreadedExecutor()
-            for node in (player, asking):
-                executor.add_node(node)
-            client = asking.create_client(Trigger, "/player/step")
-            wait_until(client.service_is_ready, pause=executor.spin_once)
-            calls = [client.call_async(Trigger.Request()) for _ in range(STEPS + 1)]
-            wait_until(lambda: all(call.done() for call in calls), pause=executor.spin_once)
-            assert [call.result().success for call in calls] == [True] * STEPS + [False]
-            assert calls[-1].result().message == "at the end, nothing is left to publish"
-        finally:
-            rclpy.shutdown()
 
 
 @pytest.mark.long

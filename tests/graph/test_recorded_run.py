@@ -9,7 +9,7 @@ import pytest
 from bag_readers import READERS, assert_equal, ours
 from marking import long
 from node_processes import short_scenario
-from waiting import exit_code_of
+from waiting import exit_code_of, wait_until
 
 from hsv.bags.description import TOPICS
 
@@ -50,7 +50,6 @@ SUBSCRIBE = textwrap.dedent(
     from hsv.bags.description import LATCHED_TOPICS, OTHER_TOPICS, ROSOUT, RUN, TOPICS
     from hsv.bags.reader import Bag
     from hsv_node.middleware import LATCHED, STEP, message_class
-    from std_srvs.srv import Trigger
 
     rclpy.init()
     node = rclpy.create_node("subscriber")
@@ -64,32 +63,18 @@ SUBSCRIBE = textwrap.dedent(
     expected = {topic: [data for _, data in recorded.messages(topic)] for topic in topics}
 
     def wait(done, what):
-        print("waits for", what)
+        print("waits for", what, flush=True)
         while not done():
             executor.spin_once(timeout_sec=0.05)
 
-    def call(name):
-        client = node.create_client(Trigger, "/player/" + name)
-        wait(client.service_is_ready, name)
-        future = client.call_async(Trigger.Request())
-        wait(future.done, name)
-        assert future.result().success, future.result().message
-        return future.result().message
-
-    wait(lambda: all(node.count_publishers(topic) for topic in topics), "no player")
-    # Endpoints are announced in the order they were made: who answers knows the subscriptions above.
-    call("pause")
-    for step in range(1, 4):
-        print(call("step"))
-        wait(lambda: all(len(messages) >= step for messages in heard.values()), f"step {step}")
-    assert all(len(messages) == 3 for messages in heard.values()), {t: len(m) for t, m in heard.items()}
+    wait(lambda: all(node.count_publishers(topic) for topic in topics), "a player")
+    wait(lambda: all(len(messages) >= 3 for messages in heard.values()), "three steps")
     # A late subscriber of a latched topic gets what was played before, among the log of nodes that run now.
     for topic, kind in {"/hsv/run": LATCHED_TOPICS[RUN], ROSOUT: OTHER_TOPICS[ROSOUT]}.items():
         played, late = {data for time, data in recorded.messages(topic) if time <= 40_000_000}, []
         node.create_subscription(message_class(kind), topic, late.append, LATCHED, raw=True)
         assert played
         wait(lambda: played <= {*late}, "what was played on " + topic)
-    print(call("resume"))
     wait(lambda: all(len(heard[topic]) >= len(expected[topic]) for topic in topics), "the end")
     assert heard == expected
     print("all", sum(map(len, heard.values())))
@@ -97,11 +82,15 @@ SUBSCRIBE = textwrap.dedent(
 )
 
 
-def test_player_steps_and_plays_the_recorded_bytes(shared_processes, bag):
+def test_player_plays_the_recorded_bytes(shared_processes, bag):
     topics = ["/hsv/state", "/hsv/command"]
-    words = ["--rate", "20", "--paused", "--topics", *topics, "/hsv/run", "/rosout"]
-    player = shared_processes.start("ros2", "run", "hsv_bringup", "player", bag, *words)
-    done = shared_processes.run(sys.executable, "-c", SUBSCRIBE, bag, ",".join([*topics, "/clock"]))
-    assert done.returncode == 0, done.stdout
-    assert "paused, played up to t = 0.040 s" in done.stdout and f"all {3 * STEPS}" in done.stdout
-    assert exit_code_of(player) == 0
+    log = shared_processes.folder / "subscriber.log"
+    with log.open("w") as output:
+        words = [sys.executable, "-c", SUBSCRIBE, bag, ",".join([*topics, "/clock"])]
+        subscriber = shared_processes.start(*words, output=output)
+        wait_until(lambda: "waits for a player" in log.read_text(), [subscriber.pid])
+    words = ["--rate", "4", "--delay", "2", "--topics", *topics, "/hsv/run", "/rosout"]
+    played = shared_processes.run("ros2", "run", "hsv_bringup", "player", bag, *words)
+    assert played.returncode == 0, played.stdout
+    assert exit_code_of(subscriber) == 0, log.read_text()
+    assert f"all {3 * STEPS}" in log.read_text()

@@ -6,7 +6,7 @@ import re
 import pytest
 from recorded_flight import message_types
 
-from hsv.bags.description import MARKERS, TOPICS, resolved
+from hsv.bags.description import TOPICS, resolved
 from hsv.bags.typestore import fields_of
 from hsv.model.airframe.pose import Sample, transforms
 from hsv.model.airframe.scene import SCENE_TOPIC
@@ -62,4 +62,4 @@ def test_the_vehicle_is_drawn_in_the_frames_and_on_the_topics_that_there_are():
     assert {name.removeprefix("frame:") for name in panel["transforms"]} == frames
     assert panel["followTf"] in frames and panel["followMode"] in ("follow-pose", "follow-position", "follow-none")
     assert all(layer["frameId"] in frames for layer in panel["layers"].values())
-    assert set(panel["topics"]) == {SCENE_TOPIC, resolved(MARKERS)}
+    assert set(panel["topics"]) == {SCENE_TOPIC}

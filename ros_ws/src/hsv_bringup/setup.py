@@ -19,17 +19,12 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "airframe = hsv_bringup.airframe:main",
             "composed = hsv_bringup.composed:main",
             "recorder = hsv_bringup.recorder:main",
             "live = hsv_bringup.live:main",
-            "fault = hsv_bringup.commands:fault",
+            "client = hsv_bringup.commands:main",
             "player = hsv_bringup.player:main",
             "ring = hsv_bringup.ring:main",
-            "set_command = hsv_bringup.commands:set_command",
-            "set_parameter = hsv_bringup.commands:set_parameter",
-            "topic = hsv_bringup.topic:main",
-            "watch = hsv_bringup.watch:main",
             "peer_emulator = hsv_bringup.peer_emulator:main",
         ],
     },

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import signal
 import sys
@@ -13,7 +12,6 @@ from typing import Any
 import rclpy
 from hsv_msgs.msg import Run
 from rclpy.node import Node
-from rclpy.utilities import remove_ros_args
 
 from hsv.bags.description import PLANT, NodeDescription
 from hsv.base.errors import HsvError, RunError
@@ -136,38 +134,28 @@ class GraphClient(Node):
         return sorted({roles.full_name(e.node_name, e.node_namespace) for e in known})
 
 
-def run_client(
-    parser: argparse.ArgumentParser,
-    act: Callable[[GraphClient, argparse.Namespace], None],
-    args: Sequence[str] | None = None,
-) -> int:
-    """Run a command and return its exit code: 1 without a run, 2 for a rejected request, each with a one-line error.
+def run_client(name: str, act: Callable[[GraphClient, Any], None], options: Any) -> int:
+    """Run the command ``name`` with its ``options``; return its exit code: 1 without a run, 2 for a rejected request.
 
-    Args:
-        parser: Parser of the command, whose name is that of the node.
-        act: Function that executes the command.
-        args: Command line; default: ``sys.argv``.
+    An error is one line.
     """
-    arguments = list(sys.argv if args is None else args)
-    parser.add_argument("--prog", default=parser.prog, help=argparse.SUPPRESS)  # such as hsv set, for error messages
-    options = parser.parse_args(remove_ros_args(arguments)[1:])
     client: GraphClient | None = None
     code = 1
     try:
         take_signals(signal.default_int_handler)
         ros_domain()
-        rclpy.init(args=arguments, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-        client = GraphClient(parser.prog)
+        rclpy.init(signal_handler_options=rclpy.SignalHandlerOptions.NO)
+        client = GraphClient(name)
         act(client, options)
         sys.stdout.flush()
         code = 0
     except KeyboardInterrupt:
-        code = _refuse(options.prog, "interrupted", 130)
+        code = _refuse("interrupted", 130)
     except BrokenPipeError:
         # The reader of the pipe has ended: redirect stdout, so that Python does not fail again when it exits.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except HsvError as error:
-        code = _refuse(options.prog, error, 1 if isinstance(error, RunError) else 2)
+        code = _refuse(error, 1 if isinstance(error, RunError) else 2)
     finally:
         with suppress(KeyboardInterrupt), ends_with(code):
             if client:
@@ -189,6 +177,6 @@ def acting_from(run: Run, step: int) -> tuple[str, dict[str, Any]]:
     return f"t = {time:.2f} s", {"step": step, "time_s": round(time, 9)}
 
 
-def _refuse(name: str, problem: object, code: int) -> int:
-    print(f"{name}: error: {' '.join(str(problem).split())}", file=sys.stderr, flush=True)
+def _refuse(problem: object, code: int) -> int:
+    print(f"hsv: error: {' '.join(str(problem).split())}", file=sys.stderr, flush=True)
     return code

@@ -1,13 +1,11 @@
-"""Commands on a running graph: faults, another point of altitude and velocity, and parameters.
-
-For example ``ros2 run hsv_bringup fault inject elevator_deflection loss_of_effectiveness effectiveness=0.8``.
-"""
+"""Commands of ``hsv`` on a running graph: faults, another point of altitude and velocity, parameters, looking."""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Sequence
+import json
+import sys
 from math import isclose
+from types import SimpleNamespace
 
 from hsv_msgs.msg import Actuator, Reference
 from hsv_msgs.srv import ClearFault, InjectFault, SetCommand
@@ -19,22 +17,22 @@ from hsv.bags.description import FAULT_INJECTOR, NOMINAL_TRAJECTORY, ROSOUT
 from hsv.bags.messages import fault_in
 from hsv.base.errors import ParameterError, RunError
 from hsv.graph.node_parameters import find, parse, step_in
-from hsv.model.faults.injector import read_parameters
 from hsv_bringup.client import GraphClient, acting_from, answer, run_client
+from hsv_bringup.topic import print_topic
+from hsv_bringup.watch import watch_flight
 from hsv_node.middleware import LATCHED, STEP, fault_message
 
 
-def _inject(client: GraphClient, options: argparse.Namespace) -> None:
-    parameters = read_parameters(",".join(options.parameters))
-    fault = fault_message(options.channel, options.type, parameters)
+def _inject(client: GraphClient, options: SimpleNamespace) -> None:
+    fault = fault_message(options.channel, options.type, options.parameters)
     _change(client, options, InjectFault, InjectFault.Request(fault=fault, duration=options.duration))
 
 
-def _clear(client: GraphClient, options: argparse.Namespace) -> None:
+def _clear(client: GraphClient, options: SimpleNamespace) -> None:
     _change(client, options, ClearFault, ClearFault.Request(channel=options.channel, type=options.type))
 
 
-def _change(client: GraphClient, options: argparse.Namespace, kind: type, request: object) -> None:
+def _change(client: GraphClient, options: SimpleNamespace, kind: type, request: object) -> None:
     run = client.find_run()
     response = client.call(FAULT_INJECTOR, kind, request)
     if not response.success:
@@ -43,7 +41,7 @@ def _change(client: GraphClient, options: argparse.Namespace, kind: type, reques
     answer(f"{response.message}, {time}", {"message": response.message, **values}, options.json)
 
 
-def _list(client: GraphClient, options: argparse.Namespace) -> None:
+def _list(client: GraphClient, options: SimpleNamespace) -> None:
     run = client.find_run()
     statuses: list[Actuator] = []
     name = client.name_of(FAULT_INJECTOR, Actuator)
@@ -58,26 +56,7 @@ def _list(client: GraphClient, options: argparse.Namespace) -> None:
     answer(f"step {status.step}, {time}: {words}", values, options.json)
 
 
-def fault(args: Sequence[str] | None = None) -> int:
-    """Run the command."""
-    parser = argparse.ArgumentParser(prog="fault", description="Inject, clear and list faults in flight.")
-    parser.add_argument("--json", action="store_true", help="print a JSON object")
-    commands = parser.add_subparsers(required=True, metavar="{inject,clear,list}")
-    inject = commands.add_parser("inject", help="begin a fault with the next step")
-    inject.add_argument("channel", help="e.g. elevator_deflection")
-    inject.add_argument("type", help="e.g. loss_of_effectiveness")
-    inject.add_argument("parameters", nargs="*", help="of the type, SI, e.g. effectiveness=0.8")
-    inject.add_argument("--duration", type=float, default=0.0, help="simulated seconds; 0: until it is cleared")
-    inject.set_defaults(act=_inject)
-    clear = commands.add_parser("clear", help="end faults with the next step")
-    clear.add_argument("channel", nargs="?", default="", help="default: all channels")
-    clear.add_argument("type", nargs="?", default="", help="default: all types")
-    clear.set_defaults(act=_clear)
-    commands.add_parser("list", help="which faults act now").set_defaults(act=_list)
-    return run_client(parser, lambda client, options: options.act(client, options), args)
-
-
-def _command(client: GraphClient, options: argparse.Namespace) -> None:
+def _command(client: GraphClient, options: SimpleNamespace) -> None:
     run = client.find_run()
     fields = {name: getattr(options, name) for name in ("altitude", "velocity", "duration", "blend")}
     published: list[Reference] = []
@@ -118,22 +97,7 @@ def _command(client: GraphClient, options: argparse.Namespace) -> None:
     answer(f"{message}, {time}", {"message": message, **values, "end_s": round(end, 9)}, options.json)
 
 
-def set_command(args: Sequence[str] | None = None) -> int:
-    """Run the command."""
-    parser = argparse.ArgumentParser(
-        prog="set_command", description="Command another point of altitude and velocity in flight."
-    )
-    parser.add_argument("altitude", type=float, help="m")
-    parser.add_argument("velocity", type=float, help="m/s")
-    parser.add_argument("--duration", type=float, default=0.0, help="least length of the ramp, s; 0: as short as fits")
-    parser.add_argument(
-        "--blend", type=float, default=0.0, help="half the time in which the rate changes at a corner, s; 0: 2 s"
-    )
-    parser.add_argument("--json", action="store_true", help="print a JSON object")
-    return run_client(parser, _command, args)
-
-
-def _set(client: GraphClient, options: argparse.Namespace) -> None:
+def _set(client: GraphClient, options: SimpleNamespace) -> None:
     node, parameter = find(options.name)
     value = parse(options.value, parameter)
     run = client.find_run()
@@ -147,10 +111,18 @@ def _set(client: GraphClient, options: argparse.Namespace) -> None:
     answer(f"{result.reason}, {time}", named | values, options.json)
 
 
-def set_parameter(args: Sequence[str] | None = None) -> int:
-    """Run the command."""
-    parser = argparse.ArgumentParser(prog="set_parameter", description="Change a parameter in flight.")
-    parser.add_argument("name", help="e.g. tau, or feedback.tau; real_time_factor, paused")
-    parser.add_argument("value", help="e.g. 0.8, or a number for each element: 0.8,0.8,0.9,0.9,1; true or false")
-    parser.add_argument("--json", action="store_true", help="print a JSON object")
-    return run_client(parser, _set, args)
+ACTIONS = {
+    "fault_inject": _inject,
+    "fault_clear": _clear,
+    "fault_list": _list,
+    "command": _command,
+    "set": _set,
+    "topic": print_topic,
+    "watch": watch_flight,
+}
+
+
+def main() -> int:
+    """Run the command of the first argument with the options in the second, as :mod:`hsv.cli.in_flight` writes them."""
+    name, options = sys.argv[1:3]
+    return run_client(name, ACTIONS[name], SimpleNamespace(**json.loads(options)))

@@ -1,10 +1,10 @@
-"""Print the topics of a running graph, or the messages of one: ``ros2 run hsv_bringup topic /hsv/state --once``."""
+"""Print the topics of a running graph, or the messages of one."""
 
 from __future__ import annotations
 
-import argparse
 import difflib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -17,7 +17,7 @@ from hsv.bags.export import table
 from hsv.bags.typestore import message_types
 from hsv.bags.units import units_of
 from hsv.base.errors import ParameterError, RunError
-from hsv_bringup.client import GraphClient, answer, run_client
+from hsv_bringup.client import GraphClient, answer
 from hsv_node.middleware import installed_class
 from hsv_node.roles import node_in_role
 
@@ -44,13 +44,12 @@ def decoder(topic: str, kind: str) -> Callable[[bytes], dict[str, Any]]:
     return decode
 
 
-def _topic(client: GraphClient, options: argparse.Namespace) -> None:
-    if options.every < 1:
-        raise ParameterError(f"every = {options.every}: expected a number of messages, at least 1")
+def print_topic(client: GraphClient, options: SimpleNamespace) -> None:
+    """Print the messages of the topic ``options.name``, or the topics if it is empty."""
     (_print_messages if options.name else _print_topics)(client, options)
 
 
-def _print_topics(client: GraphClient, options: argparse.Namespace) -> None:
+def _print_topics(client: GraphClient, options: SimpleNamespace) -> None:
     rows = [
         {"topic": name, "type": ", ".join(kinds)}
         | {"publishers": client.publishers_of(name), "subscribers": client.subscribers_of(name)}
@@ -77,7 +76,7 @@ def _topics(client: GraphClient, name: str = "") -> dict[str, list[str]]:
     return dict(client.get_topic_names_and_types())
 
 
-def _print_messages(client: GraphClient, options: argparse.Namespace) -> None:
+def _print_messages(client: GraphClient, options: SimpleNamespace) -> None:
     name = _resolved(client, options.name)
     topics = _topics(client, name)
     if not client.count_publishers(name):
@@ -138,15 +137,3 @@ def _lines(name: str, fields: dict[str, Any]) -> Iterator[str]:
             value, unit = f"{value * 1e-9:.9g}", "s"
         text = f"{value:.9g}" if isinstance(value, float) else str(value)
         yield f"  {label:{width}}  {text} {unit}".rstrip()
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the command."""
-    parser = argparse.ArgumentParser(
-        prog="topic", description="Print the topics of a running graph, or the messages of one."
-    )
-    parser.add_argument("name", nargs="?", default="", help="e.g. /hsv/state; default: list the topics")
-    parser.add_argument("--once", action="store_true", help="one message only")
-    parser.add_argument("--every", type=int, default=1, help="print every N-th message")
-    parser.add_argument("--json", action="store_true", help="print a JSON object on a line for each")
-    return run_client(parser, _topic, args)

@@ -1,18 +1,17 @@
-"""Show the current state of a running flight on one line: ``ros2 run hsv_bringup watch``."""
+"""Show the current state of a running flight on one line."""
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
-from collections.abc import Sequence
 from math import isfinite
+from types import SimpleNamespace
 from typing import Any
 
 from hsv.bags.description import ACTUATOR, NOMINAL, STATE, TOPICS, TUBE_STATUS
 from hsv.base.errors import RunError
-from hsv.base.units import UnitSystem, in_system, significant, unit_system
-from hsv_bringup.client import GraphClient, answer, run_client
+from hsv.base.units import UnitSystem, in_system, significant
+from hsv_bringup.client import GraphClient, answer
 from hsv_node.middleware import LATEST, message_class
 
 EVERY = 0.2
@@ -22,8 +21,9 @@ _CLEARED = "\r\x1b[K"
 """Control sequence that returns to the start of the line and clears it."""
 
 
-def _watch(client: GraphClient, options: argparse.Namespace) -> None:
-    system = unit_system(options.units)
+def watch_flight(client: GraphClient, options: SimpleNamespace) -> None:
+    """Print where the flight is, on a line that is updated, until it ends."""
+    system = UnitSystem(options.units)
     latest: dict[str, Any] = {}
     for topic in (STATE, NOMINAL, TUBE_STATUS, ACTUATOR):
 
@@ -74,13 +74,3 @@ def _in_words(values: dict[str, Any], system: UnitSystem) -> str:
     faults = ", ".join(values["faults"]).replace("_", " ") or "no fault"
     time = f"t {values['time']:6.1f} s"
     return f"{time}  h {altitude:7.0f} {length}  V off {error:+7.2f} {speed}  tube {level:>7}  {faults}"
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the command."""
-    parser = argparse.ArgumentParser(
-        prog="watch", description="Show on one line where the flight of a running graph is."
-    )
-    parser.add_argument("--units", default="metric", help="metric, si or paper")
-    parser.add_argument("--json", action="store_true", help="print a JSON object (SI) on a line for each look")
-    return run_client(parser, _watch, args)

@@ -33,8 +33,6 @@ RECORDER_PROGRESS = "hsv/recorder_progress"
 DIAGNOSTICS = "diagnostics"
 ROSOUT = "/rosout"
 PARAMETER_EVENTS = "/parameter_events"
-MARKERS = "hsv/airframe"
-"""Topic of the airframe node for RViz2; no node of the graph uses it, and no bag contains it."""
 WIRE_ALIGNMENT = 4
 """Alignment of the length of messages sent over DDS, bytes; they are padded with zeros."""
 INJECT_FAULT = "hsv/inject_fault"
@@ -226,11 +224,8 @@ PLAYER = NodeDescription("player", "hsv_bringup", "player", (), ())
 LIVE = NodeDescription("live", "hsv_bringup", "live", (), ())
 """Process outside the graph that displays a running flight. No node waits for it; it ends with the others."""
 
-FAULT, SET_COMMAND_CLIENT, SET_PARAMETER, TOPIC, WATCH = (
-    NodeDescription(f"hsv_{name}", "hsv_bringup", name, (), ())
-    for name in ("fault", "set_command", "set_parameter", "topic", "watch")
-)
-"""Processes outside the graph: commands that act on a running graph."""
+CLIENT = NodeDescription("client", "hsv_bringup", "client", (), ())
+"""Process outside the graph: a command of ``hsv`` on a running graph."""
 
 
 def controller_node(controller: str) -> NodeDescription:

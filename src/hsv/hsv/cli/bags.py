@@ -335,7 +335,6 @@ def play(
     rate: Annotated[float, Option(help="Pace: 1 is as recorded, 10 ten times as fast.")] = 1.0,
     topic: Annotated[list[str] | None, Option(help="Topic to publish, can be repeated; default: all.")] = None,
     clock: Annotated[bool, Option(help="Publish the clock.")] = True,
-    paused: Annotated[bool, Option("--paused", help="Start paused, until /player/resume or step.")] = False,
     namespace: Annotated[str, Option(help="ROS namespace to publish in; default: that of the bag.")] = "",
     delay: Annotated[float, Option(help="Wall time (s) that subscribers get to discover the player.")] = 1.0,
 ) -> None:
@@ -349,4 +348,4 @@ def play(
 
     output.print_bag_warnings(Bag(bag))
     words = [str(bag), "--rate", str(rate), "--delay", str(delay), *(["--topics", *topic] if topic else [])]
-    become(PLAYER, [*words, *([] if clock else ["--no-clock"]), *(["--paused"] if paused else [])], namespace)
+    become(PLAYER, [*words, *([] if clock else ["--no-clock"])], namespace)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Annotated, NoReturn
+from json import dumps
+from typing import Annotated, Any, NoReturn
 
 import typer
 from typer import Argument, Option
@@ -40,9 +40,9 @@ def inject(
     from hsv.model.faults.table import read_fault
 
     found = read_fault(channel, type, parameters or [])
-    given = [f"{name}={value!r}" for name, value in found.parameters.items()]
-    options = ["inject", "--duration", repr(read_number(DURATION, duration, "duration"))]
-    _become("FAULT", "fault", options, [channel, type, *given], namespace, json)
+    seconds = read_number(DURATION, duration, "duration")
+    options = {"channel": channel, "type": type, "parameters": found.parameters, "duration": seconds}
+    _become("fault_inject", namespace, json=json, **options)
 
 
 @fault.command()
@@ -56,7 +56,7 @@ def clear(
 
     Example: hsv fault clear elevator_deflection
     """
-    _become("FAULT", "fault", ["clear"], filter(None, (channel, type)), namespace, json)
+    _become("fault_clear", namespace, json=json, channel=channel, type=type)
 
 
 @fault.command(name="list")
@@ -65,7 +65,7 @@ def list_(namespace: GraphNamespaceOption = "", json: JsonOption = False) -> Non
 
     Example: hsv fault list --json
     """
-    _become("FAULT", "fault", ["list"], (), namespace, json)
+    _become("fault_list", namespace, json=json)
 
 
 def set_(
@@ -78,7 +78,7 @@ def set_(
 
     Example: hsv set tau 0.8
     """
-    _become("SET_PARAMETER", "set", (), (name, value), namespace, json)
+    _become("set", namespace, json=json, name=name, value=value)
 
 
 def command(
@@ -97,16 +97,14 @@ def command(
 
     Example: hsv command "86000 ft" "8100 ft/s" --blend "4 s"
     """
-    point = parse_quantity(altitude, "m", "altitude"), parse_quantity(velocity, "m/s", "velocity")
-    length, half = parse_quantity(duration, "s", "duration"), parse_quantity(blend, "s", "blend")
-    _become(
-        "SET_COMMAND_CLIENT",
-        "command",
-        ["--duration", repr(length), "--blend", repr(half)],
-        map(repr, point),
-        namespace,
-        json,
-    )
+    given = {
+        "altitude": (altitude, "m"),
+        "velocity": (velocity, "m/s"),
+        "duration": (duration, "s"),
+        "blend": (blend, "s"),
+    }
+    numbers = {name: parse_quantity(text, unit, name) for name, (text, unit) in given.items()}
+    _become("command", namespace, json=json, **numbers)
 
 
 def watch(
@@ -118,7 +116,7 @@ def watch(
 
     Example: hsv watch --units paper
     """
-    _become("WATCH", "watch", ["--units", units], (), namespace, json)
+    _become("watch", namespace, json=json, units=units)
 
 
 def topic(
@@ -137,21 +135,12 @@ def topic(
     if not name and (once or every > 1):
         option = "once" if once else f"every = {every}"
         raise ParameterError(f"{option}: expected with a topic only")
-    options = [*(["--once"] if once else []), "--every", str(every)]
-    _become("TOPIC", "topic", options, filter(None, [name]), namespace, json)
+    _become("topic", namespace, json=json, name=name, once=once, every=every)
 
 
-def _become(
-    node: str, command: str, options: Sequence[str], values: Iterable[str], namespace: str, json: bool
-) -> NoReturn:
-    """Run a client node, named in :mod:`hsv.bags.description`, in place of this process.
-
-    If the client has commands of its own, one of them heads the ``options``.
-    """
-    from hsv.bags import description
+def _become(command: str, namespace: str, **options: Any) -> NoReturn:
+    """Run the client node with a command of ``hsv_bringup.commands`` in place of this process."""
+    from hsv.bags.description import CLIENT
     from hsv.graph.launcher import become
 
-    words = ["--prog", f"hsv {command}", *(["--json"] if json else []), *options]
-    values = list(values)
-    # Some values begin with a dash themselves, as negative numbers do.
-    become(getattr(description, node), [*words, *(["--", *values] if values else [])], namespace)
+    become(CLIENT, [command, dumps(options)], namespace)

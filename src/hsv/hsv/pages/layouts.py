@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from hsv.bags.description import ACTUATOR, COMMAND, DIAGNOSTICS, MARKERS, ROSOUT, TUBE_STATUS, resolved
+from hsv.bags.description import ACTUATOR, COMMAND, DIAGNOSTICS, ROSOUT, TUBE_STATUS
 from hsv.model.airframe.pose import LEVEL, Sample, transforms
 from hsv.model.airframe.scene import SCENE_TOPIC
 from hsv.model.signals import N_RIGID
@@ -114,6 +114,6 @@ def _airframe() -> dict[str, Any]:
         "followTf": LEVEL,
         "scene": {"transforms": {"showLabel": False, "enablePreloading": False}},
         "transforms": {f"frame:{frame}": {"visible": False} for frame in frames},
-        "topics": {topic: {"visible": True} for topic in (SCENE_TOPIC, resolved(MARKERS))},
+        "topics": {SCENE_TOPIC: {"visible": True}},
         "layers": {"grid": grid},
     }
