@@ -48,11 +48,11 @@ def inputs_of(name: str) -> DesignInputs:
 
 
 def extended_model(inputs: DesignInputs, coupling: str | float) -> tuple[np.ndarray, np.ndarray]:
-    """Return A (11, 11), B (11, 2) of the ECM (paper eq. 40) at :data:`BETWEEN` under held inputs.
+    """Return A (11, 11), B (11, 2) of the ECM (paper eq. 40) at :data:`BETWEEN`, by zero-order hold.
 
     Args:
         inputs: Inputs of the co-design, with its filter and period.
-        coupling: Name of the set, or a multiple of the derived one.
+        coupling: Name of a set of coupling coefficients, or a factor on the set ``derived``.
     """
     vehicle, filter_ = load_vehicle().coupled(coupling), Filter(*series(continuous(_sections(inputs))))
     equilibrium = trim(vehicle, *BETWEEN)

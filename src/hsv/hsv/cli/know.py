@@ -249,7 +249,7 @@ def bench(
     compare: Annotated[Path | None, Option(help="Report changes since this run, saved with --json > FILE.")] = None,
     json: JsonOption = False,
 ) -> None:
-    """Measure the performance of this machine, as ratios whose two sides are measured alternately.
+    """Measure the performance of this machine, as ratios of two run times that are measured in alternation.
 
     The exit code is 1 if a group of --only could not be measured, and with --compare if anything became slower.
 

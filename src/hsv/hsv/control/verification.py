@@ -150,7 +150,7 @@ def statement_checks(subject: Subject) -> Checks:
 
 
 def input_checks(subject: Subject) -> Checks:
-    """Compare the values that the design copies from its inputs, and check its scheduling weights."""
+    """Compare what the design copies: T (eq. 12), notch (eq. 38), U (eq. 29); scheduling weights sum to one (eq. 11)."""
     design, inputs = subject.design, subject.certificate["inputs"]
     yield recomputed(subject, "inputs.model.period", design.period, "copied")
     for i, section in enumerate(design.notch):
@@ -231,7 +231,7 @@ def model_checks(subject: Subject) -> Checks:
 
 
 def feedback_checks(subject: Subject) -> Checks:
-    """Check (24): e' N^-1 e decreases at every vertex under F = M N^-1."""
+    """Check eq. 24: e' N^-1 e decreases at every vertex under F = M N^-1; A + B F is stable (eq. 22)."""
     design, F = subject.design, subject.design.feedback_gain
     A, B = design.polytope.A, design.polytope.B
     M, N = np.array(subject.stated("feedback.M")), np.array(subject.stated("feedback.N"))
@@ -255,7 +255,7 @@ def feedback_checks(subject: Subject) -> Checks:
 
 @dataclass(frozen=True)
 class NominalWeights:
-    """Data of problem (31)-(35): vertices A (r, 5, 5), B (r, 5, 2), cost weights psi, sigma, bound (2) of |u_n|."""
+    """Data of eq. 31 to 35: vertices A (r, 5, 5), B (r, 5, 2), cost weights psi and sigma, largest |u_n| (shape 2)."""
 
     A: np.ndarray
     B: np.ndarray
@@ -293,7 +293,10 @@ class NominalWeights:
 
 
 def nominal_checks(subject: Subject) -> Checks:
-    """Check (31)-(35): every gain K = Y Q^-1 with its ellipsoid, and the nesting of the ellipsoids."""
+    """Check every gain K = Y Q^-1 with its ellipsoid (eq. 31 to 35), and that A + B K is stable (eq. 20).
+
+    The ellipsoids are nested, and between two gains the cost decreases under both: rules of our own, for switching.
+    """
     design, inputs = subject.design, subject.certificate["inputs"]["nominal"]
     weights, stated = NominalWeights.of(subject), subject.certificate["nominal"]
     scales = sizes(inputs["state_scale"], STATE_NAMES[:N_RIGID]), sizes(inputs["input_scale"], INPUT_NAMES)
@@ -336,7 +339,7 @@ def nominal_checks(subject: Subject) -> Checks:
 
 
 def step(subject: Subject) -> np.ndarray:
-    """Return x_n(0) (5) of the design's step: its start trim minus its target trim."""
+    """Return x_n(0), of shape 5, of the design's step: its start trim minus its target trim."""
     inputs, vehicle = subject.certificate["inputs"]["nominal"], subject.vehicle.decoupled
     start, target = (trim(vehicle, inputs[at]["altitude"], inputs[at]["velocity"]).state for at in ("start", "target"))
     return np.asarray((start - target)[:N_RIGID])
@@ -446,7 +449,7 @@ class Tube:
     """A tube stated under ``field`` of a certificate, with the closed loops of the design.
 
     The ellipsoid is (e - c)' Q^-1 (e - c) <= 1 with ``c`` (n) and ``Q`` (n, n); the disturbance set W is the box with
-    mid-point ``middle`` (7) and half-widths ``half`` (7).
+    mid-point ``middle`` and half-widths ``half``, both of shape 7.
     """
 
     def __init__(self, subject: Subject, design: ControlDesign, field: str) -> None:
@@ -479,7 +482,7 @@ class Tube:
 
     @property
     def feedback(self) -> np.ndarray:
-        """Half-ranges (2) of F e over the set."""
+        """Half-ranges of F e over the set, of shape 2: F Z of eq. 30."""
         F = self.system.F
         return self._narrowed(np.sqrt(np.sum((F @ self.Q) * F, axis=1)), slice(N_RIGID, None))
 
@@ -491,7 +494,7 @@ class Tube:
         return np.append(np.minimum(bounds[: len(star)], star), bounds[len(star) :])
 
     def residuals(self) -> np.ndarray:
-        """Return the residuals (r) of (27) by the S-procedure; the set is invariant at vertices with a positive one.
+        """Return the residuals (r) of eq. 27, which proves eq. 26 by the S-procedure at vertices with a positive one.
 
         Errors in the set satisfy lam v' Q^-1 v <= lam, disturbances sum_j l_j d_j^2 <= sum_j l_j <= 1 - lam.
         """
@@ -654,7 +657,7 @@ def _star_checks(subject: Subject, tube: Tube) -> Checks:
 
 
 def counter_example_checks(subject: Subject) -> Checks:
-    """Recompute the reach of the stated disturbance sequences, a lower bound of every half-width.
+    """Recompute the reach of the stated disturbance sequences (eq. 22), a lower bound of every half-width (eq. 28).
 
     At a constant vertex i, the output c e(m) is at most sum_j |c A_i^j G_i| half over the last m steps, and
     disturbances with the signs of the terms attain it.
@@ -679,7 +682,7 @@ def counter_example_checks(subject: Subject) -> Checks:
 
 
 def factor_checks(subject: Subject) -> Checks:
-    """Check that the factor tau may change in flight; a design that is not adjustable has tau = 1 only."""
+    """Check that the factor tau (eq. 48) may change in flight; a design that is not adjustable has tau = 1 only."""
     design, stated = subject.design, subject.certificate.get("adjustable")
     filtered = stated is not None
     yield required(Check("nominal.filtered", str(design.filtered), str(filtered), design.filtered == filtered))
@@ -688,7 +691,7 @@ def factor_checks(subject: Subject) -> Checks:
     yield required(parameter(subject, "feedback.tau_minimum", design.tau_minimum, least, fields=fields))
     if stated is None:
         return
-    # e' N^-1 e decreases for every factor, with full and with reduced elevator effectiveness.
+    # e' N^-1 e of eq. 24 decreases under every factor, with full and with reduced elevator effectiveness.
     shares = 1.0, subject.stated("inputs.disturbance.elevator_effectiveness")
     loops = [error_system(design, subject.vehicle, tau, share).A for tau, share in product(factors(design), shares)]
     N = np.array(stated["lyapunov"]["N"])
@@ -697,6 +700,7 @@ def factor_checks(subject: Subject) -> Checks:
     fields = ("adjustable.lyapunov.N",)
     yield replace(required(above("common Lyapunov function, smallest eigenvalue", residuals.min(), 0.0)), fields=fields)
     yield recomputed(subject, "adjustable.lyapunov.lmi_smallest_eigenvalues", residuals, "eigenvalues")
+    # The plan keeps the tightened bounds of eq. 30 at tau = 1 as well.
     bounds = Tube(subject, replace(design, tau_minimum=np.ones(N_RIGID)), "tube").tightened()
     plan = subject.stated("tube.tightening.plan")
     room = np.minimum(plan["lowest"] - bounds[0], bounds[1] - plan["highest"])
@@ -705,7 +709,7 @@ def factor_checks(subject: Subject) -> Checks:
 
 
 def adjustable_checks(subject: Subject) -> Checks:
-    """Recompute Z at tau = 1, the relaxed input bounds (52), the single gain K' and the poles."""
+    """Recompute tau (eq. 48), Z at tau = 1, the relaxed input bounds (eq. 52), K' (eq. 49 to 52) and the poles."""
     design, stated = subject.design, subject.certificate.get("adjustable")
     if stated is None:
         return
@@ -719,10 +723,10 @@ def adjustable_checks(subject: Subject) -> Checks:
     incomplete = Tube(subject, design, "adjustable.incomplete")
     yield from _tube_checks(subject, complete)
     yield from _tube_checks(subject, incomplete)
-    # The paper states Z' = tau Z (47); the certificate keeps it for comparison with the Z' that was computed.
+    # The paper states Z' = tau Z after eq. 48; the certificate keeps it for comparison with the computed Z'.
     scaled = np.append(tau, np.full(len(complete.c) - N_RIGID, tau[-1])) * complete.half_width
     yield recomputed(subject, "adjustable.scaled_half_width", scaled, "half-widths")
-    # (52): the bound of |u_n| grows with the room at the target trim, by the ratio of U minus F' Z' to U minus F Z.
+    # Eq. 52: the bound of |u_n| grows with the room at the target trim, by the ratio of U minus F' Z' to U minus F Z.
     target = subject.stated("inputs.nominal.target")
     at_target = trim(subject.vehicle.decoupled, target["altitude"], target["velocity"]).input
     rooms = [np.minimum(at_target - t[0], t[1] - at_target) for t in (complete.tightened(), incomplete.tightened())]

@@ -184,7 +184,7 @@ def disturbance_columns(inputs: DesignInputs) -> np.ndarray:
 
 
 def _literal(inputs: DesignInputs, bounds: TightenedInputs) -> DesignInputs:
-    """Return the inputs with the bounds of (35) that (30) leaves on both sides of the target's trim."""
+    """Return the inputs with the largest bound of |u_n| (eq. 35) that eq. 30 leaves about the target's trim input."""
     target = inputs.nominal.target
     bound = bounds.symmetric(trim(inputs.flown_vehicle.decoupled, target.altitude, target.velocity).input)
     if not bound.min() > 0.0:

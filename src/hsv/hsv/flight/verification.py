@@ -159,7 +159,10 @@ def share_of(inputs: Mapping[str, Any]) -> float:
 
 
 def flight_checks(subject: Subject) -> Checks:
-    """Repeat the flights at the corners that determine a bound of W, and at a sample of all corners."""
+    """Repeat the flights at the corners that determine a bound of W (eq. 19), and at a sample of all corners.
+
+    Their errors stay in the set (eq. 26), and their plans in the tightened bounds (eq. 30).
+    """
     certified = replace(subject.design, tau=subject.design.tau_minimum)  # in flight the factor may be another one
     subject = replace(subject, design=certified)
     tube, share, bounds = Tube(subject, certified, "tube"), share_of(subject.certificate["inputs"]), subject.vehicle
@@ -211,7 +214,7 @@ def _lag_check(name: str, subject: Subject, flown: Sequence[Evidence]) -> Check:
 
 
 def sequence_checks(subject: Subject) -> Checks:
-    """Repeat the random sequences."""
+    """Repeat the random disturbance sequences, whose errors stay in the invariant set (eq. 26)."""
     tube, field = Tube(subject, subject.design, "tube"), "tube.invariant_set.sampling"
     numbers = subject.count(f"{field}.sequences", 1_000_000), subject.count(f"{field}.steps", 10_000)
     drawn = random_sequences(tube.A, tube.columns, tube.c, tube.Q, *numbers, subject.stated(f"{field}.seed"))

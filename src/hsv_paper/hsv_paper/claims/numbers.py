@@ -410,7 +410,7 @@ def adjustable_step(evidence: Evidence) -> Numbers:
 
 
 def less_robust(evidence: Evidence) -> Numbers:
-    """Return the ratio between the worst vehicle with tau and the worst one with the whole feedback."""
+    """Return tau, and the worst deviation after the fault of all vehicles, relative to that with tau = 1."""
     ramp, whole = (
         worst(evidence.magnitudes(name, "post_fault_attitude_from_nominal")) for name in ("case2", "case2_tau1")
     )

@@ -53,7 +53,7 @@ class Optimum:
 
 
 def fastest_transfer(vehicle: VehicleParameters, periods: int, *, settling: bool) -> Optimum:
-    """Return the fastest transfer with so many ``periods``; see :func:`hsv_paper.limits.problems.transfer`."""
+    """Return the fastest transfer; its inputs are held over ``periods`` equal intervals."""
     first, half, whole = (problems.transfer(vehicle, n, settling=settling) for n in (COARSE, periods // 2, periods))
     coarse = first.solve(problems.straight(first, GUESS), 10.0 * TOLERANCE)
     coarser = half.solve(coarse.finer(periods // 2 // COARSE), TOLERANCE)

@@ -251,7 +251,7 @@ def verdict(
 
 
 def _start(found: InvariantSet, error: np.ndarray) -> float:
-    """Return the largest level of the error with which a flight starts that is measured with an ``error`` (5)."""
+    """Return the largest level at the start of a flight whose rigid states are measured to within ``error`` (5,)."""
     corners = np.array(list(product((-1.0, 1.0), repeat=N_RIGID))) * error
     errors = np.pad(corners, ((0, 0), (0, len(found.centre) - N_RIGID)))
     level = float(found.level(errors).max())

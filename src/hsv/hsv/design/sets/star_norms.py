@@ -8,7 +8,7 @@ lam,
     Q - A_i Q A_i' / lam - g_i g_i' / (1 - lam) >= 0.
 
 So the error less its centre stays in the sum of these ellipsoids over the channels, and an output row is at most
-sum_j sqrt(row Q_j row') there. Every row has a sum of its own, the one that is least for it. The intersection of all
+sum_j sqrt(row Q_j row') there. For each row the sum that minimises its bound is chosen. The intersection of all
 sums is invariant, and the bounds of all rows hold in it at once.
 """
 
