@@ -221,7 +221,7 @@ class Bag:
 
     @cached_property
     def _clock(self) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:
-        """Log times (n,) of the messages on step topics, ascending, and the latest stamp (n,) up to each; both in ns."""
+        """Log times (n,) of the messages on step topics, ascending, and the latest stamp (n,) up to each, in ns."""
         steps = sorted(self._step_topics)
         received = np.concatenate([np.array([], np.uint64), *map(self._log_times, steps)])
         stamps = np.concatenate([np.array([], np.int64), *(self.times(topic) for topic in steps)])

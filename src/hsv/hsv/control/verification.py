@@ -150,7 +150,7 @@ def statement_checks(subject: Subject) -> Checks:
 
 
 def input_checks(subject: Subject) -> Checks:
-    """Compare what the design copies: T (eq. 12), notch (eq. 38), U (eq. 29); scheduling weights sum to one (eq. 11)."""
+    """Compare what the design copies: T (eq. 12), notch (eq. 38), U (eq. 29); check that weights sum to one (eq. 11)."""
     design, inputs = subject.design, subject.certificate["inputs"]
     yield recomputed(subject, "inputs.model.period", design.period, "copied")
     for i, section in enumerate(design.notch):
