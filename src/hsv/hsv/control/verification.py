@@ -4,8 +4,8 @@ This module imports nothing of the code that designs; only the model of the vehi
 reads the numbers in flight (vertices A_i, B_i, gains F and K) from the design file, and the statements about them from
 the certificate. It recomputes the vertices from the parameters of the vehicle, and every inequality from its matrices;
 :mod:`hsv.flight.verification` repeats the flights.
-The parts follow the paper: model (10)-(12), gain F (24), gains K (31)-(35), error system (22), (23), invariant set
-(25)-(28), tightened inputs (30), adjustable factor (47)-(54).
+The parts follow the paper: model (eq. 10 to 12), gain F (eq. 24), gains K (eq. 31 to 35), error system (eq. 22, 23),
+invariant set (eq. 25 to 28), tightened inputs (eq. 30), adjustable factor (eq. 47 to 54).
 
 Every inequality is a bound on a singular value. With Q = L L', a matrix M maps the ellipsoid x' Q^-1 x <= 1 into itself
 if and only if the largest singular value of L^-1 M L is at most 1; see :func:`image`.
@@ -90,7 +90,7 @@ _KEPT_OFF = 0.05
 """Distance of the plan bounds from the top of the certified plans, as a share of their range."""
 
 
-# --- algebra ---------------------------------------------------------------------------------------------------------
+# --- algebra ----------------------------------------------------------------------------------------------------------
 
 
 def image(Q: np.ndarray, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
@@ -131,7 +131,7 @@ def sizes(table: Mapping[str, float], names: Sequence[str]) -> np.ndarray:
     return np.array([table[name] for name in names])
 
 
-# --- statement and inputs --------------------------------------------------------------------------------------------
+# --- statement and inputs ---------------------------------------------------------------------------------------------
 
 
 def statement_checks(subject: Subject) -> Checks:
@@ -150,7 +150,7 @@ def statement_checks(subject: Subject) -> Checks:
 
 
 def input_checks(subject: Subject) -> Checks:
-    """Compare what the design copies: T (eq. 12), notch (eq. 38), U (eq. 29); check that weights sum to one (eq. 11)."""
+    """Compare what the design copies: T (eq. 12), notch (eq. 38), U (eq. 29); check that weights sum to 1 (eq. 11)."""
     design, inputs = subject.design, subject.certificate["inputs"]
     yield recomputed(subject, "inputs.model.period", design.period, "copied")
     for i, section in enumerate(design.notch):
@@ -179,16 +179,16 @@ def solver_checks(subject: Subject) -> Checks:
             yield Check(field, repr(found), f"one of {', '.join(_STATUS)}", found in _STATUS, fields=(field,))
 
 
-# --- polytopic model, (10)-(12), (45) --------------------------------------------------------------------------------
+# --- polytopic model, eq. 10 to 12, eq. 45 ----------------------------------------------------------------------------
 
 
 def notch_in_series(design: ControlDesign) -> Filter:
-    """Return the notch filter (38) of ``design`` in continuous time (39)."""
+    """Return the notch filter (eq. 38) of ``design`` in continuous time (eq. 39)."""
     return Filter(*series(continuous(design.notch)))
 
 
 def recomputed_model(subject: Subject) -> tuple[PolytopicModel, tuple[np.ndarray, np.ndarray]]:
-    """Recompute the model of the vehicle (10)-(12), or of vehicle and notch filter (45), and its scales, in seconds."""
+    """Recompute the model of the vehicle (eq. 10 to 12), or with its notch filter (eq. 45), and the model's scales."""
     from hsv.model.lpv.polytopic import polytopic_model
 
     inputs, extended = subject.certificate["inputs"]["model"], subject.stated("inputs.model.system") == "ECM"
@@ -227,7 +227,7 @@ def model_checks(subject: Subject) -> Checks:
         yield recomputed(subject, f"model.accuracy.{name}", value, kind)
 
 
-# --- feedback gain F, (24) -------------------------------------------------------------------------------------------
+# --- feedback gain F, eq. 24 ------------------------------------------------------------------------------------------
 
 
 def feedback_checks(subject: Subject) -> Checks:
@@ -250,7 +250,7 @@ def feedback_checks(subject: Subject) -> Checks:
     yield equal(subject, "feedback.method", subject.stated("inputs.feedback.method"))
 
 
-# --- nominal gains K, (31)-(35) --------------------------------------------------------------------------------------
+# --- nominal gains K, eq. 31 to 35 ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -274,7 +274,7 @@ class NominalWeights:
         return cls(polytope.A[:, :N_RIGID, :N_RIGID], polytope.B[:, :N_RIGID], psi, sigma, bound)
 
     def cost(self, K: np.ndarray, Q: np.ndarray) -> float:
-        """Return the least gamma of (31) with gamma (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K at every vertex."""
+        """Return the least gamma (eq. 31) with gamma (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K at every vertex."""
         L = np.linalg.cholesky(Q)
         M = np.linalg.solve(L, (self.A + self.B @ K) @ L)
         decrease = np.eye(len(Q)) - np.swapaxes(M, 1, 2) @ M
@@ -284,7 +284,7 @@ class NominalWeights:
         return float(np.linalg.eigvals(np.linalg.solve(decrease, stage)).real.max())
 
     def decrease(self, K: np.ndarray, Q: np.ndarray, gamma: float) -> np.ndarray:
-        """Return the smallest eigenvalue (r) of (34) at each vertex for the cost ``gamma``, scaled to unit diagonal."""
+        """Return the smallest eigenvalue (r) of eq. 34 at each vertex for the cost ``gamma``, scaled to the unit."""
         L = np.linalg.cholesky(Q)
         M = np.linalg.solve(L, (self.A + self.B @ K) @ L)
         stage = np.vstack((np.sqrt(self.psi) @ L, np.sqrt(self.sigma) @ K @ L)) / np.sqrt(gamma)
@@ -356,11 +356,11 @@ def _gain_checks(subject: Subject, field: str, weights: NominalWeights, K: np.nd
     decrease = weights.decrease(K, Q, subject.stated(f"{field}.certified_gamma"))
     yield above(f"{field}: (34) smallest eigenvalue", decrease.min(), -ROUNDING)
     yield recomputed(subject, f"{field}.lmi_smallest_eigenvalues", decrease, "eigenvalues")
-    # (33): the design state lies in the ellipsoid.
+    # Eq. 33 (eq. 50 for K'): the design state lies in the ellipsoid.
     room = 1.0 - float(level(Q, state))
     yield above(f"{field}: (33) room of the design state", room, -ROUNDING)
     yield recomputed(subject, f"{field}.state_residual", room, "eigenvalues")
-    # (35): the largest |K x| over the ellipsoid stays within the bounds.
+    # Eq. 35 (eq. 52 for K'): the largest |K x| over the ellipsoid stays within the bounds.
     inputs = 1.0 - np.sum((K @ Q) * K, axis=1) / weights.bound**2
     yield above(f"{field}: (35) room of the inputs", inputs.min(), 0.0)
     yield recomputed(subject, f"{field}.input_residuals", inputs, "eigenvalues")
@@ -373,7 +373,7 @@ def symmetric(name: str, Q: np.ndarray) -> Check:
     return required(at_most(f"{name}, difference from its transpose", asymmetry, 0.0))
 
 
-# --- error system, (22), (23) ----------------------------------------------------------------------------------------
+# --- error system, eq. 22, eq. 23 -------------------------------------------------------------------------------------
 
 
 def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
@@ -398,7 +398,7 @@ class ErrorSystem(NamedTuple):
 
 
 def error_system(design: ControlDesign, vehicle: Vehicle, tau: np.ndarray, effectiveness: float = 1.0) -> ErrorSystem:
-    """Return the error system (22), (23) for the feedback tau F, with notch filter and actuators in the state.
+    """Return the error system (eq. 22, 23) for the feedback tau F, with notch filter and actuators in the state.
 
     The feedback uses the filtered pitch rate q_f = C_s s + D_s q. It drives the actuators, which act on the vehicle by
     their mean position over a period, C_a a + D_a u.
@@ -442,7 +442,7 @@ def factors(design: ControlDesign) -> list[np.ndarray]:
     return [one] if np.array_equal(design.tau_minimum, one) else [design.tau_minimum, one]
 
 
-# --- invariant set, (25)-(28), and tightened inputs, (30) ------------------------------------------------------------
+# --- invariant set, eq. 25 to 28, and tightened inputs, eq. 30 --------------------------------------------------------
 
 
 class Tube:
@@ -477,7 +477,7 @@ class Tube:
 
     @property
     def half_width(self) -> np.ndarray:
-        """Half-widths (n) of the set (28)."""
+        """Half-widths (n) of the set, eq. 28."""
         return self._narrowed(np.sqrt(np.diag(self.Q)), slice(N_RIGID))
 
     @property
@@ -504,7 +504,7 @@ class Tube:
         return 1.0 - image(self.Q, self.A / np.sqrt(self.lam), scaled) ** 2
 
     def tightened(self, lag: Sequence[Sequence[float]] = ((0.0, 0.0), (0.0, 0.0))) -> np.ndarray:
-        """Return the bounds (2, 2) of u_n + u_r by (30), (53): U minus the range of the feedback; rows lower, upper.
+        """Return the bounds (2, 2) of u_n + u_r (eq. 30, 53): U minus the range of the feedback; rows lower, upper.
 
         Args:
             lag: Minimum and maximum (2 each) of the feedback to the lag of the plan behind the actuators.
@@ -602,7 +602,7 @@ def lag_feedback(subject: Subject) -> Sequence[Sequence[float]]:
 
 
 def _tube_checks(subject: Subject, tube: Tube) -> Checks:
-    """Check the set, the disturbances and the tightened inputs stated under the field of ``tube``."""
+    """Check set (eq. 25 to 28), W (eq. 19) and tightened inputs (eq. 30, 53) stated under the field of ``tube``."""
     field = tube.field
     inside, inputs = f"{field}.invariant_set", subject.certificate["inputs"]["disturbance"]
     yield equal(subject, f"{inside}.kind", "ellipsoid")
@@ -636,7 +636,7 @@ def _tube_checks(subject: Subject, tube: Tube) -> Checks:
 
 
 def widened(bounds: np.ndarray, inflation: float) -> np.ndarray:
-    """Return ``bounds`` inflated by (19), rounded up to six significant digits; negative bounds become zero."""
+    """Return ``bounds`` inflated by eq. 19, rounded up to six significant digits; negative bounds become zero."""
     bounds = inflation * np.maximum(bounds, 0.0)
     quantum = 10.0 ** (np.floor(np.log10(np.where(bounds > 0.0, bounds, 1.0))) - 5.0)
     return np.asarray(quantum * np.ceil(bounds / quantum * (1.0 - 1e-12)))
@@ -678,7 +678,7 @@ def counter_example_checks(subject: Subject) -> Checks:
     yield required(at_most("counter-examples, largest share of a half-width", (driven / certified).max(), 1.0))
 
 
-# --- adjustable factor, (47)-(54) ------------------------------------------------------------------------------------
+# --- adjustable factor, eq. 47 to 54 ----------------------------------------------------------------------------------
 
 
 def factor_checks(subject: Subject) -> Checks:
@@ -773,7 +773,7 @@ def _full_state_checks(subject: Subject) -> Checks:
                 yield at_most(f"rightmost pole of the coupled vehicle, {coupling} coupling", pole, 0.0)
 
 
-# --- before a flight -------------------------------------------------------------------------------------------------
+# --- before a flight --------------------------------------------------------------------------------------------------
 
 Part = Callable[[Subject], Checks]
 
@@ -800,9 +800,9 @@ def preflight(design: ControlDesign, certificate: str = "") -> str:
     """Check a design before a flight; return a warning, or an empty string.
 
     A modified design may fly as long as the conditions for its safety hold: the gains are stable at every vertex; F
-    has a common Lyapunov function (24) and every K one by (34); the invariant set monitored in flight is the certified
-    set, and it is invariant at every vertex under the gain in flight. If one of these fails, the design is refused.
-    Any other difference from the certificate is a warning, and so is a missing certificate.
+    has a common Lyapunov function (eq. 24) and every K one (eq. 34); the invariant set monitored in flight is the
+    certified set, and it is invariant at every vertex under the gain in flight. If one of these fails, the design is
+    refused. Any other difference from the certificate is a warning, and so is a missing certificate.
 
     Args:
         design: The design to check.

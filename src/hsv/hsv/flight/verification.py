@@ -1,7 +1,7 @@
 """Flights and random sequences of a design repeated: the second half of :mod:`hsv.control.verification`.
 
 Nothing here comes from the code that computes designs. Flights are simulated by the real loop, and the disturbances
-that acted in them are what the polytopic model does not explain, (13)-(19).
+that acted in them are what the polytopic model does not explain, eq. 13 to 19.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ _FLIGHTS, _SEED = 48, 7
 
 
 def region(subject: Subject, design: ControlDesign, share: float) -> Components:
-    """Return the nominal flight of the declared region: the step of the design with ``share`` of the fault, (47)."""
+    """Return the nominal flight of the declared region: the step of the design with ``share`` of the fault, eq. 47."""
     declared = region_parameters(subject.certificate["inputs"], subject.vehicle, share)
     return assemble({**design.to_parameters(), **declared})
 
@@ -67,7 +67,7 @@ class Disturbances(NamedTuple):
 
 
 def disturbances(subject: Subject, flight: Flight) -> Disturbances:
-    """Return the disturbances in a flight, (13)-(18), and its error in the tube, (22).
+    """Return the disturbances in a flight (eq. 13 to 18), and its error in the tube (eq. 22).
 
     The disturbance is Delta(k) = x(k+1) - [x_r(k+1) + d_r(k)] - A(p) (x - x_r) - B(p) (u - u_r). Its part B_e(p) times
     the lost elevator deflection is due to the fault. The rest is represented by three held accelerations and the
@@ -154,7 +154,7 @@ def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
 
 
 def share_of(inputs: Mapping[str, Any]) -> float:
-    """Return the share of fault and parameter bounds that W' covers, (47): the largest factor, or 1 without one."""
+    """Return the share of fault and parameter bounds that W' covers (eq. 47): the largest factor, or 1 without one."""
     return float(max(inputs["adjustable"]["tau"])) if inputs.get("adjustable") else 1.0
 
 
