@@ -69,7 +69,7 @@ def flight_data(bag: Bag) -> FlightData:
 
 
 def flight_fingerprint(bag: Bag) -> str | None:
-    """Return the fingerprint of the flight in ``bag``, or ``None`` if steps are missing."""
+    """Return the fingerprint of the flight in ``bag``, or ``None`` if the recording is not complete."""
     topics = (STATE, FILTERED_STATE, NOMINAL, COMMAND, ACTUATOR)
     state, filtered, nominal, command, actuator = joined(bag, topics).values()
     every = np.arange(len(state["step"]))

@@ -50,7 +50,7 @@ def describe(bag: Bag) -> dict[str, Any]:
 
     Returns:
         ``path``, ``folder``, ``warnings`` (texts), ``complete`` (whether there are none), ``start_s``, ``duration_s``,
-        ``messages``, ``topics``, ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None
+        ``messages``, ``topics``, ``custom_data``, ``fingerprint`` (None if not complete), ``as_published`` (None
         without a published value), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
         entry per interval), ``equipment`` (deviations of sensors, links, effectors and air from the ideal, SI),
         ``step_times`` (wall times of the steps of the control law in ms, by node, and the control period),

@@ -34,7 +34,7 @@ class FlightSummary:
     metrics: Mapping[str, float]
     """Metrics by name, in SI units."""
     fingerprint: str | None
-    """Fingerprint of the flight; ``None`` if steps are missing."""
+    """Fingerprint of the flight; ``None`` if the recording is not complete."""
     design_hash: str
     ending: str
     """``finished``, ``diverged`` or ``broken off``."""

@@ -70,7 +70,7 @@ def as_published(found: str | None, scenario: Scenario | None, design_hash: str)
 def published_in_words(found: str | None, same: bool | None) -> str:
     """Return the result of :func:`as_published` as text."""
     if found is None:
-        return "none: steps are missing"
+        return "none: the recording is not complete"
     return {True: "as published", False: "not the published flight of this scenario", None: "none is published"}[same]
 
 
