@@ -53,6 +53,11 @@ def test_a_fault_acts_from_the_first_step_at_or_after_its_time(time, step):
     assert first_step(time, 0.02) == step
 
 
+def test_a_sensor_that_is_faulty_from_the_start_gives_its_first_measurement_without():
+    injector = injector_of((Fault.of("pitch_rate", "sensor_bias", {"offset": 0.1}), 0))
+    assert [result.active[0].since for result in (injector.step(step, COMMAND) for step in range(2))] == [1, 1]
+
+
 def test_faults_of_a_channel_act_together():
     injector = injector_of((loss(0.9), 0), (loss(0.5), 2), (loss(0.8, FUEL), 2))
     assert injector.step(1, COMMAND).active == active((loss(0.9), 0))

@@ -214,9 +214,9 @@ def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
     values = {"overshoot": max(0.0, float(np.max(done)) - 1.0)}
     if (risen := done >= 0.9).any():
         values["rise_time"] = float(time[np.argmax(risen)] - time[np.argmax(done >= 0.1)])
-    off = np.flatnonzero(np.abs(done - 1.0) > SETTLING_BAND)[-1:]
-    if not len(off) or off[0] + 1 < len(time):
-        values["settling_time"] = float(time[off[0] + 1 if len(off) else 0])
+    settled = np.flatnonzero(np.abs(done - 1.0) > SETTLING_BAND)[-1] + 1  # the first sample is outside the band
+    if settled < len(time):
+        values["settling_time"] = float(time[settled])
     return values
 
 
