@@ -110,18 +110,6 @@ def test_all_packages_have_one_version_which_the_library_and_the_citation_say():
     assert versions == {hsv.__version__} == {citation["version"]}
 
 
-@pytest.mark.parametrize(
-    "setup", [path for m in MANIFESTS for path in m.parent.glob("setup.py")], ids=lambda p: p.parent.name
-)
-def test_setup_takes_the_version_from_the_manifest(setup, tmp_path):
-    manifest = setup.with_name("package.xml").read_text(encoding="utf-8")
-    (tmp_path / "package.xml").write_text(manifest.replace(f"<version>{hsv.__version__}<", "<version>7.8.9<"))
-    (tmp_path / "setup.py").write_bytes(setup.read_bytes())
-    (tmp_path / setup.parent.name).symlink_to(setup.parent / setup.parent.name)
-    asked = [sys.executable, "setup.py", "--quiet", "--version"]
-    assert subprocess.run(asked, cwd=tmp_path, capture_output=True, text=True).stdout == "7.8.9\n"
-
-
 @pytest.fixture
 def checkout(tmp_path):
     """A copy of the files that a release changes, with something in every changelog to release."""

@@ -19,7 +19,7 @@ from hsv_node.lockstep import PeerNode
 
 
 class BlockNode(PeerNode):
-    """Answers the messages of each step with those of its block, on the topics of its role."""
+    """Steps its block with the messages of each step, and publishes the results on the topics of its role."""
 
     component: Any
     """The component that is stepped; set by the node."""

@@ -150,7 +150,7 @@ class PlanBounds:
 
     @property
     def upper(self) -> np.ndarray:
-        """Largest inputs (2) inside both."""
+        """Largest inputs (2) inside both bounds."""
         return np.minimum(self.input_maximum, self.region_maximum[:2])
 
     @property

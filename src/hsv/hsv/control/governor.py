@@ -2,8 +2,8 @@
 
 A command is a list of legs: a point of altitude and velocity, the time of the request, and the least duration. A leg is
 flown as a ramp with blended corners along the climbing, accelerating trims of :mod:`hsv.control.reference_trajectory`.
-Its length is found by bisection, in whole periods: the shortest for which x_n (paper eq. 20), driven by the defect of
-the reference, leaves u_r + u_n inside U minus F Z (eq. 30) in every step, and no input changes faster than its actuator
+Its length is found by bisection, in whole periods: the shortest that keeps u_r + u_n inside U minus F Z (paper eq. 30)
+in every step, with x_n (eq. 20) driven by the defect of the reference, and changes no input faster than its actuator
 can.
 """
 
@@ -232,7 +232,7 @@ class Governor:
         return ""
 
     def _planned(self, corners: Sequence[Corner], beginning: Beginning) -> tuple[np.ndarray, np.ndarray, bool]:
-        """Return u_r + u_n (k, 2), x_n (k, 9), and whether x_n stayed in the family."""
+        """Return u_r + u_n (k, 2), x_n (k, 9), and whether x_n stayed in the ellipsoids of the nominal gains."""
         rows = self._steps(corners[-1].time + corners[-1].blend + AFTERWARDS) - beginning.step
         plan, deviation = np.empty((rows, N_INPUTS)), np.empty((rows, N_STATES))
         reference = self.trajectory(corners).data

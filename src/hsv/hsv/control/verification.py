@@ -87,7 +87,7 @@ _LONGEST = 10_000
 
 _STATUS = ("optimal", "optimal_inaccurate")
 _KEPT_OFF = 0.05
-"""Distance of the plan bounds from the top of the certified plans, as a share of their range."""
+"""Share of the range of the certified plans by which the bounds of plans in flight lie below it."""
 
 
 # --- algebra ----------------------------------------------------------------------------------------------------------
@@ -150,7 +150,10 @@ def statement_checks(subject: Subject) -> Checks:
 
 
 def input_checks(subject: Subject) -> Checks:
-    """Compare what the design copies: T (eq. 12), notch (eq. 38), U (eq. 29); check that weights sum to 1 (eq. 11)."""
+    """Compare what the design copies: T (eq. 12), notch (eq. 38), U (eq. 29), and check the scheduling weights.
+
+    They sum to one (eq. 11), and none is negative (eq. 12).
+    """
     design, inputs = subject.design, subject.certificate["inputs"]
     yield recomputed(subject, "inputs.model.period", design.period, "copied")
     for i, section in enumerate(design.notch):
@@ -584,6 +587,7 @@ def set_checks(subject: Subject) -> Checks:
     yield above("room of the nominal plan", min((lowest - bounds[0]).min(), (bounds[1] - highest).min()), 0.0)
     yield Check("nominal plan bounds", str(design.plan_bounds is not None), "True", design.plan_bounds is not None)
     if design.plan_bounds is not None:
+        # Our own, besides eq. 30: plans in flight keep to the range of the certified ones, shifted down.
         low, high = plan["pitch_acceleration"]
         lowest, highest = np.append(lowest, low), np.append(highest, high)
         shift = _KEPT_OFF * (highest - lowest) * np.array([1.0, 1.0, 0.0])
@@ -618,6 +622,7 @@ def _tube_checks(subject: Subject, tube: Tube) -> Checks:
     at_start = float(level(tube.Q, -tube.c))
     yield required(at_most(f"{field}: level of e = 0", at_start, 1.0))
     yield recomputed(subject, f"{inside}.certificate.level_of_zero_error", at_start, "eigenvalues")
+    # W (eq. 19) from the measured bounds; inflation and share are margins of our own.
     measured = subject.stated(f"{field}.disturbance.measured")
     for side, bounds, sign in (("lower", tube.lower, -1.0), ("upper", tube.upper, 1.0)):
         outward = widened(sign * np.array(measured[side]), inputs["inflation"])
@@ -636,7 +641,7 @@ def _tube_checks(subject: Subject, tube: Tube) -> Checks:
 
 
 def widened(bounds: np.ndarray, inflation: float) -> np.ndarray:
-    """Return ``bounds`` inflated by eq. 19, rounded up to six significant digits; negative bounds become zero."""
+    """Return ``bounds`` times ``inflation``, rounded up to six significant digits; negative bounds become zero."""
     bounds = inflation * np.maximum(bounds, 0.0)
     quantum = 10.0 ** (np.floor(np.log10(np.where(bounds > 0.0, bounds, 1.0))) - 5.0)
     return np.asarray(quantum * np.ceil(bounds / quantum * (1.0 - 1e-12)))
@@ -744,7 +749,7 @@ def adjustable_checks(subject: Subject) -> Checks:
 
 
 def _full_state_checks(subject: Subject) -> Checks:
-    """Check the rightmost poles of the coupled vehicle under the full-state F' of section 4.3 and the structured F.
+    """Check the rightmost poles of the coupled vehicle (eq. 42) under F' (eq. 24 for eq. 45) and the structured F.
 
     The full-state F' cancels the notch filter.
     """

@@ -76,7 +76,7 @@ class Plan:
 
     @classmethod
     def of(cls, subject: CertifiedDesign) -> Plan:
-        """Fly the nominal vehicle over the declared region of ``subject``."""
+        """Return the plan of the nominal vehicle's flight with the declared fault of ``subject``."""
         inputs = subject.inputs
         return cls(subject, Region(subject.design, inputs, incomplete_share(inputs)).fly({}))
 

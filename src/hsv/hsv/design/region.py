@@ -37,9 +37,9 @@ def incomplete_share(inputs: DesignInputs) -> float:
 
 
 class Region:
-    """The flights of a design over ``share`` of its declared region: of fault and parameter bounds (paper eq. 47).
+    """The flights of a design at corners of its declared region: bounds of fault and parameters times ``share``.
 
-    ``equipment``: flat parameters of what else is not ideal.
+    The share is that of paper eq. 47. ``equipment``: flat parameters of hardware and air that are not ideal.
     """
 
     def __init__(

@@ -193,6 +193,7 @@ def flight_checks(subject: Subject) -> Checks:
     )
     yield _lag_check("feedback to the lag of the plan", subject, flown)
     if "adjustable" in subject.certificate:
+        # Our own: the whole fault (W) stays in the set of W' (eq. 47) in these flights; eq. 26 does not guarantee it.
         whole, everyone = region(subject, certified, 1.0), corners(bounds.uncertainty, 1.0)
         field = "adjustable.complete_fault"
         yield recomputed(subject, f"{field}.flights", len(everyone), "copied")
@@ -208,6 +209,7 @@ def _worst(subject: Subject, field: str, flown: Sequence[Evidence]) -> Checks:
 
 
 def _lag_check(name: str, subject: Subject, flown: Sequence[Evidence]) -> Check:
+    """Check the feedback to the plan's lag; our own, since the actuators of the paper have no dynamics."""
     lower, upper = lag_feedback(subject)
     room = min(float(min((f.lag[0] - lower).min(), (upper - f.lag[1]).min())) for f in flown)
     return above(f"{name}, room to its bounds", room, -ROUNDING)

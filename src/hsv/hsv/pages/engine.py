@@ -98,7 +98,7 @@ def compressed(data: bytes) -> Markup:
 
 
 def render(template: str, *, plots: Sequence[Plot] = (), numbers: Numbers | None = None, **values: Any) -> str:
-    """Return a page of ``plots`` and their ``numbers``; the page's script receives ``described`` among ``values``."""
+    """Return a page of ``plots`` and ``numbers``; ``values`` fill the template, ``described`` goes to its script."""
     environment = Environment(
         loader=PackageLoader("hsv.pages", "template"),
         autoescape=template.endswith(".html.j2"),

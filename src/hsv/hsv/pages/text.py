@@ -28,7 +28,7 @@ def quantity(value: float | None, unit: str, digits: int = 5, *, signed: bool = 
 
 
 def in_brackets(unit: str, *, share: bool = False) -> Markup:
-    """Return the unit in all systems as it follows a heading; nothing for a pure number."""
+    """Return the unit in brackets, as after a heading, in every system of units; nothing for a pure number."""
     names = {system: unit_html(in_system(1.0, unit, system, share=share)[1]) for system in SYSTEMS}
     return switched({system: f" [{name}]" if name else "" for system, name in names.items()})
 

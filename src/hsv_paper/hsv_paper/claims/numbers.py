@@ -229,7 +229,7 @@ def falls(evidence: Evidence) -> Numbers:
 
 
 def passed(evidence: Evidence) -> Numbers:
-    """Return the effect of the filter off its centre: lag (rad), and the change of gain (dB) far above it."""
+    """Return the filter's effect off its centre: lag (rad), and change of gain (dB) at ten times the centre."""
     section, crossover = design("baseline").notch[0], float(margins(evidence, {}, notched=False)[0, 0])
     slow_lag, lag = -np.angle(notch_response([section], np.array([1.0, crossover])))
     far = np.array([10.0 * section.zero_frequency])

@@ -68,7 +68,7 @@ def deepest_fault(vehicle: VehicleParameters, envelope: Vehicle, delay: float) -
 
 
 def fault_row(fault: Optimum, delay: float) -> dict[str, Any]:
-    """Return a row of the table of the deepest faults, with the limits found without optimisation."""
+    """Return the row of ``fault``: the deepest one by optimisation, beside the limits known without it."""
     vehicle, found = fault.problem.vehicle, fault.found
     numbers = {
         "least P": found.scalar,

@@ -210,13 +210,13 @@ def verdict(
     models: Sequence[Model] = (),
     lag: Lag = None,
 ) -> Verdict:
-    """Return whether ``design`` is certified with ``models`` in addition to its certificate's disturbances.
+    """Return whether ``design`` stays certified if ``models`` of hardware and air add to its disturbances.
 
     Args:
         name: Name of the verdict.
         design: Design of ``subject``, with the actuators to certify.
         subject: The design with its certificate.
-        models: Models next to those disturbances.
+        models: Models that are added.
         lag: Lag of the nominal input.
     """
     tube, inputs = subject.certificate["tube"], subject.inputs.invariant_set
