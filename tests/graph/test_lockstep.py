@@ -179,7 +179,7 @@ def test_a_vehicle_outside_the_certified_set_is_told(processes):
     status = Bag(path).columns("/hsv/tube_status")
     assert set(status["status"]) == {TubeStatusCode.UNCERTIFIED_VEHICLE} and status["inside"].all()
     told = processes.run("hsv", "info", path).stdout
-    assert "vehicle that the design is not certified for" in " ".join(told.split())
+    assert "uncertified steps 51" in told and "vehicle.coupling: derived; the certificate is for paper_like" in told
 
 
 @pytest.mark.long
