@@ -80,11 +80,11 @@ def tampered_design(subject, name, draw):
 
 
 def place(certificate, field):
-    """Return the table or list that holds a field, and the field's key there."""
-    *parents, last = field.split(".")
-    for key in parents:
-        certificate = certificate[int(key) if isinstance(certificate, list) else key]
-    return certificate, last
+    """Return the table that holds a field, and the field's key there, which may have points."""
+    if field in certificate:
+        return certificate, field
+    key, _, inside = field.partition(".")
+    return place(certificate[int(key) if isinstance(certificate, list) else key], inside)
 
 
 def tampered_certificate(subject, field, draw):
@@ -97,7 +97,7 @@ def tampered_certificate(subject, field, draw):
     certificate = copy.deepcopy(subject.certificate)
     table, last = place(certificate, field)
     value = table[last]
-    if isinstance(value, list) and not isinstance(value[0], str):
+    if isinstance(value, list) and value and not isinstance(value[0], str):
         values = np.array(value, object)
         entry = tuple(int(draw.integers(n)) for n in (values.shape[:1] if share == -1.0 else values.shape))
         values[entry] += 1 if isinstance(values[entry], int) else share * abs(values[entry]) + 1e-6

@@ -117,11 +117,10 @@ def test_flights_and_bags_need_no_extra_and_a_missing_one_is_named(tmp_path):
     assert ran.stderr.splitlines() == expected and ran.returncode == 0
 
 
-PACKAGE = Path(__file__).parents[2] / "src" / "hsv"
-
-
 def test_without_a_compiler_one_line_names_the_packages_to_install():
     command = [sys.executable, "setup.py", "--version"]
-    ran = subprocess.run(command, cwd=PACKAGE, env=os.environ | {"CC": "absent"}, capture_output=True, text=True)
+    ran = subprocess.run(
+        command, cwd=ROOT / "src" / "hsv", env=os.environ | {"CC": "absent"}, capture_output=True, text=True
+    )
     needed = "hsv needs a C compiler and Python's header files: sudo apt-get install g++ python3-dev\n"
     assert (ran.returncode, ran.stdout, ran.stderr) == (1, "", needed)
