@@ -5,13 +5,23 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from frames import composed
 from published_model import DERIVED, FOOT, SLUG
 
 from hsv.model.airframe.geometry import EIGENVALUE, Cantilever, airframe
-from hsv.model.airframe.pose import BODY, ELEVATOR, FLIGHT_PATH, Sample, segments
+from hsv.model.airframe.pose import BODY, ELEVATOR, FLIGHT_PATH, LEVEL, Sample, Transform, segments, transforms
 from hsv.model.airframe.solids import solids
 from hsv.model.vehicle import load_vehicle
+
+
+def composed(sample, root=LEVEL, exaggeration=None):
+    """Return the transforms of all frames below ``root`` relative to it."""
+    found = {root: Transform(root, root)}
+    for own in transforms(sample, exaggeration):
+        if outer := found.get(own.parent):
+            cos, sin = math.cos(outer.pitch), math.sin(outer.pitch)
+            x, z = outer.x + own.x * cos - own.z * sin, outer.z + own.x * sin + own.z * cos
+            found[own.child] = Transform(root, own.child, x, z, outer.pitch + own.pitch)
+    return found
 
 
 def test_lengths_add_up_to_the_published_hundred_feet():
