@@ -1,8 +1,7 @@
 """Set the bench up: what "make setup" runs. Needs Python 3.11 or 3.12 and what its first error message names.
 
-Makes the virtual environment .venv with the pinned packages, ROS 2 Jazzy among them where none is sourced, and builds
-the packages of src and ros_ws/src with colcon, which generates the messages and compiles the core. A complete step
-leaves a stamp with what it was made of and is skipped as long as that is unchanged, also after an interruption.
+Makes .venv with the pinned packages, ROS 2 Jazzy among them where none is sourced, and builds the packages by colcon. A
+complete step leaves a stamp of what it was made of and is skipped as long as that is unchanged.
 """
 
 from __future__ import annotations
@@ -132,7 +131,7 @@ def install(title: str, route: str, files: list[str], env: dict[str, str]) -> No
 
 
 def relocate() -> None:
-    """Replace the prefix of the Python for which the ROS wheels were built, in their CMake files and ament index."""
+    """Replace the prefix of the Python for which ROS wheels, if any, were built, in their CMake files and ament index."""
     share = VENV / "share"
     for path in [*share.glob("*/cmake/*.cmake"), *share.glob("ament_index/resource_index/parent_prefix_path/*")]:
         before = path.read_text()
@@ -205,8 +204,7 @@ def set_up(route: str, env: dict[str, str]) -> None:
     if not installed:
         make_environment(route, env)
         install("Packages for the build", route, files[:1], env)
-        if route == "wheels":
-            relocate()
+        relocate()
     for gone in {path.parent for path in INSTALL.glob("*/hsv-setup")} - {INSTALL / name for name in keys}:
         shutil.rmtree(gone)
     building = build(route, outdated, env) if outdated else None
@@ -229,8 +227,7 @@ def main() -> int:
     if sys.prefix != sys.base_prefix:  # the interpreter of the environment itself, or of another one
         os.execve(BASE, [BASE, *sys.argv], clean_environment(route))
     if route not in ROUTES:
-        print(f"make setup: ROS_DISTRO={route} is sourced, expected jazzy or no ROS in this shell", file=sys.stderr)
-        return 1
+        sys.exit(f"make setup: ROS_DISTRO={route} is sourced, expected jazzy or no ROS in this shell")
     lock = os.open(ROOT, os.O_RDONLY)
     os.set_inheritable(lock, True)
     try:
