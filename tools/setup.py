@@ -131,7 +131,7 @@ def install(title: str, route: str, files: list[str], env: dict[str, str]) -> No
 
 
 def relocate() -> None:
-    """Replace the prefix of the Python for which ROS wheels, if any, were built, in their CMake files and ament index."""
+    """Replace the prefix of the Python for which ROS wheels, if any, were built, in CMake files and ament index."""
     share = VENV / "share"
     for path in [*share.glob("*/cmake/*.cmake"), *share.glob("ament_index/resource_index/parent_prefix_path/*")]:
         before = path.read_text()
