@@ -91,4 +91,6 @@ def test_what_a_campaign_of_whole_flights_opens_with(browser, screen, tmp_path, 
     screen(1280)
     browser.open(page)
     assert browser.run("return document.querySelector('.lead').innerText").startswith(f"{within_all(results)} of 100 ")
+    first = "return document.querySelector('.opening:has(.bound) figcaption').innerText"
+    assert browser.run(first).startswith("The limit that most flights break: altitude end error")
     browser.picture(pictures / "montecarlo.png")

@@ -30,7 +30,7 @@ from hsv.flight.flight import Flight
 from hsv.flight.metrics import METRICS, Group, in_words, is_share
 from hsv.model.plant import Plant
 from hsv.pages.engine import Numbers, Plot, render, write_page
-from hsv.pages.picture import picture
+from hsv.pages.picture import Picture, picture
 from hsv.pages.text import capitalised, quantity, units_of
 
 POINTS = 2000
@@ -74,6 +74,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
     numbers = Numbers()
     drawn = np.arange(0, results.campaign.samples, -(-results.campaign.samples // POINTS))
     end = _windows(results)[-1]
+    failed = most_failed(judged)
     envelopes = _envelopes(results, flights, numbers)
     pictured = [plot for name in PICTURED for plot in envelopes if plot.name == f"envelope_{name}"]
     starts = [fault.start for fault in results.campaign.scenario.fault]
@@ -102,6 +103,8 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
         units=units,
         sections={name: heading for name, heading in SECTIONS.items() if differing or name != "scatter"},
         sentence=sentence(results),
+        failed=failed and in_words(failed.name),
+        sorted=failed and _sorted(results, failed, numbers),
         picture=picture(pictured, numbers, end, shades),
         result=results.path.name,
         shares=judged,
@@ -121,16 +124,34 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
 
 def sentence(results: Results) -> str:
     """Return the verdict: the number of flights within all limits, and the limit that most flights exceed."""
-    ended, *limited = shares(results)
+    ended, *limited = judged = shares(results)
     lost = ended.flights - ended.within
     ending = f"{lost} of {ended.flights} flights did not come to their end" if lost else "All flights came to their end"
     if not limited:
         return f"{ending}; there are no limits to judge them by."
     text = f"{within_all(results)} of {ended.flights} flights are within all {len(limited)} limits"
-    failed = min(limited, key=lambda share: share.within)
-    if broken := failed.flights - failed.within:
+    if failed := most_failed(judged):
+        broken = failed.flights - failed.within
         text += f"; most often not kept is the limit of {in_words(failed.name)}, by {broken} of {ended.flights}"
     return f"{text}. {ending}."
+
+
+def most_failed(judged: Sequence[Share]) -> Share | None:
+    """Return the limit that most flights exceed, or None if no flight exceeds one."""
+    over = min((share for share in judged if share.limit is not None), key=lambda share: share.within, default=None)
+    return over if over is not None and over.within < over.flights else None
+
+
+def _sorted(results: Results, failed: Share, numbers: Numbers) -> Picture:
+    """Return the picture of the metric that fails most: the sorted magnitudes of all flights, and the limit."""
+    values = np.sort(np.abs(results.column(failed.name)))  # flights that do not define the metric come last, as NaN
+    across = 100.0 * (np.arange(len(values)) + 0.5) / len(values)
+    limit = "bound", None, np.array([0.0, 100.0]), np.full(2, failed.limit)
+    lines = (limit, ("actual", 0, across, values))
+    curves = [{"kind": kind, "run": run, "x": numbers.add(x), "y": numbers.add(y)} for kind, run, x, y in lines]
+    title = f"{capitalised(in_words(failed.name))}, magnitude"
+    plot = Plot("sorted", title, OUTCOMES[failed.name], "", curves, share=is_share(failed.name))
+    return picture([plot], numbers, 100.0, axis="flights, in order of magnitude [%]")
 
 
 def _grouped(shown: Sequence[Distribution]) -> dict[str, list[Distribution]]:

@@ -37,6 +37,7 @@ class Picture(NamedTuple):
     """Drawings over one axis; a shade has its start and its width in percent."""
 
     drawings: list[Drawing]
+    axis: str
     ticks: list[Tick]
     shades: list[tuple[float, float]]
 
@@ -46,12 +47,13 @@ def picture(
     numbers: Numbers,
     end: float,
     shades: Sequence[tuple[float, float]] = (),
+    axis: str = "time [s]",
     kinds: Sequence[str] = DRAWN,
 ) -> Picture:
-    """Return the picture of ``plots``, all over the time 0 ... ``end`` (s), with stretches of it shaded."""
+    """Return the picture of ``plots``, all over 0 ... ``end``, with stretches of the axis shaded."""
     marked = [(100.0 * start / end, 100.0 * (stop - start) / end) for start, stop in shades]
     drawings = [_drawing(plot, numbers, end, kinds) for plot in plots]
-    return Picture(drawings, _ticks(0.0, end, 1.0, 8), marked)
+    return Picture(drawings, axis, _ticks(0.0, end, 1.0, 8), marked)
 
 
 def _drawing(plot: Plot, numbers: Numbers, end: float, kinds: Sequence[str]) -> Drawing:
