@@ -150,7 +150,7 @@ def statement_checks(subject: Subject) -> Checks:
 
 
 def input_checks(subject: Subject) -> Checks:
-    """Compare what the design copies: T (eq. 12), notch (eq. 38), U (eq. 29), and check the scheduling weights.
+    """Compare what the design copies: period (eq. 12), notch (eq. 38), U (eq. 29), and check the scheduling weights.
 
     They sum to one (eq. 11), and none is negative (eq. 12).
     """
@@ -209,7 +209,7 @@ def recomputed_model(subject: Subject) -> tuple[PolytopicModel, tuple[np.ndarray
 
 
 def model_checks(subject: Subject) -> Checks:
-    """Compare vertices, weights and accuracy of the model with values recomputed from the vehicle parameters."""
+    """Compare vertices (eq. 12), weights and accuracy (xi, eq. 11) with values recomputed from the vehicle."""
     design, inputs, (model, scales) = subject.design, subject.certificate["inputs"]["model"], recomputed_model(subject)
     shown = "{} from the vehicle".format
     yield parameter(subject, "model.a", design.polytope.A, model.polytope.A, shown("model.a"))
@@ -277,7 +277,10 @@ class NominalWeights:
         return cls(polytope.A[:, :N_RIGID, :N_RIGID], polytope.B[:, :N_RIGID], psi, sigma, bound)
 
     def cost(self, K: np.ndarray, Q: np.ndarray) -> float:
-        """Return the least gamma (eq. 31) with gamma (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K at every vertex."""
+        """Return the least gamma_n (eq. 32): gamma_n (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K (eq. 34) everywhere.
+
+        Everywhere is at every vertex, and A_c = A + B K.
+        """
         L = np.linalg.cholesky(Q)
         M = np.linalg.solve(L, (self.A + self.B @ K) @ L)
         decrease = np.eye(len(Q)) - np.swapaxes(M, 1, 2) @ M
@@ -287,7 +290,7 @@ class NominalWeights:
         return float(np.linalg.eigvals(np.linalg.solve(decrease, stage)).real.max())
 
     def decrease(self, K: np.ndarray, Q: np.ndarray, gamma: float) -> np.ndarray:
-        """Return the smallest eigenvalue (r) of eq. 34 at each vertex for the cost ``gamma``, scaled to the unit."""
+        """Return the smallest eigenvalue (r) of eq. 34 at each vertex, its diagonal blocks scaled to the identity."""
         L = np.linalg.cholesky(Q)
         M = np.linalg.solve(L, (self.A + self.B @ K) @ L)
         stage = np.vstack((np.sqrt(self.psi) @ L, np.sqrt(self.sigma) @ K @ L)) / np.sqrt(gamma)
@@ -474,7 +477,7 @@ class Tube:
 
     @property
     def columns(self) -> np.ndarray:
-        """Effect (r, n, 8) on e - c of each channel of W at half its width, then the drift of c under its mid-point."""
+        """Effect (r, n, 8) on e - c: of each channel of W at half its width, and of the drift of c at W's mid-point."""
         drift = self.A @ self.c + self.G @ self.middle - self.c
         return np.concatenate((self.G * self.half, drift[:, :, None]), axis=2)
 
@@ -497,7 +500,7 @@ class Tube:
         return np.append(np.minimum(bounds[: len(star)], star), bounds[len(star) :])
 
     def residuals(self) -> np.ndarray:
-        """Return the residuals (r) of eq. 27, which proves eq. 26 by the S-procedure at vertices with a positive one.
+        """Return the residuals (r) of the S-procedure, one a vertex; where positive, the ellipsoid satisfies eq. 26.
 
         Errors in the set satisfy lam v' Q^-1 v <= lam, disturbances sum_j l_j d_j^2 <= sum_j l_j <= 1 - lam.
         """
@@ -619,6 +622,7 @@ def _tube_checks(subject: Subject, tube: Tube) -> Checks:
     shown = f"{field}: invariance, smallest eigenvalue over the vertices"
     yield replace(required(above(shown, residuals.min(), 0.0)), fields=fields)
     yield recomputed(subject, f"{inside}.certificate.lmi_smallest_eigenvalues", residuals, "eigenvalues")
+    # A flight starts at e = 0, which lies in Z (eq. 25); Z has a centre c of our own, since W is not symmetric.
     at_start = float(level(tube.Q, -tube.c))
     yield required(at_most(f"{field}: level of e = 0", at_start, 1.0))
     yield recomputed(subject, f"{inside}.certificate.level_of_zero_error", at_start, "eigenvalues")
@@ -664,8 +668,8 @@ def _star_checks(subject: Subject, tube: Tube) -> Checks:
 def counter_example_checks(subject: Subject) -> Checks:
     """Recompute the reach of the stated disturbance sequences (eq. 22), a lower bound of every half-width (eq. 28).
 
-    At a constant vertex i, the output c e(m) is at most sum_j |c A_i^j G_i| half over the last m steps, and
-    disturbances with the signs of the terms attain it.
+    At a constant vertex i, an output row y has |y e(m)| <= sum over j < m of |y A_i^j G_i| half, which disturbances
+    with the signs of the terms attain.
     """
     inside = "tube.invariant_set"
     if "star_norms" not in subject.stated(inside):
@@ -731,7 +735,7 @@ def adjustable_checks(subject: Subject) -> Checks:
     # The paper states Z' = tau Z after eq. 48; the certificate keeps it for comparison with the computed Z'.
     scaled = np.append(tau, np.full(len(complete.c) - N_RIGID, tau[-1])) * complete.half_width
     yield recomputed(subject, "adjustable.scaled_half_width", scaled, "half-widths")
-    # Eq. 52: the bound of |u_n| grows with the room at the target trim, by the ratio of U minus F' Z' to U minus F Z.
+    # Eq. 53: its room U minus F' Z' over that of eq. 30, at the target trim, scales the bound of eq. 52 (our own rule).
     target = subject.stated("inputs.nominal.target")
     at_target = trim(subject.vehicle.decoupled, target["altitude"], target["velocity"]).input
     rooms = [np.minimum(at_target - t[0], t[1] - at_target) for t in (complete.tightened(), incomplete.tightened())]
@@ -749,15 +753,16 @@ def adjustable_checks(subject: Subject) -> Checks:
 
 
 def _full_state_checks(subject: Subject) -> Checks:
-    """Check the rightmost poles of the coupled vehicle (eq. 42) under F' (eq. 24 for eq. 45) and the structured F.
+    """Check the poles of the coupled vehicle (eq. 42) under the structured F and under F' (eq. 24 on model eq. 45).
 
-    The full-state F' cancels the notch filter.
+    The full-state F' acts on all states of the rigid vehicle and of the notch filter.
     """
     design, field, notch = subject.design, "adjustable.full_state", notch_in_series(subject.design)
     gain, whole = np.array(subject.stated(f"{field}.gain")), recomputed_model(subject)[0].whole
     kept = [*range(N_RIGID), *range(N_STATES, N_STATES + len(notch.B))]
     loops = whole.A[:, kept][:, :, kept] + whole.B[:, kept] @ gain
     yield recomputed(subject, f"{field}.spectral_radii", radii(loops), "spectral radii")
+    # Our own: F' on the true pitch rate, through q' = C x_q + d_q q (eq. 39), shows that F' cancels the notch filter.
     on_rate = (gain @ from_true_rate(notch)[np.ix_(kept, kept)])[1, PITCH_RATE]
     check = recomputed(subject, f"{field}.elevator_on_pitch_rate", on_rate, "feedback gain")
     yield replace(check, fields=(f"{field}.elevator_on_pitch_rate", f"{field}.gain"))

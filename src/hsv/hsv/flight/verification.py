@@ -50,7 +50,7 @@ _FLIGHTS, _SEED = 48, 7
 
 
 def region(subject: Subject, design: ControlDesign, share: float) -> Components:
-    """Return the nominal flight of the declared region: the step of the design with ``share`` of the fault, eq. 47."""
+    """Return the loop that flies the step of the design, without uncertainty, with ``share`` of the fault (eq. 47)."""
     declared = region_parameters(subject.certificate["inputs"], subject.vehicle, share)
     return assemble({**design.to_parameters(), **declared})
 
@@ -161,7 +161,7 @@ def share_of(inputs: Mapping[str, Any]) -> float:
 def flight_checks(subject: Subject) -> Checks:
     """Repeat the flights at the corners that determine a bound of W (eq. 19), and at a sample of all corners.
 
-    Their errors stay in the set (eq. 26), and their plans in the tightened bounds (eq. 30).
+    Errors stay in the set (eq. 26), plans in the stated range, itself within eq. 30; pitch acceleration is our own.
     """
     certified = replace(subject.design, tau=subject.design.tau_minimum)  # in flight the factor may be another one
     subject = replace(subject, design=certified)
@@ -238,7 +238,7 @@ def bounding_corners(subject: Subject) -> list[Corner]:
 def scenario_checks(
     subject: Subject, scenario: Scenario, over: Sequence[Corner] = ({},), progress: Progress = lambda *_: None
 ) -> Checks:
-    """Fly ``scenario`` with the design, the vehicle changed to each of ``over``, and check level, disturbances, plan.
+    """Fly ``scenario``, also with the changes ``over``; check level (eq. 26), disturbances (eq. 19), plan (eq. 30).
 
     Raises:
         DesignError: The scenario is not flown by the tube law.
