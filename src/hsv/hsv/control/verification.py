@@ -209,7 +209,7 @@ def recomputed_model(subject: Subject) -> tuple[PolytopicModel, tuple[np.ndarray
 
 
 def model_checks(subject: Subject) -> Checks:
-    """Compare vertices (eq. 12), weights and accuracy (xi, eq. 11) with values recomputed from the vehicle."""
+    """Compare vertices (eq. 12), singular values, weights and accuracy xi (eq. 11) with values from the vehicle."""
     design, inputs, (model, scales) = subject.design, subject.certificate["inputs"]["model"], recomputed_model(subject)
     shown = "{} from the vehicle".format
     yield parameter(subject, "model.a", design.polytope.A, model.polytope.A, shown("model.a"))
@@ -510,7 +510,7 @@ class Tube:
         return 1.0 - image(self.Q, self.A / np.sqrt(self.lam), scaled) ** 2
 
     def tightened(self, lag: Sequence[Sequence[float]] = ((0.0, 0.0), (0.0, 0.0))) -> np.ndarray:
-        """Return the bounds (2, 2) of u_n + u_r (eq. 30, 53): U minus the range of the feedback; rows lower, upper.
+        """Return the bounds (2, 2) of u_n + u_r: U minus the range of feedback (eq. 30; eq. 53 prints a plus for it).
 
         Args:
             lag: Minimum and maximum (2 each) of the feedback to the lag of the plan behind the actuators.
@@ -548,7 +548,7 @@ class StarNorms(NamedTuple):
         )
 
     def start(self, tube: Tube) -> float:
-        """Return the largest level of the start of a flight, e = 0, in the ellipsoids.
+        """Return the largest level of the start e = 0 (in Z, eq. 25) in the ellipsoids; the split below is our own.
 
         The start lies at -c, which is split into one term per channel: the steady response of the mean vertex to the
         mid-point of the channel. The last term takes the remainder.
@@ -731,7 +731,7 @@ def adjustable_checks(subject: Subject) -> Checks:
     complete = Tube(subject, replace(design, tau=one, tau_minimum=one), "adjustable.complete")
     incomplete = Tube(subject, design, "adjustable.incomplete")
     yield from _tube_checks(subject, complete)
-    yield from _tube_checks(subject, incomplete)
+    yield from _tube_checks(subject, incomplete)  # Z' and W' of eq. 47, in the form of eq. 25 to 28 and eq. 19
     # The paper states Z' = tau Z after eq. 48; the certificate keeps it for comparison with the computed Z'.
     scaled = np.append(tau, np.full(len(complete.c) - N_RIGID, tau[-1])) * complete.half_width
     yield recomputed(subject, "adjustable.scaled_half_width", scaled, "half-widths")
