@@ -79,8 +79,6 @@ def test_a_missing_field_is_named(table):
         parse_inputs(table)
 
 
-DESIGNS = sorted(path.stem for path in Path(__file__).parents[2].glob("offline_design/*.toml"))
-
 AGREED = 1e-4
 """In scaled coordinates; `hsv design --check` itself asks for ten times less."""
 
@@ -95,7 +93,10 @@ PROCESSORS = {
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize(
     ("name", "processor"),
-    [("baseline", "Haswell, two threads"), *((name, "Nehalem, libm without FMA") for name in DESIGNS)],
+    [
+        ("baseline", "Haswell, two threads"),
+        *((name, "Nehalem, libm without FMA") for name in ("adjustable", "realistic", "tight", "winged_cone")),
+    ],
 )
 def test_a_shipped_design_comes_out_as_shipped(name, processor):
     words = [sys.executable, "-m", "hsv.cli.entry", "design", name, "--check", "--json"]

@@ -109,13 +109,12 @@ def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes):
 
 @pytest.mark.long
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize("pace", ["1", "0"], ids=["real time", "full speed"])
-@pytest.mark.parametrize("controller", ["tube_mpc", "node:hsv_example_node/regulator"])
+@pytest.mark.parametrize(("controller", "pace"), [("tube_mpc", "0"), ("node:hsv_example_node/regulator", "1")])
 def test_commands_in_flight_beside_four_busy_processes(processes, controller, pace):
     busy = [processes.start(sys.executable, "-c", "while True: pass") for _ in range(4)]
     path = short_scenario(processes.folder, duration=3600, fault=6)
     path.write_text(f'controller = "{controller}"\n{path.read_text()}')
-    bags = [processes.folder / name for name in "abcde"]
+    bags = [processes.folder / name for name in "abc"]
     for bag in bags:
         flight = processes.start("hsv", "run", path, "--bag", bag, "--real-time-factor", pace, "--no-report")
         fly_until(flight, bag, 50)
