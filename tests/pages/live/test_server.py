@@ -162,7 +162,7 @@ def test_topics_come_with_their_definitions_and_bytes(foxglove, messages):
         assert channel["schema"] == definition(channel["schemaName"])
 
     def subscribed():
-        # A message that is sent before the server knows the subscription reaches nobody.
+        # The server discards messages until it has registered the subscription, so the test repeats the message.
         foxglove.send("/clock", 0, b"first")
         return client.messages["/clock"]
 
