@@ -8,6 +8,7 @@ import re
 import shutil
 import signal
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from node_processes import Processes, children, recorded_steps, short_scenario
 from printed_commands import ROOT, the_printed
 from waiting import exit_code_of, output_of, wait_until
 
-from hsv.bags.description import RECORDER, graph
+from hsv.bags.description import RECORDER, TOPICS, graph
 from hsv.bags.reader import Bag
 from ros2 import prefixes
 
@@ -48,7 +49,7 @@ def arguments(**values: object) -> list[str]:
 
 def told(processes: Processes, *words: str | Path) -> Any:
     done = processes.run("hsv", *words, "--json")
-    assert done.returncode == 0, done.stdout
+    assert done.returncode == 0 and done.stdout.startswith("{"), done.stdout  # a warning would stand before it
     return json.loads(done.stdout)
 
 
@@ -205,8 +206,15 @@ def recorded(shared_processes: Processes) -> tuple[Path, Path]:
     bags.mkdir(exist_ok=True)
     recorder = start_to_record(shared_processes, the_printed(PAGE, "ros2 bag record -a"))
     launch = the_printed(PAGE, "ros2 launch hsv_bringup sil.launch.py real_time_factor:=1")
-    done = shared_processes.run("bash", "-c", launch)
-    assert done.returncode == 0, done.stdout
+    flight = shared_processes.start("bash", "-c", f"exec {launch}")
+    log = shared_processes.folder / "record.log"
+    subscribed = [f"Subscribed to topic '/{topic}'" for topic in TOPICS]
+    wait_until(lambda: all(line in log.read_text() for line in subscribed), [flight.pid, recorder.pid])
+    wait_until(lambda: time.time() - log.stat().st_mtime > 5.0, [flight.pid, recorder.pid])
+    resumed = shared_processes.run("bash", "-c", the_printed(PAGE, "hsv set paused"))
+    assert resumed.returncode == 0, resumed.stdout
+    output = output_of(flight)
+    assert flight.returncode == 0, output
     finish(recorder)
     return bags / "own", bags / "recorded"
 
