@@ -54,9 +54,8 @@ def told(processes: Processes, *words: str | Path) -> Any:
 
 
 def test_launch_flies_case_1_with_the_published_fingerprint(shared_processes: Processes) -> None:
-    done = shared_processes.run(
-        "bash", "-c", the_printed(PAGE, "ros2 launch hsv_bringup sil.launch.py scenario:=case1")
-    )
+    launch = the_printed(PAGE, "ros2 launch hsv_bringup sil.launch.py scenario:=case1")
+    done = shared_processes.run("bash", "-c", launch)
     assert done.returncode == 0, done.stdout
     assert "fingerprint  as published" in done.stdout and "ERROR" not in done.stdout
     [bag] = (shared_processes.folder / "bags").glob("case1_*")
@@ -207,14 +206,11 @@ def recorded(shared_processes: Processes) -> tuple[Path, Path]:
     recorder = start_to_record(shared_processes, the_printed(PAGE, "ros2 bag record -a"))
     launch = the_printed(PAGE, "ros2 launch hsv_bringup sil.launch.py real_time_factor:=1")
     flight = shared_processes.start("bash", "-c", f"exec {launch}")
-    log = shared_processes.folder / "record.log"
-    subscribed = [f"Subscribed to topic '/{topic}'" for topic in TOPICS]
-    wait_until(lambda: all(line in log.read_text() for line in subscribed), [flight.pid, recorder.pid])
-    wait_until(lambda: time.time() - log.stat().st_mtime > 5.0, [flight.pid, recorder.pid])
-    resumed = shared_processes.run("bash", "-c", the_printed(PAGE, "hsv set paused"))
-    assert resumed.returncode == 0, resumed.stdout
-    output = output_of(flight)
-    assert flight.returncode == 0, output
+    log, pids = shared_processes.folder / "record.log", [flight.pid, recorder.pid]
+    wait_until(lambda: all(f"Subscribed to topic '/{topic}'" in log.read_text() for topic in TOPICS), pids)
+    wait_until(lambda: time.time() - log.stat().st_mtime > 5.0, pids)
+    assert shared_processes.run("bash", "-c", the_printed(PAGE, "hsv set paused")).returncode == 0
+    assert "fingerprint  as published" in output_of(flight) and flight.returncode == 0
     finish(recorder)
     return bags / "own", bags / "recorded"
 
@@ -313,11 +309,8 @@ def test_the_controller_in_cpp_flies_as_the_one_in_python(processes: Processes) 
     np.testing.assert_allclose(*commands, rtol=1e-9)
 
 
-EXAMPLE = re.compile(r"```python\n(.*?)```", re.DOTALL)
-
-
 def test_two_vehicles_fly_in_one_domain_as_the_page_shows(processes: Processes) -> None:
-    [example] = EXAMPLE.findall((ROOT / PAGE).read_text(encoding="utf-8"))
+    [example] = re.findall(r"```python\n(.*?)```", (ROOT / PAGE).read_text(encoding="utf-8"), re.DOTALL)
     (processes.folder / "two.launch.py").write_text(example)
     done = processes.run("ros2", "launch", "./two.launch.py")
     assert done.returncode == 0, done.stdout
