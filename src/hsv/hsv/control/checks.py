@@ -1,4 +1,4 @@
-"""Checks of a design: an item that is recomputed, the value found, and the value expected."""
+"""Checks of a design: each compares a value found in its files with the expected one, which is recomputed."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from hsv.model.vehicle import Vehicle, load_vehicle
 
 @dataclass(frozen=True)
 class Check:
-    """One item of a design, recomputed: ``value`` is the value found, ``expected`` describes the expected one in words.
+    """The result of one check: the ``value`` found, a description of the ``expected`` one, and whether they agree.
 
-    A design that fails a ``required`` check must not fly; other checks only show that it is not the design as written.
-    ``fields``: fields of the certificate that the check holds to their value.
+    A design that fails a ``required`` check must not fly; other checks only show that it differs from its certificate.
+    ``fields`` are the paths of the fields of the certificate that the check covers.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Check:
 
     @property
     def shown(self) -> str:
-        """The value found, as text."""
+        """The value found as text, a number with six significant digits."""
         return self.value if isinstance(self.value, str) else f"{self.value:.6g}"
 
 
@@ -45,23 +45,25 @@ Checks = Iterable[Check]
 
 @dataclass(frozen=True)
 class Subject:
-    """A design to verify: the design as it is flown, and its certificate."""
+    """A design to verify: the design in flight, and its certificate."""
 
     design: ControlDesign
     certificate: dict[str, Any]
 
     def stated(self, field: str) -> Any:
-        """Return a field of the certificate, by its path, e.g. ``"nominal.0.Q"``."""
+        """Return the value of a ``field`` of the certificate, given by its path, e.g. ``"nominal.0.Q"``."""
         found: Any = self.certificate
         for key in field.split("."):
             found = found[int(key) if isinstance(found, list) else key]
         return found
 
     def count(self, field: str, limit: int) -> int:
-        """Return a number of samples, sequences or steps, at most ``limit`` to guard against hostile files.
+        """Return the count in a ``field`` of the certificate, e.g. of samples or steps.
+
+        The ``limit`` guards against the work that a hostile file could cause.
 
         Raises:
-            DesignError: It is no such number.
+            DesignError: The field is not an integer from 1 to ``limit``.
         """
         found = self.stated(field)
         if not isinstance(found, int) or not 0 < found <= limit:
@@ -70,7 +72,7 @@ class Subject:
 
     @cached_property
     def vehicle(self) -> Vehicle:
-        """The vehicle in the certificate, or the default vehicle."""
+        """The vehicle in the certificate, or the default vehicle if the certificate contains none."""
         values = self.certificate["inputs"].get("vehicle")
         if not isinstance(values, dict | None):
             raise DesignError(f"inputs.vehicle = {values!r}: expected the parameters of a vehicle")
@@ -78,16 +80,24 @@ class Subject:
 
 
 def load_subject(path: Path) -> Subject:
-    """Return the parameter file at ``path`` with its certificate.
+    """Return the design in the parameter file at ``path``, with the certificate next to the file.
 
     Raises:
-        DesignError: A file that is missing or malformed.
+        DesignError: One of the files is missing or malformed.
     """
     return Subject(read_design(path), read_certificate(certificate_path(path)))
 
 
 def same(name: str, value: Any, expected: Any, tolerance: str, size: Any = 1.0) -> Check:
-    """Return the check that every entry of ``value`` equals that of ``expected``, within a tolerance of the table."""
+    """Return the check that every entry of ``value`` equals that of ``expected``.
+
+    Args:
+        name: Name of the check.
+        value: Number or array found.
+        expected: Number or array of the same shape, recomputed.
+        tolerance: Key of the tolerance in :data:`hsv.control.tolerances.TOLERANCES`.
+        size: Size of the entries, for the absolute tolerance.
+    """
     value, expected = np.asarray(value, float), np.asarray(expected, float)
     if value.shape != expected.shape:
         return Check(name, f"shape {value.shape}", f"shape {expected.shape}", False)
@@ -101,12 +111,12 @@ def same(name: str, value: Any, expected: Any, tolerance: str, size: Any = 1.0) 
 
 
 def recomputed(subject: Subject, field: str, value: Any, tolerance: str, size: Any = 1.0) -> Check:
-    """Return the check that a ``field`` of the certificate has the recomputed ``value``."""
+    """Return the check that a ``field`` of the certificate has the recomputed ``value``; see :func:`same`."""
     return replace(same(field, subject.stated(field), value, tolerance, size), fields=(field,))
 
 
 def equal(subject: Subject, field: str, expected: Any) -> Check:
-    """Return the check that a ``field`` of the certificate, no array of numbers, is as ``expected``."""
+    """Return the check that a ``field`` of the certificate equals ``expected`` exactly; not for arrays of numbers."""
     found = subject.stated(field)
     return Check(field, repr(found), repr(expected), found == expected, fields=(field,))
 
@@ -120,7 +130,17 @@ def parameter(
     index: Any = ...,
     fields: Sequence[str] = (),
 ) -> Check:
-    """Return the check of every entry of ``value``, a parameter of the design file or its part ``[index]``."""
+    """Return the check that a parameter of the design file equals the ``expected`` array, within its own tolerance.
+
+    Args:
+        subject: Design and certificate.
+        name: Name of the parameter, as in :data:`hsv.control.tolerances.PARAMETERS`.
+        value: The array of the parameter, or a part of it.
+        expected: Recomputed array of the same shape.
+        shown: Name of the check; empty: that of the parameter.
+        index: Index of the part in the array; by default ``value`` is all of it.
+        fields: Fields of the certificate that the check covers.
+    """
     size = entry_size(name, subject.certificate)[index]
     return replace(same(shown or name, value, expected, PARAMETERS[name], size), fields=tuple(fields))
 
@@ -136,16 +156,16 @@ def above(name: str, value: float, limit: float) -> Check:
 
 
 def required(check: Check) -> Check:
-    """Return ``check`` as a required one."""
+    """Return a copy of ``check`` that is required."""
     return replace(check, required=True)
 
 
 def gathered(name: str, checks: Callable[[], Checks]) -> list[Check]:
-    """Return the checks; an error in them becomes the last check, which fails under ``name``."""
+    """Run ``checks`` and return their results; an error ends them as a failed, required check called ``name``."""
     done: list[Check] = []
     try:
         done.extend(checks())
-    # A certificate may hold anything anywhere.
+    # Any field of a certificate may have any type and value.
     except (DesignError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
         missing = isinstance(error, KeyError)
         value = f"no field {error}" if missing else str(error)
@@ -154,10 +174,10 @@ def gathered(name: str, checks: Callable[[], Checks]) -> list[Check]:
 
 
 def unchecked(subject: Subject, checks: Iterable[Check], *, whole: bool = True) -> list[str]:
-    """Return the fields of the certificate that no check recomputes: they are stated, not checked.
+    """Return the fields of the certificate that none of the ``checks`` covers: they are stated, not checked.
 
-    ``whole``: a table without any checked field is named as a whole, and the entries of a list once, as in
-    ``nominal.*.gamma``.
+    By default a table without any covered field is one item, and so is a field of all entries of a list, as in
+    ``nominal.*.gamma``. With ``whole=False`` every field is listed.
     """
     held = {field for check in checks for field in check.fields}
     free: dict[str, bool] = {}
@@ -173,7 +193,7 @@ def unchecked(subject: Subject, checks: Iterable[Check], *, whole: bool = True) 
 
 
 def leaves(value: Any, field: str = "") -> Iterator[str]:
-    """Return the paths of all fields in ``value``; an array of numbers is one field."""
+    """Yield the path of every field in nested tables, e.g. ``"nominal.0.Q"``; an array of numbers is one field."""
     nested = value.items() if isinstance(value, dict) else enumerate(value) if _tables(value) else ()
     if not nested:
         yield field

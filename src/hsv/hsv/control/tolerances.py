@@ -13,15 +13,15 @@ from hsv.model.signals import INPUT_NAMES, STATE_NAMES
 class Tolerance(NamedTuple):
     """Largest difference of an entry from its recomputed value: the larger of two bounds.
 
-    ``relative`` to the recomputed entry, or ``absolute`` in scaled coordinates, a share of the entry's size; the latter
-    is what counts for entries that are zero, exactly or to rounding.
+    The ``relative`` bound is a share of the recomputed entry. The ``absolute`` bound is a share of the size of the
+    entry, see :func:`entry_size`; it decides for entries that are zero, exactly or except for rounding.
     """
 
     relative: float
     absolute: float
 
     def allowed(self, expected: np.ndarray, size: Any = 1.0) -> np.ndarray:
-        """Return the largest difference allowed of each entry, given the ``size`` that counts as one; both SI."""
+        """Return the largest difference allowed for each entry of ``expected``, given its ``size``; all in SI."""
         return np.maximum(self.relative * np.abs(expected), self.absolute * np.asarray(size, float))
 
 
@@ -54,7 +54,7 @@ TOLERANCES = {
 """Tolerances by the quantity compared."""
 
 RECOMPUTED_DESIGN = 1e-3
-"""Largest deviation, in scaled coordinates, of a recomputed design."""
+"""Largest deviation of a recomputed design from the shipped one, as a share of the larger of an entry and its size."""
 
 PARAMETERS = {
     name: kind
@@ -79,14 +79,16 @@ PARAMETERS = {
 
 
 ROUNDING = TOLERANCES["inequalities"].absolute
-"""Amount by which an inequality that is zero by construction may appear to be violated."""
+"""Amount by which rounding may violate an inequality that holds with equality by construction."""
 
 
 def entry_size(parameter: str, certificate: Mapping[str, Any]) -> np.ndarray:
-    """Return what counts as one for each entry of ``parameter``, an array that its own broadcasts to, SI.
+    """Return the size (SI) of the entries of a design ``parameter``, the unit of the absolute tolerances.
+
+    The array has the shape of the parameter's, or one that broadcasts to it.
 
     Raises:
-        KeyError: A field that the certificate lacks.
+        KeyError: The certificate lacks a field that gives the size.
     """
     kind = PARAMETERS[parameter]
     if parameter.startswith("model.") or kind in ("feedback gain", "nominal gains"):
@@ -94,7 +96,7 @@ def entry_size(parameter: str, certificate: Mapping[str, Any]) -> np.ndarray:
         states = np.array([table["state_scale"][name] for name in STATE_NAMES])
         inputs = np.array([table["input_scale"][name] for name in INPUT_NAMES])
         rows, columns = {"model.a": (states, states), "model.b": (states, inputs)}.get(parameter, (inputs, states))
-        # A certificate may have any scales.
+        # The scales of a certificate may be anything, even zero.
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(rows[:, None] / columns)
     described = certificate["tube"]["invariant_set"]

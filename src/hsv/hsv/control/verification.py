@@ -1,14 +1,15 @@
-"""Independent verification of a design: recompute every statement of its certificate with numpy.
+"""Independent verification of a design: recompute the statements of its certificate with numpy.
 
-This module imports nothing of the code that designs; only the model of the vehicle, :mod:`hsv.model`, is common. It
-reads the numbers in flight (vertices A_i, B_i, gains F and K) from the design file, and the statements about them from
-the certificate. It recomputes the vertices from the parameters of the vehicle, and every inequality from its matrices;
-:mod:`hsv.flight.verification` repeats the flights.
-The parts follow the paper: model (eq. 10 to 12), gain F (eq. 24), gains K (eq. 31 to 35), error system (eq. 22, 23),
-invariant set (eq. 25 to 28), tightened inputs (eq. 30), adjustable factor (eq. 47 to 54).
+This module imports no code that computes designs. It shares with that code only the vehicle model (:mod:`hsv.model`),
+the discretisation of the notch filter (:mod:`hsv.control.notch_filter`) and the reading of the files. The numbers in
+flight (vertices A_i, B_i, gains F and K) come from the design file, the statements about them from the certificate.
+The vertices are recomputed from the parameters of the vehicle, and every inequality from its matrices.
+:mod:`hsv.flight.verification` repeats the flights, and :func:`hsv.control.checks.unchecked` lists the fields that no
+check covers. The parts follow the paper: model (eq. 10 to 12), gain F (eq. 24), gains K (eq. 31 to 35), error system
+(eq. 22, 23), invariant set (eq. 25 to 28), tightened inputs (eq. 30), adjustable factor (eq. 47 to 54).
 
-Every inequality is a bound on a singular value. With Q = L L', a matrix M maps the ellipsoid x' Q^-1 x <= 1 into itself
-if and only if the largest singular value of L^-1 M L is at most 1; see :func:`image`.
+The matrix inequalities are checked as bounds on singular values. With Q = L L', a matrix M maps the ellipsoid
+x' Q^-1 x <= 1 into itself if and only if the largest singular value of L^-1 M L is at most 1; see :func:`image`.
 """
 
 from __future__ import annotations
@@ -65,10 +66,10 @@ CHANNELS = {
     "altitude_residual": "m",
     "pitch_angle_residual": "rad",
 }
-"""Channels of the disturbance set W in the order of the columns of G, with their units."""
+"""Units of the channels of the disturbance set W, in the order of the columns of G in :class:`ErrorSystem`."""
 
 ACCELERATED, REMAINING = [1, 2, 4], [0, 3]
-"""Rigid states that the three accelerations act on, and those in which a residual remains."""
+"""Indices of the rigid states on which the three acceleration channels act, and of those with a residual channel."""
 
 STEERING = (
     "inputs.description",
@@ -80,21 +81,21 @@ STEERING = (
     "inputs.model.tensor_product.tolerance",
     "inputs.tightening",
 )
-"""Inputs that only steer the search for a design; the checks of the result do not depend on them."""
+"""Inputs that steer the search for a design. They count as stated, not as checked, although their digest is checked."""
 
 _LONGEST = 10_000
 """Maximum length of a counter-example, steps."""
 
 _STATUS = ("optimal", "optimal_inaccurate")
 _KEPT_OFF = 0.05
-"""Share of the range of the certified plans by which the bounds of plans in flight lie below it."""
+"""Both bounds of plans in flight are those of the certified plans, shifted down by this share of their range."""
 
 
 # --- algebra ----------------------------------------------------------------------------------------------------------
 
 
 def image(Q: np.ndarray, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
-    """Return the largest singular value (...) of L^-1 [M L, columns] with Q = L L'.
+    """Return the largest singular value (...) of L^-1 [M L, columns] for each M (..., n, n), with Q = L L' (n, n).
 
     If it is at most 1, then M x + columns d lies in {x: x' Q^-1 x <= 1} for all x, d with x' Q^-1 x + d' d <= 1.
     """
@@ -103,12 +104,12 @@ def image(Q: np.ndarray, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
 
 
 def level(Q: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return the level x' Q^-1 x (...) of each row of ``x`` (..., n)."""
+    """Return x' Q^-1 x, the level of ``x`` (n) in the ellipsoid of ``Q`` (n, n): 1 on its boundary."""
     return np.asarray(np.sum(np.linalg.solve(np.linalg.cholesky(Q), x.T) ** 2, axis=0))
 
 
 def radii(M: np.ndarray) -> np.ndarray:
-    """Return the spectral radii (r) of matrices (r, n, n)."""
+    """Return the spectral radius (r) of each matrix in ``M`` (r, n, n)."""
     return np.asarray(np.abs(np.linalg.eigvals(M)).max(axis=-1))
 
 
@@ -119,7 +120,10 @@ def inverse(Q: np.ndarray) -> np.ndarray:
 
 
 def quotient(M: np.ndarray, N: np.ndarray) -> np.ndarray:
-    """Return the gain M N^-1 (2, 9), computed with N scaled to unit diagonal; columns of flexible states are zero."""
+    """Return the gain M N^-1 (2, 9) from M (2, 5) and N (5, 5); the columns of the flexible states are zero.
+
+    N is scaled to a unit diagonal for the computation.
+    """
     scale = np.sqrt(np.diag(N))
     gain = np.zeros((len(M), N_STATES))
     gain[:, :N_RIGID] = np.linalg.solve(N / np.outer(scale, scale), (M / scale).T).T / scale
@@ -127,7 +131,7 @@ def quotient(M: np.ndarray, N: np.ndarray) -> np.ndarray:
 
 
 def sizes(table: Mapping[str, float], names: Sequence[str]) -> np.ndarray:
-    """Return the values of ``table`` in the order of ``names``."""
+    """Return the values of ``table`` as an array, in the order of ``names``."""
     return np.array([table[name] for name in names])
 
 
@@ -135,7 +139,10 @@ def sizes(table: Mapping[str, float], names: Sequence[str]) -> np.ndarray:
 
 
 def statement_checks(subject: Subject) -> Checks:
-    """Compare names, units and digests; no other check relies on a digest."""
+    """Compare name, units, number of vertices, and the digests of inputs and parameters.
+
+    The digests replace no other check: the other parts recompute the numbers themselves.
+    """
     from pydantic import TypeAdapter  # formats numbers as the design does; imported here to keep nodes light
 
     design, inputs = subject.design, subject.certificate["inputs"]
@@ -150,9 +157,9 @@ def statement_checks(subject: Subject) -> Checks:
 
 
 def input_checks(subject: Subject) -> Checks:
-    """Compare what the design copies: period (eq. 12), notch (eq. 38), U (eq. 29), and check the scheduling weights.
+    """Check what the design copies from its inputs: period (eq. 12), notch (eq. 38), U (eq. 29), vehicle and actuators.
 
-    They sum to one (eq. 11), and none is negative (eq. 12).
+    Also check that the scheduling weights sum to one (eq. 11), and that none is negative (eq. 12).
     """
     design, inputs = subject.design, subject.certificate["inputs"]
     yield recomputed(subject, "inputs.model.period", design.period, "copied")
@@ -191,7 +198,10 @@ def notch_in_series(design: ControlDesign) -> Filter:
 
 
 def recomputed_model(subject: Subject) -> tuple[PolytopicModel, tuple[np.ndarray, np.ndarray]]:
-    """Recompute the model of the vehicle (eq. 10 to 12), or with its notch filter (eq. 45), and the model's scales."""
+    """Return the polytopic model recomputed from the vehicle, and the scales of its states (n) and inputs (2), SI.
+
+    The model is that of the vehicle alone (eq. 10 to 12) or with the notch filter (eq. 45), as the inputs require.
+    """
     from hsv.model.lpv.polytopic import polytopic_model
 
     inputs, extended = subject.certificate["inputs"]["model"], subject.stated("inputs.model.system") == "ECM"
@@ -209,7 +219,7 @@ def recomputed_model(subject: Subject) -> tuple[PolytopicModel, tuple[np.ndarray
 
 
 def model_checks(subject: Subject) -> Checks:
-    """Compare vertices (eq. 12), singular values, weights and accuracy xi (eq. 11) with values from the vehicle."""
+    """Compare vertices (eq. 12), singular values, weights and accuracy (eq. 11) with values from the vehicle."""
     design, inputs, (model, scales) = subject.design, subject.certificate["inputs"]["model"], recomputed_model(subject)
     shown = "{} from the vehicle".format
     yield parameter(subject, "model.a", design.polytope.A, model.polytope.A, shown("model.a"))
@@ -234,7 +244,7 @@ def model_checks(subject: Subject) -> Checks:
 
 
 def feedback_checks(subject: Subject) -> Checks:
-    """Check eq. 24: e' N^-1 e decreases at every vertex under F = M N^-1; A + B F is stable (eq. 22)."""
+    """Check that e' N^-1 e decreases at every vertex under F = M N^-1 (eq. 24), and that A + B F is stable (eq. 22)."""
     design, F = subject.design, subject.design.feedback_gain
     A, B = design.polytope.A, design.polytope.B
     M, N = np.array(subject.stated("feedback.M")), np.array(subject.stated("feedback.N"))
@@ -258,7 +268,11 @@ def feedback_checks(subject: Subject) -> Checks:
 
 @dataclass(frozen=True)
 class NominalWeights:
-    """Data of eq. 31 to 35: vertices A (r, 5, 5), B (r, 5, 2), cost weights psi and sigma, largest |u_n| (shape 2)."""
+    """Data of eq. 31 to 35: vertices, cost weights and input bounds of the nominal problem.
+
+    ``A`` (r, 5, 5) and ``B`` (r, 5, 2) are the vertices on the rigid states, ``psi`` (5, 5) and ``sigma`` (2, 2) the
+    weights of states and inputs, and ``bound`` (2) the largest |u_n|.
+    """
 
     A: np.ndarray
     B: np.ndarray
@@ -268,7 +282,10 @@ class NominalWeights:
 
     @classmethod
     def of(cls, subject: Subject) -> NominalWeights:
-        """Return the problem of a certificate; its costs are integrals over time (s), independent of the period."""
+        """Return the data of the nominal problem in a certificate.
+
+        The weights contain the period, so that a cost approximates an integral over time, in s.
+        """
         polytope, inputs = subject.design.polytope, subject.certificate["inputs"]["nominal"]
         scales = sizes(inputs["state_scale"], STATE_NAMES[:N_RIGID]), sizes(inputs["input_scale"], INPUT_NAMES)
         psi, sigma = (subject.design.period * np.diag(scale**-2.0) for scale in scales)
@@ -277,9 +294,12 @@ class NominalWeights:
         return cls(polytope.A[:, :N_RIGID, :N_RIGID], polytope.B[:, :N_RIGID], psi, sigma, bound)
 
     def cost(self, K: np.ndarray, Q: np.ndarray) -> float:
-        """Return the least gamma_n (eq. 32): gamma_n (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K (eq. 34) everywhere.
+        """Return the smallest gamma_n (eq. 32) that satisfies eq. 34 at every vertex, for K (2, 5) and Q (5, 5).
 
-        Everywhere is at every vertex, and A_c = A + B K.
+        Eq. 34 then reads gamma_n (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K with A_c = A + B K.
+
+        Raises:
+            DesignError: x' Q^-1 x does not decrease at a vertex.
         """
         L = np.linalg.cholesky(Q)
         M = np.linalg.solve(L, (self.A + self.B @ K) @ L)
@@ -290,7 +310,10 @@ class NominalWeights:
         return float(np.linalg.eigvals(np.linalg.solve(decrease, stage)).real.max())
 
     def decrease(self, K: np.ndarray, Q: np.ndarray, gamma: float) -> np.ndarray:
-        """Return the smallest eigenvalue (r) of eq. 34 at each vertex, its diagonal blocks scaled to the identity."""
+        """Return the smallest eigenvalue (r) of the matrix of eq. 34 at each vertex, for the cost bound ``gamma``.
+
+        The diagonal blocks of the matrix are scaled to the identity.
+        """
         L = np.linalg.cholesky(Q)
         M = np.linalg.solve(L, (self.A + self.B @ K) @ L)
         stage = np.vstack((np.sqrt(self.psi) @ L, np.sqrt(self.sigma) @ K @ L)) / np.sqrt(gamma)
@@ -301,7 +324,8 @@ class NominalWeights:
 def nominal_checks(subject: Subject) -> Checks:
     """Check every gain K = Y Q^-1 with its ellipsoid (eq. 31 to 35), and that A + B K is stable (eq. 20).
 
-    The ellipsoids are nested, and between two gains the cost decreases under both: rules of our own, for switching.
+    Two further checks are not in the paper. Each ellipsoid lies in the one before, so that gains may be switched. In an
+    interpolated family, the level in each ellipsoid also decreases under the gain of the next one inside.
     """
     design, inputs = subject.design, subject.certificate["inputs"]["nominal"]
     weights, stated = NominalWeights.of(subject), subject.certificate["nominal"]
@@ -345,13 +369,14 @@ def nominal_checks(subject: Subject) -> Checks:
 
 
 def step(subject: Subject) -> np.ndarray:
-    """Return x_n(0), of shape 5, of the design's step: its start trim minus its target trim."""
+    """Return x_n(0) (5) of the step for which the gains are designed: trim at its start minus trim at its target."""
     inputs, vehicle = subject.certificate["inputs"]["nominal"], subject.vehicle.decoupled
     start, target = (trim(vehicle, inputs[at]["altitude"], inputs[at]["velocity"]).state for at in ("start", "target"))
     return np.asarray((start - target)[:N_RIGID])
 
 
 def _gain_checks(subject: Subject, field: str, weights: NominalWeights, K: np.ndarray, state: np.ndarray) -> Checks:
+    """Check the gain ``K`` (2, 5) stated under ``field`` (eq. 31 to 35) for the design state x_n(0) = ``state`` (5)."""
     Q = np.array(subject.stated(f"{field}.Q"))
     yield symmetric(f"{field}.Q", Q)
     try:
@@ -362,7 +387,7 @@ def _gain_checks(subject: Subject, field: str, weights: NominalWeights, K: np.nd
     decrease = weights.decrease(K, Q, subject.stated(f"{field}.certified_gamma"))
     yield above(f"{field}: (34) smallest eigenvalue", decrease.min(), -ROUNDING)
     yield recomputed(subject, f"{field}.lmi_smallest_eigenvalues", decrease, "eigenvalues")
-    # Eq. 33 (eq. 50 for K'): the design state lies in the ellipsoid.
+    # Eq. 33 (eq. 50 for K'): x_n(0) lies in the ellipsoid.
     room = 1.0 - float(level(Q, state))
     yield above(f"{field}: (33) room of the design state", room, -ROUNDING)
     yield recomputed(subject, f"{field}.state_residual", room, "eigenvalues")
@@ -374,7 +399,7 @@ def _gain_checks(subject: Subject, field: str, weights: NominalWeights, K: np.nd
 
 
 def symmetric(name: str, Q: np.ndarray) -> Check:
-    """Return the check that ``Q`` (..., n, n) is symmetric; the other checks may read either triangle of it."""
+    """Return the required check that ``Q`` (..., n, n) is symmetric; other checks may read one triangle only."""
     asymmetry = float(np.abs(Q - np.swapaxes(Q, -1, -2)).max(initial=0.0))
     return required(at_most(f"{name}, difference from its transpose", asymmetry, 0.0))
 
@@ -383,7 +408,7 @@ def symmetric(name: str, Q: np.ndarray) -> Check:
 
 
 def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
-    """Return the effect (5, 3) of unit accelerations, held over a period (s), on the rigid states at mid-envelope."""
+    """Return the changes (5, 3) of the rigid states by unit accelerations held over ``period`` s, at mid-envelope."""
     A, _ = linearise(vehicle.decoupled, *vehicle.centre)
     unit = np.zeros((N_RIGID, 3))
     unit[ACCELERATED, [0, 1, 2]] = 1.0
@@ -391,9 +416,10 @@ def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
 
 
 class ErrorSystem(NamedTuple):
-    """The error system e(k+1) = A_i e(k) + G_i d(k) with the feedback F e + F_d d.
+    """The error system e(k+1) = A_i e(k) + G_i d(k) in closed loop with the feedback F e + F_d d.
 
-    The error e contains rigid states, notch filter and the actuators of the design; ``names`` are its names.
+    ``A`` (r, n, n) and ``G`` (r, n, 7) at r vertices, ``F`` (2, n), ``F_d`` (2, 7). The error e consists of the rigid
+    states, the notch filter and the actuators of the design; ``names`` (n) lists its components.
     """
 
     A: np.ndarray
@@ -410,9 +436,9 @@ def error_system(design: ControlDesign, vehicle: Vehicle, tau: np.ndarray, effec
     their mean position over a period, C_a a + D_a u.
 
     Args:
-        design: Vertices, F, notch filter and actuators.
+        design: Design with vertices, F, notch filter and actuators.
         vehicle: Vehicle of the design.
-        tau: (5) factors of the feedback.
+        tau: (5) factors of the feedback of the rigid states.
         effectiveness: Effectiveness of the elevator, from 0 to 1.
     """
     period, polytope = design.period, design.polytope
@@ -440,9 +466,9 @@ def error_system(design: ControlDesign, vehicle: Vehicle, tau: np.ndarray, effec
 
 
 def factors(design: ControlDesign) -> list[np.ndarray]:
-    """Return the extreme factors tau (5 each) of the feedback: the smallest certified one and 1.
+    """Return the extreme factors tau (5 each) of the feedback: the smallest certified ones and ones, or ones alone.
 
-    A set that is invariant under both is invariant under any variation of the factor between them.
+    A set that is invariant under both is invariant under any variation of tau on the line between them.
     """
     one = np.ones(N_RIGID)
     return [one] if np.array_equal(design.tau_minimum, one) else [design.tau_minimum, one]
@@ -454,12 +480,13 @@ def factors(design: ControlDesign) -> list[np.ndarray]:
 class Tube:
     """A tube stated under ``field`` of a certificate, with the closed loops of the design.
 
-    The ellipsoid is (e - c)' Q^-1 (e - c) <= 1 with ``c`` (n) and ``Q`` (n, n); the disturbance set W is the box with
-    mid-point ``middle`` and half-widths ``half``, both of shape 7.
+    Its set is the ellipsoid (e - c)' Q^-1 (e - c) <= 1 with ``c`` (n) and ``Q`` (n, n). The disturbance set W is a box
+    with mid-point ``middle`` (7) and half-widths ``half`` (7). The r closed loops are those of all vertices, at each
+    extreme factor tau.
     """
 
     def __init__(self, subject: Subject, design: ControlDesign, field: str) -> None:
-        """Read set and disturbances from the certificate, and compute the error systems at the extreme factors."""
+        """Read set and disturbances from the certificate, and compute the error systems at the extreme factors tau."""
         self.field, self.design = field, design
         systems = [error_system(design, subject.vehicle, tau) for tau in factors(design)]
         self.system = systems[0]
@@ -477,32 +504,40 @@ class Tube:
 
     @property
     def columns(self) -> np.ndarray:
-        """Effect (r, n, 8) on e - c: of each channel of W at half its width, and of the drift of c at W's mid-point."""
+        """Columns (r, n, 8) that act on e - c: the 7 channels of W times their half-widths, and the drift of c.
+
+        The drift is the change of e in one step from e = c, with the disturbances at the mid-point of W.
+        """
         drift = self.A @ self.c + self.G @ self.middle - self.c
         return np.concatenate((self.G * self.half, drift[:, :, None]), axis=2)
 
     @property
     def half_width(self) -> np.ndarray:
-        """Half-widths (n) of the set, eq. 28."""
+        """Half-widths (n) of the set (eq. 28); those of the rigid states are narrowed by star norms, if stated."""
         return self._narrowed(np.sqrt(np.diag(self.Q)), slice(N_RIGID))
 
     @property
     def feedback(self) -> np.ndarray:
-        """Half-ranges of F e over the set, of shape 2: F Z of eq. 30."""
+        """Half-ranges (2) of F e over the set, F Z of eq. 30; narrowed by star norms, if stated."""
         F = self.system.F
         return self._narrowed(np.sqrt(np.sum((F @ self.Q) * F, axis=1)), slice(N_RIGID, None))
 
     def _narrowed(self, bounds: np.ndarray, rows: slice) -> np.ndarray:
+        """Return ``bounds``, the first ones lowered to the star norms of output ``rows`` where these are smaller."""
         if self.star is None:
             return bounds
-        # A row of the output is bounded by the sum over all channels of its half-range in the channel's ellipsoid.
+        # An output is bounded by the sum, over all channels, of its half-range in the ellipsoid of the channel.
         star = np.sqrt(np.einsum("ki,kjil,kl->kj", self.rows, self.star.Q, self.rows)).sum(axis=1)[rows]
         return np.append(np.minimum(bounds[: len(star)], star), bounds[len(star) :])
 
     def residuals(self) -> np.ndarray:
-        """Return the residuals (r) of the S-procedure, one a vertex; where positive, the ellipsoid satisfies eq. 26.
+        """Return the residual (r) of the S-procedure in each closed loop; if all are positive, eq. 26 holds.
 
-        Errors in the set satisfy lam v' Q^-1 v <= lam, disturbances sum_j l_j d_j^2 <= sum_j l_j <= 1 - lam.
+        With the contraction lam and multipliers l_j, errors v = e - c in the set satisfy lam v' Q^-1 v <= lam, and
+        disturbances |d_j| <= 1 satisfy sum_j l_j d_j^2 <= sum_j l_j <= 1 - lam.
+
+        Raises:
+            DesignError: A multiplier is not positive, or their sum exceeds 1 - lam.
         """
         if self.l.min() <= 0.0 or self.l.sum(axis=1).max() > (1.0 - self.lam) * (1.0 + 1e-12):
             raise DesignError("multipliers: expected all above zero and sums of at most 1 - contraction")
@@ -510,10 +545,12 @@ class Tube:
         return 1.0 - image(self.Q, self.A / np.sqrt(self.lam), scaled) ** 2
 
     def tightened(self, lag: Sequence[Sequence[float]] = ((0.0, 0.0), (0.0, 0.0))) -> np.ndarray:
-        """Return the bounds (2, 2) of u_n + u_r: U minus the range of feedback (eq. 30; eq. 53 prints a plus for it).
+        """Return the bounds of u_n + u_r, U minus the range of the feedback: (lower and upper, inputs), i.e. (2, 2).
+
+        This is eq. 30; eq. 53 prints a plus in place of the minus.
 
         Args:
-            lag: Minimum and maximum (2 each) of the feedback to the lag of the plan behind the actuators.
+            lag: Minimum and maximum (2 each) of the feedback that the lag of the actuators behind the plan causes.
         """
         middle = self.system.F @ self.c + self.system.F_d @ self.middle
         half = self.feedback + np.abs(self.system.F_d) @ self.half
@@ -522,7 +559,10 @@ class Tube:
 
 
 class StarNorms(NamedTuple):
-    """Star norms: an ellipsoid ``Q`` (7, 8, n, n) and its ``contraction`` (7, 8) for each output row and channel."""
+    """Star norms: an ellipsoid ``Q`` (7, 8, n, n) and its ``contraction`` (7, 8) for each output row and channel.
+
+    The 7 rows are those of :attr:`Tube.rows`: rigid states, then feedback. The 8 channels are :attr:`Tube.columns`.
+    """
 
     Q: np.ndarray
     contraction: np.ndarray
@@ -530,8 +570,12 @@ class StarNorms(NamedTuple):
     def residuals(self, tube: Tube) -> np.ndarray:
         """Return the residuals (7, acting channels): where positive, the ellipsoid of row and channel is invariant.
 
-        The ellipsoid v' Q^-1 v <= 1 is invariant under v(k+1) = A_i v + g_i d with |d| <= 1 if
-        Q - A_i Q A_i' / lam - g_i g_i' / (1 - lam) >= 0 (Abedor, Nagpal and Poolla 1996); Q is scaled to the identity.
+        Acting channels have a column other than zero. The ellipsoid v' Q^-1 v <= 1 is invariant under
+        v(k+1) = A_i v + g_i d with |d| <= 1 if Q - A_i Q A_i' / lam - g_i g_i' / (1 - lam) >= 0 (Abedor, Nagpal and
+        Poolla 1996), where lam is the contraction. The residual is that of this matrix with Q scaled to the identity.
+
+        Raises:
+            DesignError: A contraction is not between 0 and 1.
         """
         if not (self.contraction.min() > 0.0 and self.contraction.max() < 1.0):
             raise DesignError("star_norms.contraction: expected between 0 and 1")
@@ -548,10 +592,11 @@ class StarNorms(NamedTuple):
         )
 
     def start(self, tube: Tube) -> float:
-        """Return the largest level of the start e = 0 (in Z, eq. 25) in the ellipsoids; the split below is our own.
+        """Return the largest level of the start e = 0 in the ellipsoids; at most 1 means that it lies in all (eq. 25).
 
-        The start lies at -c, which is split into one term per channel: the steady response of the mean vertex to the
-        mid-point of the channel. The last term takes the remainder.
+        The start is e - c = -c, which is split into one term for each acting channel. The split is not in the paper: a
+        term is minus the steady response of the mean vertex to the mid-point of the channel. The last term takes the
+        remainder.
         """
         acting, mean = np.flatnonzero(tube.columns.any(axis=(0, 1))), tube.A.mean(axis=0)
         terms = np.linalg.solve(mean - np.eye(len(mean)), tube.G.mean(axis=0) * tube.middle).T
@@ -561,7 +606,7 @@ class StarNorms(NamedTuple):
 
 
 def set_checks(subject: Subject) -> Checks:
-    """Recompute invariance, half-widths, W and tightened inputs of the tube used in flight."""
+    """Check the tube used in flight: invariance, half-widths, W, star norms, tightened inputs and bounds of plans."""
     design = subject.design
     tube = Tube(subject, design, "tube")
     yield Check("tube parameters", str(design.tube is not None), "True", design.tube is not None)
@@ -590,7 +635,7 @@ def set_checks(subject: Subject) -> Checks:
     yield above("room of the nominal plan", min((lowest - bounds[0]).min(), (bounds[1] - highest).min()), 0.0)
     yield Check("nominal plan bounds", str(design.plan_bounds is not None), "True", design.plan_bounds is not None)
     if design.plan_bounds is not None:
-        # Our own, besides eq. 30: plans in flight keep to the range of the certified ones, shifted down.
+        # Not in the paper: plans in flight also keep to the range of the certified ones, shifted down.
         low, high = plan["pitch_acceleration"]
         lowest, highest = np.append(lowest, low), np.append(highest, high)
         shift = _KEPT_OFF * (highest - lowest) * np.array([1.0, 1.0, 0.0])
@@ -603,13 +648,16 @@ def set_checks(subject: Subject) -> Checks:
 
 
 def lag_feedback(subject: Subject) -> Sequence[Sequence[float]]:
-    """Return the stated minimum and maximum (2 each) of the feedback to the lag of the plan behind the actuators."""
+    """Return the stated minimum and maximum (2 each) of the feedback that the actuators' lag behind the plan causes.
+
+    They are zero if the certificate states none.
+    """
     lag = subject.certificate["tube"]["tightening"].get("lag_feedback")
     return (lag["lower"], lag["upper"]) if lag else ((0.0, 0.0), (0.0, 0.0))
 
 
 def _tube_checks(subject: Subject, tube: Tube) -> Checks:
-    """Check set (eq. 25 to 28), W (eq. 19) and tightened inputs (eq. 30, 53) stated under the field of ``tube``."""
+    """Check what the field of ``tube`` states: set (eq. 25 to 28), W (eq. 19) and tightened inputs (eq. 30, 53)."""
     field = tube.field
     inside, inputs = f"{field}.invariant_set", subject.certificate["inputs"]["disturbance"]
     yield equal(subject, f"{inside}.kind", "ellipsoid")
@@ -622,11 +670,11 @@ def _tube_checks(subject: Subject, tube: Tube) -> Checks:
     shown = f"{field}: invariance, smallest eigenvalue over the vertices"
     yield replace(required(above(shown, residuals.min(), 0.0)), fields=fields)
     yield recomputed(subject, f"{inside}.certificate.lmi_smallest_eigenvalues", residuals, "eigenvalues")
-    # A flight starts at e = 0, which lies in Z (eq. 25); Z has a centre c of our own, since W is not symmetric.
+    # A flight starts at e = 0, which lies in Z (eq. 25). Unlike the paper's, Z has a centre c, as W is not symmetric.
     at_start = float(level(tube.Q, -tube.c))
     yield required(at_most(f"{field}: level of e = 0", at_start, 1.0))
     yield recomputed(subject, f"{inside}.certificate.level_of_zero_error", at_start, "eigenvalues")
-    # W (eq. 19) from the measured bounds; inflation and share are margins of our own.
+    # W (eq. 19) from the measured bounds; inflation and share are not in the paper.
     measured = subject.stated(f"{field}.disturbance.measured")
     for side, bounds, sign in (("lower", tube.lower, -1.0), ("upper", tube.upper, 1.0)):
         outward = widened(sign * np.array(measured[side]), inputs["inflation"])
@@ -652,6 +700,7 @@ def widened(bounds: np.ndarray, inflation: float) -> np.ndarray:
 
 
 def _star_checks(subject: Subject, tube: Tube) -> Checks:
+    """Check that the ellipsoids of the star norms are symmetric, invariant, and contain the start e = 0."""
     star, inside = tube.star, "tube.invariant_set"
     assert star is not None
     shape = (len(tube.rows), len(CHANNELS) + 1)
@@ -666,10 +715,10 @@ def _star_checks(subject: Subject, tube: Tube) -> Checks:
 
 
 def counter_example_checks(subject: Subject) -> Checks:
-    """Recompute the reach of the stated disturbance sequences (eq. 22), a lower bound of every half-width (eq. 28).
+    """Recompute the errors that the stated disturbance sequences reach (eq. 22): lower bounds of half-widths (eq. 28).
 
-    At a constant vertex i, an output row y has |y e(m)| <= sum over j < m of |y A_i^j G_i| half, which disturbances
-    with the signs of the terms attain.
+    At a constant vertex i and with W moved to the origin, an output row y satisfies
+    |y e(m)| <= sum over j < m of |y A_i^j G_i| half, which disturbances with the signs of the terms attain.
     """
     inside = "tube.invariant_set"
     if "star_norms" not in subject.stated(inside):
@@ -691,7 +740,10 @@ def counter_example_checks(subject: Subject) -> Checks:
 
 
 def factor_checks(subject: Subject) -> Checks:
-    """Check that the factor tau (eq. 48) may change in flight; a design that is not adjustable has tau = 1 only."""
+    """Check that tau (eq. 48) may change in flight, or that it is fixed at 1 if the design is not adjustable.
+
+    All factors tau share one Lyapunov function, with and without the fault, and the plan also fits at tau = 1.
+    """
     design, stated = subject.design, subject.certificate.get("adjustable")
     filtered = stated is not None
     yield required(Check("nominal.filtered", str(design.filtered), str(filtered), design.filtered == filtered))
@@ -700,7 +752,7 @@ def factor_checks(subject: Subject) -> Checks:
     yield required(parameter(subject, "feedback.tau_minimum", design.tau_minimum, least, fields=fields))
     if stated is None:
         return
-    # e' N^-1 e of eq. 24 decreases under every factor, with full and with reduced elevator effectiveness.
+    # e' N^-1 e of eq. 24 decreases at both extreme factors, with full and with reduced elevator effectiveness.
     shares = 1.0, subject.stated("inputs.disturbance.elevator_effectiveness")
     loops = [error_system(design, subject.vehicle, tau, share).A for tau, share in product(factors(design), shares)]
     N = np.array(stated["lyapunov"]["N"])
@@ -709,7 +761,7 @@ def factor_checks(subject: Subject) -> Checks:
     fields = ("adjustable.lyapunov.N",)
     yield replace(required(above("common Lyapunov function, smallest eigenvalue", residuals.min(), 0.0)), fields=fields)
     yield recomputed(subject, "adjustable.lyapunov.lmi_smallest_eigenvalues", residuals, "eigenvalues")
-    # The plan keeps the tightened bounds of eq. 30 at tau = 1 as well.
+    # At tau = 1, too, the plan keeps within the tightened bounds of eq. 30.
     bounds = Tube(subject, replace(design, tau_minimum=np.ones(N_RIGID)), "tube").tightened()
     plan = subject.stated("tube.tightening.plan")
     room = np.minimum(plan["lowest"] - bounds[0], bounds[1] - plan["highest"])
@@ -718,7 +770,10 @@ def factor_checks(subject: Subject) -> Checks:
 
 
 def adjustable_checks(subject: Subject) -> Checks:
-    """Recompute tau (eq. 48), Z at tau = 1, the relaxed input bounds (eq. 52), K' (eq. 49 to 52) and the poles."""
+    """Recompute tau (eq. 48), Z and Z' (eq. 47), the relaxed input bounds (eq. 52), K' (eq. 49 to 52) and the poles.
+
+    A design that is not adjustable has none of these, and no checks.
+    """
     design, stated = subject.design, subject.certificate.get("adjustable")
     if stated is None:
         return
@@ -735,7 +790,7 @@ def adjustable_checks(subject: Subject) -> Checks:
     # The paper states Z' = tau Z after eq. 48; the certificate keeps it for comparison with the computed Z'.
     scaled = np.append(tau, np.full(len(complete.c) - N_RIGID, tau[-1])) * complete.half_width
     yield recomputed(subject, "adjustable.scaled_half_width", scaled, "half-widths")
-    # Eq. 53: its room U minus F' Z' over that of eq. 30, at the target trim, scales the bound of eq. 52 (our own rule).
+    # Not in the paper: the bound of eq. 52 grows by the ratio of the rooms at the target trim, eq. 53 over eq. 30.
     target = subject.stated("inputs.nominal.target")
     at_target = trim(subject.vehicle.decoupled, target["altitude"], target["velocity"]).input
     rooms = [np.minimum(at_target - t[0], t[1] - at_target) for t in (complete.tightened(), incomplete.tightened())]
@@ -753,16 +808,16 @@ def adjustable_checks(subject: Subject) -> Checks:
 
 
 def _full_state_checks(subject: Subject) -> Checks:
-    """Check the poles of the coupled vehicle (eq. 42) under the structured F and under F' (eq. 24 on model eq. 45).
+    """Check the poles of the coupled vehicle (eq. 42) under the structured F and the full-state F' (eq. 24, eq. 45).
 
-    The full-state F' acts on all states of the rigid vehicle and of the notch filter.
+    F acts on the rigid states; F' also acts on the states of the notch filter.
     """
     design, field, notch = subject.design, "adjustable.full_state", notch_in_series(subject.design)
     gain, whole = np.array(subject.stated(f"{field}.gain")), recomputed_model(subject)[0].whole
     kept = [*range(N_RIGID), *range(N_STATES, N_STATES + len(notch.B))]
     loops = whole.A[:, kept][:, :, kept] + whole.B[:, kept] @ gain
     yield recomputed(subject, f"{field}.spectral_radii", radii(loops), "spectral radii")
-    # Our own: F' on the true pitch rate, through q' = C x_q + d_q q (eq. 39), shows that F' cancels the notch filter.
+    # Not in the paper: the gain of F' on the true pitch rate, by eq. 39, shows that F' cancels the notch filter.
     on_rate = (gain @ from_true_rate(notch)[np.ix_(kept, kept)])[1, PITCH_RATE]
     check = recomputed(subject, f"{field}.elevator_on_pitch_rate", on_rate, "feedback gain")
     yield replace(check, fields=(f"{field}.elevator_on_pitch_rate", f"{field}.gain"))
@@ -794,7 +849,7 @@ QUICK: dict[str, Part] = {
     "invariant set": set_checks,
     "adjustable factor": factor_checks,
 }
-"""Checks by part that need neither a solver nor the vehicle model; a node runs them when it starts."""
+"""Checks by part that do not recompute the polytopic model; the node of the tube law runs them before a flight."""
 
 RECOMPUTED: dict[str, Part] = {
     "statement": statement_checks,
@@ -809,10 +864,14 @@ RECOMPUTED: dict[str, Part] = {
 def preflight(design: ControlDesign, certificate: str = "") -> str:
     """Check a design before a flight; return a warning, or an empty string.
 
-    A modified design may fly as long as the conditions for its safety hold: the gains are stable at every vertex; F
-    has a common Lyapunov function (eq. 24) and every K one (eq. 34); the invariant set monitored in flight is the
-    certified set, and it is invariant at every vertex under the gain in flight. If one of these fails, the design is
-    refused. Any other difference from the certificate is a warning, and so is a missing certificate.
+    A modified design may fly as long as the conditions for its safety hold:
+
+    - the gains are stable at every vertex;
+    - F has a common Lyapunov function for all vertices (eq. 24), and so has every K (eq. 34);
+    - the invariant set monitored in flight is the certified one, and is invariant at every vertex under the gain F.
+
+    A design that violates a condition is refused. Any other difference from the certificate is a warning, and so is a
+    missing certificate.
 
     Args:
         design: The design to check.
