@@ -1,1 +1,1 @@
-"""The paper's study: its figures, its claims, and what they are sensitive to."""
+"""The study of the paper: its figures, its claims, the sensitivity of its results, and the physical limits."""

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from hsv_paper.study import Study
 
 COMMANDS = {name: Command(__name__) for name in ("figures", "claims", "sensitivity", "limits")}
-"""Places of the commands."""
+"""The commands and the module that holds them."""
 
 CoarsenessOption = Annotated[float, typer.Option(help="1: as in the docs; 4: a quarter of the points.")]
 StudyOption = Annotated[Path, typer.Option("--out", help="Folder for a PDF, a PNG and a page on the study.")]
 
 _FIGURE, _CLAIMS = 4.0, 900.0
-"""Time (s) on one processor: of a figure, and of the claims with their 17 scenarios of 1025 vehicles each."""
+"""Time (s) on one processor: per figure, and of all claims, which need the flights of 17 scenarios by 1025 vehicles."""
 
 
 def main() -> None:
@@ -121,7 +121,7 @@ def limits(out: StudyOption = Path("study"), coarseness: CoarsenessOption = 1.0)
 
 
 def _make(study: Study, out: Path, coarseness: float) -> None:
-    """Make a study, write its figure and its page, and print its tables."""
+    """Run a study, write its figure and its page, and print its tables."""
     import matplotlib
 
     from hsv_paper.plots import RC, save

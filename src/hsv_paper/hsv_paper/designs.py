@@ -1,4 +1,4 @@
-"""Shipped designs with their certificates, and the models that the paper compares at one point."""
+"""The shipped designs with their certificates, and two models that the paper compares at one point of the envelope."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 
 BETWEEN = (85817.0 * FOOT, 8037.0 * FOOT)
-"""Altitude (m) and velocity (m/s) of Figures 2 and 8, between the samples of the models."""
+"""Altitude (m) and velocity (m/s) of Figures 2 and 8, a point between the samples of the polytopic models."""
 
 CODESIGN_FREQUENCIES = np.logspace(-2.0, 2.0, 1500)
-"""rad/s: over which the co-designed model is compared."""
+"""Frequencies (rad/s) at which the co-designed model is compared."""
 
 
 @cache
 def design(name: str) -> ControlDesign:
-    """Return a shipped design as it flies."""
+    """Return a shipped design by name."""
     return read_design(find_design(name))
 
 
@@ -36,19 +36,19 @@ def certificate(name: str) -> dict[str, Any]:
 
 
 def tube_of(name: str) -> TubeSet:
-    """Return the invariant set of a shipped design."""
+    """Return the invariant set of a shipped design, which must have one."""
     found = design(name).tube
     assert found is not None
     return found
 
 
 def inputs_of(name: str) -> DesignInputs:
-    """Return the inputs from which a shipped design was made, as its certificate states them."""
+    """Return the inputs of a shipped design, as stated in its certificate."""
     return inputs_from_report(certificate(name)["inputs"])
 
 
 def extended_model(inputs: DesignInputs, coupling: str | float) -> tuple[np.ndarray, np.ndarray]:
-    """Return A (11, 11), B (11, 2) of the ECM (paper eq. 40) at :data:`BETWEEN`, by zero-order hold.
+    """Return A (11, 11) and B (11, 2) of the ECM (paper eq. 40) at :data:`BETWEEN`, by zero-order hold.
 
     Args:
         inputs: Inputs of the co-design, with its filter and period.
@@ -61,7 +61,7 @@ def extended_model(inputs: DesignInputs, coupling: str | float) -> tuple[np.ndar
 
 
 def codesigned_model(inputs: DesignInputs) -> tuple[np.ndarray, np.ndarray]:
-    """Return A (11, 11), B (11, 2) of the co-designed polytopic model at :data:`BETWEEN`."""
+    """Return A (11, 11) and B (11, 2) of the co-designed polytopic model at :data:`BETWEEN`."""
     return polytopic_model(inputs.model, load_vehicle(), _sections(inputs)).whole.at(*BETWEEN)
 
 

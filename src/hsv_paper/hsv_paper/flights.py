@@ -1,4 +1,4 @@
-"""The flights of the paper's study: single ones, and those of many vehicles with their measures."""
+"""Flights for the figures and studies: single flights, and flights of many vehicles with their measures."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from hsv.model.plant import FlightStatus
 from hsv_paper.designs import tube_of
 
 Table = dict[str, np.ndarray]
-"""Columns (flights) by measure, the nominal vehicle first; NaN where a flight does not define the measure."""
+"""One column (flights) per measure, the nominal vehicle first; NaN if a flight does not define the measure."""
 
 AFTER = 20.0
 """Seconds after the fault over which errors are averaged."""
 
 RINGING = (10.0, 20.0)
-"""Seconds after the fault between which only vibration remains."""
+"""Seconds after the fault: an interval in which only vibration remains."""
 
 SETTLED = 0.05
-"""Share of its largest distance from its last value within which an angle or the pitch rate counts as settled."""
+"""An angle or the pitch rate has settled within this share of its largest distance from its final value."""
 
 LAST = 1.0
-"""Seconds before the end, several periods of both modes: a rate above its decay level then has not decayed."""
+"""Seconds before the end, several periods of both modes. Vibration that lasts into them has not decayed."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """Flat parameters of a flight, and the vehicles that fly it: relative changes of parameters, nominal first."""
+    """The flat parameters of a flight, and the vehicles that fly it: relative changes of parameters, nominal first."""
 
     values: Mapping[str, Any]
     over: Sequence[Corner]
@@ -45,12 +45,12 @@ class Point:
 
 @cache
 def flight_of(scenario: str) -> FlightData:
-    """Return the flight of a shipped scenario."""
+    """Return the flight of a shipped scenario by its name."""
     return fly(assemble(flight_parameters(load_scenario(scenario)))).data()
 
 
 def fly_over(point: Point, progress: Callable[[int], None] = lambda done: None) -> Table:
-    """Return the measures of the flights of all vehicles of a point, flown in as many threads as processors."""
+    """Return the measures of the flights of all vehicles of a point; one thread per processor flies them."""
     parts = assemble(dict(point.values))
     levels = TubeLevels(parts)
 
@@ -70,9 +70,10 @@ def fly_over(point: Point, progress: Callable[[int], None] = lambda done: None) 
 
 
 def flight_measures(flight: FlightData) -> dict[str, float]:
-    """Return the metrics of a flight with those of the study (SI); undefined ones are omitted.
+    """Return the metrics of a flight and the measures of the study (SI); undefined ones are omitted.
 
-    Errors of different rigid-body states are compared relative to the half-widths of the baseline's invariant set.
+    ``rigid_error`` is relative to the half-widths of the baseline's invariant set, so that it can combine different
+    states.
     """
     values = flight_metrics(flight)
     deviation = np.abs(flight.state - flight.reference)
@@ -99,7 +100,7 @@ def flight_measures(flight: FlightData) -> dict[str, float]:
 
 
 def _settling_time(time: np.ndarray, states: np.ndarray) -> float:
-    """Return the last time (n) at which one of the states (n, m) is not within :data:`SETTLED` of its last value."""
+    """Return the last time at which one of the states (n, m) is farther than :data:`SETTLED` from its last value."""
     distance = np.abs(states - states[-1])
     moving = np.flatnonzero(np.any(distance > SETTLED * distance.max(axis=0), axis=1))
     return float(time[moving[-1]]) if len(moving) else 0.0

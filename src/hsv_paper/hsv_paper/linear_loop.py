@@ -1,6 +1,6 @@
-"""The sampled closed loop, linear: the vehicle at trim under held inputs, the discrete notch filter, the feedback F.
+"""The linear sampled loop: vehicle at trim under held inputs, discrete notch filter, and feedback gain F.
 
-Actuators and a delay may stand between controller and vehicle.
+Actuators and a delay may act between controller and vehicle.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ TARGET = (86100.0 * FOOT, 8150.0 * FOOT)
 """Altitude (m) and velocity (m/s) at which Case 1 starts and ends."""
 
 EFFECTIVENESS = (1.0, 0.9)
-"""Effectiveness of the elevator before and after the fault."""
+"""Effectiveness of the elevator before and after Case 1's fault."""
 
 ELEVATOR = 1
 
 COUPLING_SCALES = tuple(0.05 * step for step in range(26))
-"""Multiples kappa of the derived coupling in which limits of stability are bracketed."""
+"""Multiples kappa of the derived coupling, between which limits of stability are bracketed."""
 
 Corners = Sequence[Mapping[str, float]]
-"""Relative changes of the vehicle's parameters, one vehicle each."""
+"""Relative changes of the vehicle's parameters, one mapping per vehicle."""
 
 NOMINAL: Corners = ({},)
 
@@ -51,7 +51,7 @@ class Hardware:
 
     @classmethod
     def of(cls, elevator: str) -> Hardware:
-        """Return a published elevator with the fuel delivery of 10 rad/s, or ideal hardware."""
+        """Return ideal hardware, or a published elevator together with the fuel delivery of 10 rad/s."""
         return cls() if elevator == IDEAL else cls((ACTUATOR_SETS["fuel_10"], ACTUATOR_SETS[elevator]))
 
 
@@ -60,10 +60,10 @@ NO_HARDWARE = Hardware.of(IDEAL)
 
 @dataclass(frozen=True)
 class SampledLoop:
-    """A (n, n) of vehicle (9), actuators, delay and filter, loop open; B (n, 2); gain (2, n) of u; period (s).
+    """The open loop A (n, n), B (n, 2), the gain (2, n) of u = gain x, and the period (s).
 
-    B includes the effectiveness of the elevator.
-    """
+    The states are those of vehicle (9), actuators, delay and filter. B includes the effectiveness of the elevator.
+"""
 
     A: np.ndarray
     B: np.ndarray
@@ -72,13 +72,13 @@ class SampledLoop:
 
     @property
     def poles(self) -> np.ndarray:
-        """Poles of the closed loop as continuous ones, rad/s, complex."""
+        """The poles (n) of the closed loop, converted to continuous time, rad/s, complex."""
         closed = np.linalg.eigvals(self.A + self.B @ self.gain).astype(complex)
         return np.asarray(np.log(closed) / self.period)
 
     @property
     def growth(self) -> float:
-        """Largest real part of all poles, 1/s: below zero the loop is stable."""
+        """The largest real part of all poles, 1/s; the loop is stable if it is below zero."""
         return float(self.poles.real.max())
 
     def command_noise(self, noise: np.ndarray) -> np.ndarray:
@@ -91,13 +91,13 @@ class SampledLoop:
             raise np.linalg.LinAlgError(f"growth {self.growth:.3g} 1/s, expected a stable loop")
         direct = self.gain[:, :N_STATES] * noise
         entering = self.B @ direct
-        # Of the measurements, only the pitch rate drives the filter.
+        # Of the measurements, only the pitch rate enters the filter.
         entering[N_STATES:, PITCH_RATE] += self.A[N_STATES:, PITCH_RATE] * noise[PITCH_RATE]
         P = solve_discrete_lyapunov(self.A + self.B @ self.gain, entering @ entering.T)
         return np.asarray(np.sqrt(np.diag(self.gain @ P @ self.gain.T + direct @ direct.T)))
 
     def elevator_loop(self, frequencies: np.ndarray) -> np.ndarray:
-        """Return L (f), the response of the loop broken at the elevator, the other input closed; -1 is critical."""
+        """Return the response L (f) of the loop broken at the elevator, with the fuel loop closed; -1 is critical."""
         A = self.A + np.outer(self.B[:, 1 - ELEVATOR], self.gain[1 - ELEVATOR])
         poles, modes = np.linalg.eig(A)
         residues = (self.gain[ELEVATOR] @ modes) * np.linalg.solve(modes, self.B[:, ELEVATOR])
@@ -107,7 +107,7 @@ class SampledLoop:
 
 @dataclass(frozen=True, eq=False)
 class Feedback:
-    """A state feedback with gain (2, 9), notch filter on the pitch rate, period (s) and hardware."""
+    """A state feedback: its gain (2, 9), notch filter on the pitch rate, period (s), and hardware."""
 
     gain: np.ndarray
     notch: tuple[NotchSection, ...]
@@ -118,13 +118,13 @@ class Feedback:
     def of(
         cls, design: ControlDesign, factor: float = 1.0, *, notched: bool = True, hardware: Hardware = NO_HARDWARE
     ) -> Feedback:
-        """Return the feedback ``factor`` times F of a design, with its notch filter or without."""
+        """Return the feedback with ``factor`` times the gain F of a design, with or without its notch filter."""
         return cls(factor * design.feedback_gain, design.notch if notched else (), design.period, hardware)
 
     def around(
         self, vehicle: VehicleParameters, point: tuple[float, float] = TARGET, effectiveness: float = 1.0
     ) -> SampledLoop:
-        """Return the loop around a vehicle in trim at an altitude (m) and velocity (m/s).
+        """Return the loop around a vehicle in trim at ``point``: altitude (m) and velocity (m/s).
 
         Raises:
             TrimError: There is no equilibrium at this point.
@@ -137,7 +137,7 @@ class Feedback:
         return SampledLoop(A, B, gain, self.period)
 
     def growths(self, vehicle: VehicleParameters, over: Corners) -> np.ndarray:
-        """Return the growth (1/s) by vehicle of ``over``, the largest at both ends of the step, with fault or not."""
+        """Return the growth (1/s) by vehicle: the largest at both ends of the step, before and after the fault."""
         return np.array(
             [
                 max(
@@ -150,13 +150,13 @@ class Feedback:
         )
 
     def growth(self, vehicle: VehicleParameters, over: Corners = NOMINAL) -> float:
-        """Return the largest growth (1/s) at both ends of Case 1's step, before and after the fault, over vehicles."""
+        """Return the largest of the :meth:`growths` (1/s) of the vehicles ``over``."""
         return float(self.growths(vehicle, over).max())
 
     def critical_coupling(self, over: Corners = NOMINAL) -> float | None:
         """Return the multiple kappa of the derived coupling at which the first of the vehicles becomes unstable.
 
-        ``None``: all are stable up to the last of :data:`COUPLING_SCALES`.
+        None: all vehicles are stable up to the last of :data:`COUPLING_SCALES`.
         """
         return stability_limit(lambda kappa: self.growth(load_vehicle().coupled(kappa), over), COUPLING_SCALES)
 
@@ -165,19 +165,19 @@ class Feedback:
 def _held(
     vehicle: VehicleParameters, point: tuple[float, float], period: float, hardware: Hardware
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return A (n, n) and B (n, 2) of the vehicle at trim behind ``hardware``; many loops share each."""
+    """Return the discrete A (n, n) and B (n, 2) of the trimmed vehicle behind ``hardware``, cached for many loops."""
     equilibrium = trim(vehicle, *point)
     A, B = jacobian(equilibrium.state, equilibrium.input, vehicle)
     return held_behind(A, B, period, hardware.actuators, hardware.delay)
 
 
 def crossings(growth: Callable[[float], float], along: Sequence[float], tolerance: float = 1e-6) -> Iterator[float]:
-    """Yield the values at which ``growth`` changes its sign going ``along`` its argument.
+    """Yield the values of the scalar at which ``growth`` changes its sign.
 
     Args:
-        growth: Largest real part (1/s) of a loop's poles over a scalar, such as kappa.
+        growth: Largest real part (1/s) of a loop's poles as a function of a scalar, such as kappa.
         along: Values of the scalar, increasing or decreasing, dense enough to bracket every change of sign.
-        tolerance: Tolerance of a crossing, as a fraction of the interval it lies in.
+        tolerance: Tolerance of a crossing, as a fraction of the interval that it lies in.
     """
     stable = growth(along[0]) < 0.0
     for before, value in pairwise(along):
@@ -187,14 +187,14 @@ def crossings(growth: Callable[[float], float], along: Sequence[float], toleranc
 
 
 def stability_limit(growth: Callable[[float], float], along: Sequence[float], tolerance: float = 1e-6) -> float | None:
-    """Return the first of the :func:`crossings`; the first value if the loop is not stable there; ``None`` without."""
+    """Return the first of the :func:`crossings`; ``along[0]`` if unstable there; None if there is no crossing."""
     return float(along[0]) if growth(along[0]) >= 0.0 else next(crossings(growth, along, tolerance), None)
 
 
 def phase_margins(frequencies: np.ndarray, response: np.ndarray) -> np.ndarray:
-    """Return frequency (rad/s) and phase margin (rad, the angle to -1) (n, 2) at every crossing of unit gain of L (f).
+    """Return frequency (rad/s) and phase margin (rad), (n, 2), at every crossing of unit gain by the response L (f).
 
-    The logarithm of L is interpolated linearly.
+    The phase margin is the magnitude of the angle to -1. The logarithm of L is interpolated linearly.
     """
     gain, phase = np.log(np.abs(response)), np.unwrap(np.angle(response))
     i = np.flatnonzero(np.sign(gain[:-1]) != np.sign(gain[1:]))

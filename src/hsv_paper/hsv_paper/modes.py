@@ -1,4 +1,4 @@
-"""The coupled model linearised where Case 1 starts: its modes, and their peaks from elevator to pitch rate."""
+"""Modes of the coupled model, linearised at the start of Case 1, and their peaks from elevator to pitch rate."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from hsv.model.vehicle import load_vehicle
 from hsv_paper.linear_loop import ELEVATOR, START
 
 Coupling = str | float
-"""Name of a coupling set, or a multiple of the derived one."""
+"""Name of a set of coupling coefficients, or a multiple of the derived set."""
 
 WINDOW = 0.1
-"""The peak of a mode is the highest within this share of its natural frequency."""
+"""A mode's peak is sought within this share of its natural frequency."""
 
 FREQUENCIES = np.geomspace(10.0, 25.0, 15001)
-"""rad/s: about the elastic modes."""
+"""Frequencies (rad/s) around those of the elastic modes."""
 
 
 class Peak(NamedTuple):
@@ -36,35 +36,35 @@ class Peak(NamedTuple):
 
 @cache
 def linearised(coupling: Coupling) -> tuple[np.ndarray, np.ndarray]:
-    """Return A (9, 9) and B (9, 2) of the vehicle with a coupling, in trim where Case 1 starts."""
+    """Return A (9, 9) and B (9, 2) of the vehicle with this coupling, in trim at the start of Case 1."""
     vehicle = load_vehicle().coupled(coupling)
     point = trim(vehicle, *START)
     return jacobian(point.state, point.input, vehicle)
 
 
 def open_loop_modes(coupling: Coupling) -> list[Mode]:
-    """Return all modes of the model, fastest first."""
+    """Return all modes of the vehicle with this coupling, fastest first."""
     return modes(linearised(coupling)[0])
 
 
 def elastic_modes(coupling: Coupling) -> dict[str, Mode]:
-    """Return the two elastic modes, "first" and "second"."""
+    """Return the two elastic modes by name, "first" and "second"."""
     second, first = open_loop_modes(coupling)[:2]
     return {"first": first, "second": second}
 
 
 def pitch_rate_response(coupling: Coupling, frequencies: np.ndarray) -> np.ndarray:
-    """Return q / delta_e (f), 1/s, in continuous time."""
+    """Return the response (f) of pitch rate to elevator, 1/s, in continuous time, at ``frequencies`` (f), rad/s."""
     return frequency_response(*linearised(coupling), frequencies)[:, PITCH_RATE, ELEVATOR]
 
 
 def peaks(sections: Sequence[NotchSection]) -> dict[str, Peak]:
-    """Return the peak of each mode, elevator to pitch rate filtered by ``sections``; -inf dB if none remains.
+    """Return the peak of each mode in the pitch rate filtered by ``sections``; -inf dB if no peak remains.
 
-    A peak lies beside the mode's natural frequency, because the rest of the response adds to it.
+    A peak is not exactly at the mode's natural frequency, because the rest of the response adds to it.
     """
     magnitude, _ = bode(pitch_rate_response("paper_like", FREQUENCIES) * notch_response(sections, FREQUENCIES))
-    # The largest value of a window would not do: at its edge it is the flank of the other mode.
+    # A maximum over the window would not do: at the edge it may be on the flank of the other mode.
     maxima = find_peaks(magnitude)[0]
     found = {}
     for name, mode in elastic_modes("paper_like").items():
@@ -75,6 +75,6 @@ def peaks(sections: Sequence[NotchSection]) -> dict[str, Peak]:
 
 
 def peak_falls(sections: Sequence[NotchSection]) -> dict[str, float]:
-    """Return the reduction (dB) of each mode's :func:`peaks` by ``sections``; infinite if no peak remains."""
+    """Return the reduction (dB) of each mode's peak, :func:`peaks`, by ``sections``; infinite if no peak remains."""
     remaining = peaks(sections)
     return {name: peak.magnitude - remaining[name].magnitude for name, peak in peaks(()).items()}

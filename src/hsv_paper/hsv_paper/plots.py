@@ -1,4 +1,4 @@
-"""The look of all figures: the paper's panels, units and notation."""
+"""The style of all figures: the paper's panels, units and notation."""
 
 from __future__ import annotations
 
@@ -33,34 +33,34 @@ RC: Any = {
     "pdf.fonttype": 42,
     "figure.facecolor": "white",
 }
-"""Matplotlib settings of all figures."""
+"""The Matplotlib settings of all figures."""
 
 BLUE, RED, GREEN, ORANGE, GREY, PURPLE = "#0b4f9e", "#c0392b", "#1f7a3d", "#c77700", "#777777", "#7d3c98"
 
 FEET, DEGREES = to_paper(1.0, "m")[0], to_paper(1.0, "rad")[0]
-"""Factors from SI to the units of the paper's axes."""
+"""Factors from m to ft and from rad to deg, the units of the paper's axes."""
 
 WIDTH = 7.0
-"""Inches: the text width of the journal's page."""
+"""Width of a figure (inches): the text width of the journal's page."""
 
 DOTTED_GREY: Any = {"color": GREY, "linewidth": 0.6, "linestyle": ":"}
 ZERO: Any = {"color": "black", "linewidth": 0.6}
-"""Line styles of marked values and of limits."""
+"""Line styles: dotted for marked values, black for zero."""
 
 
 def new_figure(height: float) -> Figure:
-    """Return an empty figure of the page's width and of ``height`` inches."""
+    """Return an empty figure as wide as the page; ``height`` in inches."""
     return Figure(figsize=(WIDTH, height), layout="constrained")
 
 
 def letter(axes: Iterable[Axes]) -> None:
-    """Mark panels (a), (b), ... as the paper does."""
+    """Label the panels (a), (b), ... as the paper does."""
     for index, axis in enumerate(axes):
         axis.set_title(f"({chr(ord('a') + index)})", loc="left", fontweight="bold")
 
 
 def plain_log(axis: Axes) -> None:
-    """Make the vertical axis logarithmic, with plain numbers on it."""
+    """Make the vertical axis logarithmic, with plain numbers as tick labels."""
     axis.set_yscale("log")
     axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.yaxis.set_major_formatter(FormatStrFormatter("%g"))
@@ -68,7 +68,7 @@ def plain_log(axis: Axes) -> None:
 
 
 def save(figure: Figure, stem: Path) -> list[Path]:
-    """Write ``figure`` as vector PDF and as PNG; equal figures give equal files."""
+    """Write ``figure`` as PDF and PNG and return both paths; equal figures give equal files."""
     pdf, png = stem.with_suffix(".pdf"), stem.with_suffix(".png")
     with matplotlib.rc_context(RC):
         figure.savefig(pdf, metadata={"CreationDate": None})
@@ -86,10 +86,10 @@ def bode_panels() -> tuple[Figure, Axes, Axes]:
 def draw_bode(
     magnitude: Axes, phase: Axes, frequencies: np.ndarray, curves: Iterable[tuple[np.ndarray, str, dict[str, Any]]]
 ) -> None:
-    """Draw responses (f) with their labels and styles into a magnitude and a phase panel, and label the axes.
+    """Draw curves, each a complex response (f), a label and a style, into a magnitude and a phase panel.
 
-    The phase at the lowest frequency is within half a turn of -270 deg, the phase of elevator to pitch rate between
-    the slow modes and the elastic ones, so that all figures show the same branch.
+    The phase is shifted by whole turns until it begins within half a turn of -270 deg. This is the phase of elevator to
+    pitch rate between the slow modes and the elastic ones, so that all figures show the same branch.
     """
     for response, label, style in curves:
         decibel, degree = bode(response)

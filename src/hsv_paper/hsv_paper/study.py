@@ -1,4 +1,4 @@
-"""The runner of all studies, sensitivities and physical limits alike: a study makes a figure, text and tables."""
+"""The runner of all studies, of sensitivity and of physical limits: a study makes a figure, text and tables."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hsv.flight.corners import Corner, screening_corners
 from hsv.model.vehicle import load_vehicle
 
 Rows = Sequence[Mapping[str, Any]]
-"""A table: its rows, each with a cell (text, rounded number or ``None``) by column."""
+"""The rows of a table. A row maps each column to a cell: text, a rounded number, or None."""
 
 _PAGE = """# {kind}: {title}
 Made by `hsv-paper {command} --out docs/study`, including all numbers.
@@ -36,14 +36,14 @@ _TERMS = """## Terms
 
 @dataclass(frozen=True)
 class Scope:
-    """How fine a study is (coarseness 1: as in the docs), and where it reports progress."""
+    """The resolution of a study, and its report of progress. Coarseness 1 is that of the docs."""
 
     coarseness: float
     progress: Progress = lambda what, done, total: None
 
     @property
     def every(self) -> int:
-        """One in so many values of a list is used."""
+        """Stride in lists of values: only one of so many values is used."""
         return max(1, round(self.coarseness))
 
     @cached_property
@@ -56,29 +56,29 @@ class Scope:
         return screening_corners(load_vehicle().uncertainty, scale)[:: self.every]
 
     def grid(self, low: float, high: float, step: float) -> np.ndarray:
-        """Return values from ``low`` to ``high``, ``step`` apart, or farther if coarse."""
+        """Return values from ``low`` to ``high`` with a spacing of about ``step`` times the coarseness."""
         return np.linspace(low, high, max(2, round((high - low) / (step * self.coarseness)) + 1))
 
     def count(self, number: int, least: int) -> int:
-        """Return how many of a ``number`` of points are used, at least ``least``."""
+        """Return the ``number`` of points divided by the coarseness, but at least ``least``."""
         return max(least, round(number / self.coarseness))
 
 
 class Outcome:
-    """Results of a study: its figure, and the parts of its page, text and tables, in their order."""
+    """The results of a study: its figure, and the text and tables of its page in their order."""
 
     def __init__(self, figure: Figure, *parts: str | Rows) -> None:
         self.figure, self.parts = figure, parts
 
     @property
     def tables(self) -> list[Rows]:
-        """The tables among the parts."""
+        """The tables of the page."""
         return [part for part in self.parts if not isinstance(part, str)]
 
 
 @dataclass(frozen=True)
 class Study:
-    """A study: its title, its function, and about how many minutes it takes on one processor."""
+    """A study: its title, the function that runs it, and about how many minutes it takes on one processor."""
 
     name: str
     title: str
@@ -87,7 +87,7 @@ class Study:
     kind: str = "Sensitivity"
 
     def page(self, outcome: Outcome) -> str:
-        """Return the page in Markdown."""
+        """Return the study's page in Markdown."""
         limits = self.name == "limits"
         command = self.name if limits else f"sensitivity {self.name}"
         parts = [part if isinstance(part, str) else markdown(part) for part in outcome.parts]
@@ -96,7 +96,7 @@ class Study:
 
 
 def markdown(rows: Rows, right: Sequence[str] | None = None) -> str:
-    """Return a table in Markdown; "–" stands for ``None``.
+    """Return a table in Markdown; a dash stands for None.
 
     Args:
         rows: Rows with the same columns.
@@ -113,10 +113,10 @@ def markdown(rows: Rows, right: Sequence[str] | None = None) -> str:
 
 
 def rounded(value: float | None, digits: int = 0) -> float | None:
-    """Return a number as a cell; ``None`` where there is none or it is not finite."""
+    """Return a number, rounded to ``digits`` decimals, as a cell; None if it is None or not finite."""
     return None if value is None or not np.isfinite(value) else round(float(value), digits)
 
 
 def in_words(over: Sequence[Corner]) -> str:
-    """Return which vehicles ``over`` has: the nominal one, and some of all corners."""
+    """Return in words which vehicles ``over`` has: the nominal one, and how many of all corners."""
     return f"nominal vehicle and {len(over) - 1} of the {2 ** len(load_vehicle().uncertainty)} corners"

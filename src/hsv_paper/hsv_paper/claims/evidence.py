@@ -1,4 +1,4 @@
-"""Sources for measuring claims: certificates, flights of many vehicles, and the sampled loop."""
+"""Measurements for judging claims: numbers of certificates, flights of many vehicles, and poles of the sampled loop."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from hsv_paper.flights import Point, Table, fly_over
 from hsv_paper.linear_loop import Feedback, Hardware
 
 ELEVATORS = {name: ACTUATOR_SETS[name] for name in ("elevator_150", "elevator_50", "elevator_20")}
-"""Elevators that readings may name, each with the fuel delivery of 10 rad/s; those of the paper are ideal."""
+"""Elevators that a claim may name, each flown with the fuel delivery of 10 rad/s; the paper's are ideal."""
 
 
 class Evidence:
@@ -35,12 +35,12 @@ class Evidence:
         elevator: str = IDEAL,
         loops: Sequence[Corner] | None = None,
     ) -> None:
-        """Prepare the evidence.
+        """Prepare the evidence without computing anything.
 
         Args:
-            over: Vehicles that are flown, the nominal one first; by default all corners.
-            elevator: Elevator in loops and flights, ideal or of :data:`ELEVATORS`.
-            loops: Vehicles of the linear loops; by default those that are flown.
+            over: Vehicles to fly, the nominal one first; by default the nominal vehicle and all corners.
+            elevator: Elevator in loops and flights, ideal or one of :data:`ELEVATORS`.
+            loops: Vehicles of the linear loops; by default those of ``over``.
         """
         self._progress = progress
         self.hardware = Hardware.of(elevator)
@@ -54,7 +54,7 @@ class Evidence:
         self.behind = cache(self._behind)
 
     def _behind(self, elevator: str) -> Evidence:
-        """Return the evidence with this elevator: this one if it is ideal, else flights of at most 32 corners."""
+        """Return the evidence with this elevator: itself if ideal, else a new one with at most 32 corners to fly."""
         if elevator == IDEAL:
             return self
         over = [corner for corner in screening_corners(load_vehicle().uncertainty) if corner in self.over]
@@ -64,35 +64,35 @@ class Evidence:
         return {**flight_parameters(load_scenario(scenario)), **dict((*self._equipment, *changes))}
 
     def _corners(self, scenario: str, *changes: tuple[str, Any]) -> Table:
-        """Return the measurements of a scenario with the nominal vehicle (first) and at all corners."""
+        """Return the measures of a scenario, with these parameters changed, flown by all vehicles."""
         what = " ".join((scenario, *(f"{name}={value}" for name, value in (*self._equipment, *changes))))
         point = Point(self._values(scenario, changes), self.over)
         return fly_over(point, lambda done: self._progress(what, done, len(self.over)))
 
     def _changed(self, scenario: str, *changes: tuple[str, Any]) -> dict[str, float]:
-        """Return the measurements of the nominal flight of a scenario with other parameters."""
+        """Return the measures of a scenario, with these parameters changed, flown by the nominal vehicle."""
         table = fly_over(Point(self._values(scenario, changes), [{}]))
         return {name: float(column[0]) for name, column in table.items()}
 
     def uncertain(self, scenario: str, measure: str, *changes: tuple[str, Any]) -> float:
-        """Return the magnitude of a measure with the uncertain parameters of Case 1 and 2; NaN where not defined.
+        """Return the magnitude of a measure in the flight with uncertain parameters; NaN if it is not defined.
 
-        The uncertain flight of ``case1_...`` is that of ``case1_uncertain_...``, and so for Case 2.
+        For ``case1_...`` this flight is the scenario ``case1_uncertain_...``, and so for Case 2.
         """
         case, _, rest = scenario.partition("_")
         flight = self.changed("_".join(filter(None, (case, "uncertain", rest))), *changes)
         return abs(flight.get(measure, np.nan))
 
     def magnitudes(self, scenario: str, measure: str, *changes: tuple[str, Any]) -> np.ndarray:
-        """Return the magnitude (vehicles) of a measure, the nominal vehicle first."""
+        """Return the magnitudes (vehicles) of a measure in the flights of a scenario, the nominal vehicle first."""
         return np.abs(self.corners(scenario, *changes)[measure])
 
     def _growth(
         self, coupling: str, notch: tuple[NotchSection, ...], name: str = "baseline", factor: float = 1.0
     ) -> np.ndarray:
-        """Return the largest real part, 1/s, of the sampled loop's poles, by vehicle, the nominal one first.
+        """Return the growth (1/s), by vehicle, of the sampled loop with ``factor`` times F of the design ``name``.
 
-        It is the largest of both ends of the step, before and after the fault. ``factor`` multiplies the feedback.
+        It is the largest real part of all poles, at both ends of Case 1's step, before and after the fault.
         """
         self._progress(f"poles, {coupling} coupling", 0, 1)
         loop = Feedback(factor * design(name).feedback_gain, notch, design(name).period, self.hardware)
@@ -100,7 +100,7 @@ class Evidence:
 
 
 def certified(entry: str) -> np.ndarray:
-    """Return the numbers in an entry of a certificate, ``design:path.to.entry``, those of all elements of lists."""
+    """Return the numbers (n) at ``design:path.to.entry`` in a certificate, from all elements of lists."""
     name, _, path = entry.partition(":")
     found = [certificate(name)]
     for key in path.split("."):
@@ -109,7 +109,7 @@ def certified(entry: str) -> np.ndarray:
 
 
 def shown(value: float, unit: str, digits: int = 4) -> str:
-    """Return a number (SI) with the paper's unit; an infinite time is beyond the end of the flight."""
+    """Return a number (SI) as text in the paper's unit. An infinite time is "not by the end" of the flight."""
     if not math.isfinite(value):
         return "not defined" if math.isnan(value) else "not by the end" if unit == "s" else "unbounded"
     number, name = to_paper(value, unit)
@@ -117,5 +117,5 @@ def shown(value: float, unit: str, digits: int = 4) -> str:
 
 
 def worst(values: np.ndarray) -> float:
-    """Return the largest of the values of all vehicles; infinite where one diverged or does not define it."""
+    """Return the largest of the values of all vehicles; infinite if a value is NaN, as for a lost vehicle."""
     return float(np.inf) if np.any(np.isnan(values)) else float(values.max())

@@ -1,7 +1,7 @@
-"""Computations for claims that neither certificates nor flights provide, in the order of the paper.
+"""Numbers for the claims that neither a certificate nor a measure of a flight provides, in the order of the paper.
 
-A claim names its function in ``claims.yaml``. Each returns numbers (SI) and words by name; an array has an element for
-each vehicle, the nominal one first.
+A claim names its function in ``claims.yaml``. Each function returns numbers (SI) and words by name. An array has one
+element per vehicle, the nominal one first.
 """
 
 from __future__ import annotations
@@ -48,27 +48,27 @@ from hsv_paper.linear_loop import ELEVATOR, TARGET, Feedback, phase_margins
 Numbers = dict[str, Any]
 
 SLOWEST_ELASTIC = 8.0
-"""rad/s: half the lower structural frequency; slower modes belong to the rigid body."""
+"""rad/s: half the lower structural frequency of the elastic modes. Slower modes belong to the rigid body."""
 
 RIGID = 10.0
-"""rad/s: frequency between the rigid body and the elastic modes."""
+"""rad/s: a frequency between those of the rigid body and those of the elastic modes."""
 
 FAMILY = "case1_rmpc_fourth_k"
-"""A scenario of robust MPC with a gain of the nested family."""
+"""A scenario with robust MPC that flies one gain of the nested family."""
 
 
 # Section 3.1: the polytopic model and its disturbances.
 
 
 def vertices(evidence: Evidence) -> Numbers:
-    """Return the numbers of vertices of the models of both designs."""
+    """Return the numbers of vertices of the polytopic models of the baseline and of the adjustable design."""
     return {name: float(len(design(name).polytope.A)) for name in ("baseline", "adjustable")}
 
 
 def coupling(evidence: Evidence) -> Numbers:
-    """Return the effect of coupling on the modes and on the pitch-rate response.
+    """Return how much the coupling shifts the elastic modes (relative) and changes the pitch-rate response (dB).
 
-    ``almost``: the largest relative shift of a mode that counts as none, a tenth of the distance of the two modes.
+    ``almost`` is the largest relative shift that counts as none: a tenth of the relative distance of the two modes.
     """
     vehicle = load_vehicle().decoupled
     structural = {"first": vehicle.natural_frequency_1, "second": vehicle.natural_frequency_2}
@@ -85,13 +85,13 @@ def coupling(evidence: Evidence) -> Numbers:
 
 
 def _rise() -> np.ndarray:
-    """Return the increase (dB) by coupling of the pitch-rate response to the elevator, about the elastic modes."""
+    """Return the rise (dB) of pitch rate over elevator by paper-like coupling, over :data:`modes.FREQUENCIES`."""
     coupled, alone = (bode(modes.pitch_rate_response(name, modes.FREQUENCIES))[0] for name in ("paper_like", 0.0))
     return coupled - alone
 
 
 def disturbance(evidence: Evidence) -> Numbers:
-    """Return the numbers of flights in which disturbances were compared with W, and its share with derived coupling."""
+    """Return how many flights were compared with the disturbance set W, and the share of W for the derived coupling."""
     other = certificate("baseline_derived")
     return {
         "flights": certificate("baseline")["tube"]["flights"]["flights"],
@@ -104,12 +104,12 @@ def disturbance(evidence: Evidence) -> Numbers:
 
 
 def box(evidence: Evidence) -> Numbers:
-    """Return the spectral radius that must be below 1 for the paper's box (eq. 25 to eq. 28) to exist.
+    """Return the spectral radius that must be below 1 for the paper's invariant box (eq. 25 to eq. 28) to exist.
 
-    For Z = {|e| <= z} and half-widths w_i of the disturbance, condition (27) is, by the Farkas lemma (the paper's
-    Lemma 2), |A_i + B_i F| z + w_i <= z at every vertex. A vertex at which |A_i + B_i F| has a spectral radius of at
-    least one rules out any z: its left Perron vector y gives y'z + y'w_i <= y'z. Integrators and oscillating pairs lose
-    their sign in the absolute value.
+    The box is Z = {|e| <= z}; w_i are the half-widths of the disturbance at vertex i. By the Farkas lemma (the paper's
+    Lemma 2), condition (27) is |A_i + B_i F| z + w_i <= z at every vertex. If |A_i + B_i F| has a spectral radius of at
+    least one at some vertex, no z exists: its left Perron vector y gives y'z + y'w_i <= y'z. The absolute value hides
+    the signs that make integrators and oscillating pairs stable.
     """
     flown = design("baseline")
     largest = np.abs(flown.polytope.A + flown.polytope.B @ flown.feedback_gain).max(axis=0)
@@ -117,7 +117,7 @@ def box(evidence: Evidence) -> Numbers:
 
 
 def symmetric(evidence: Evidence) -> Numbers:
-    """Return the distances of the centres of W and Z from zero, relative to their half-widths."""
+    """Return how far the centres of W and Z are from zero, relative to their half-widths; the largest of each."""
     tube = tube_of("baseline")
     channels = certificate("baseline")["tube"]["disturbance"]["channels"]
     off = {name: abs(b["upper"] + b["lower"]) / (b["upper"] - b["lower"]) for name, b in channels.items()}
@@ -127,12 +127,12 @@ def symmetric(evidence: Evidence) -> Numbers:
 
 
 def certified_attitude(evidence: Evidence) -> Numbers:
-    """Return the half-width (rad) of the invariant set in the attitude angles."""
+    """Return the half-width (rad) of the invariant set in the attitude: the larger one of its two angles."""
     return {"attitude": float(tube_of("baseline").half_width[2:4].max())}
 
 
 def input_set(evidence: Evidence) -> Numbers:
-    """Return the widths of U ⊖ FZ and the margins of the nominal trajectory in it."""
+    """Return the widths of U ⊖ FZ, and the margins of the nominal trajectory to its bounds, SI."""
     tightening = certificate("baseline")["tube"]["tightening"]
     widths = np.array(tightening["upper"]) - np.array(tightening["lower"])
     rooms = np.minimum(tightening["plan"]["margin_to_lower"], tightening["plan"]["margin_to_upper"])
@@ -140,13 +140,13 @@ def input_set(evidence: Evidence) -> Numbers:
 
 
 def kept_of_level(A: np.ndarray, B: np.ndarray, gain: np.ndarray, shape: np.ndarray) -> float:
-    """Return the largest factor per step on x' P x under u = K x over vertices and states; below 1 it decreases.
+    """Return the largest factor per step on x' P x under u = K x, over all vertices and states.
 
-    The factor applies to the whole polytope, because x' P x is convex.
+    Below 1, x' P x decreases. The factor holds for the whole polytope, because x' P x is convex.
 
     Args:
-        A: (r, n, n) vertices.
-        B: (r, n, m).
+        A: (r, n, n) state matrices of the vertices.
+        B: (r, n, m) input matrices of the vertices.
         gain: (m, n) K.
         shape: (n, n) P.
     """
@@ -154,7 +154,10 @@ def kept_of_level(A: np.ndarray, B: np.ndarray, gain: np.ndarray, shape: np.ndar
 
 
 def nominal_law(evidence: Evidence) -> Numbers:
-    """Return the factors on the Lyapunov functions of the nominal gains, and the level of x_n over the flight."""
+    """Return the largest factor per step on the nominal Lyapunov functions, and levels of x_n in Case 1.
+
+    A level is x_n' P x_n of the outermost ellipsoid; ``left`` is the last one relative to the ``first``.
+    """
     flown = design("baseline")
     A, B = flown.polytope.A[:, :N_RIGID, :N_RIGID], flown.polytope.B[:, :N_RIGID]
     pairs = zip(flown.nominal_gains, flown.nominal_ellipsoids, strict=True)
@@ -170,7 +173,7 @@ def nominal_law(evidence: Evidence) -> Numbers:
 
 
 def nominal_inputs(evidence: Evidence) -> Numbers:
-    """Return the largest share that the nominal input takes of its bound over the nominal flight of Case 1."""
+    """Return the largest nominal input relative to its bound in Case 1, nominal vehicle."""
     flown = design("baseline")
     law = FamilyLaw(nominal_data(flown))
     planned = np.abs([law.step(deviation).input for deviation in flight_of("case1").deviation])
@@ -189,7 +192,7 @@ def seven_modes(evidence: Evidence) -> Numbers:
 
 
 def underdamped(evidence: Evidence) -> Numbers:
-    """Return the damping of the elastic modes, and the rise at their peaks."""
+    """Return the larger damping ratio of the elastic modes, and the rise (dB) by coupling at both peaks."""
     raised = _rise()
     first, second = (float(np.interp(peak.frequency, modes.FREQUENCIES, raised)) for peak in modes.peaks(()).values())
     return {
@@ -200,7 +203,11 @@ def underdamped(evidence: Evidence) -> Numbers:
 
 
 def coupling_in_pitch_rate(evidence: Evidence) -> Numbers:
-    """Return the shares of the pitch rate in the effects of coupling."""
+    """Return the share of the pitch rate in three effects of coupling, as ratios of sums of squares.
+
+    ``onto_rigid``, ``onto_elastic``: in the terms from modes to rigid body and back. ``answer``: in the change of the
+    response to the elevator.
+    """
     scale = np.array(list(certificate("baseline")["inputs"]["model"]["tensor_product"]["state_scale"].values()))
     models = [modes.linearised(name) for name in ("paper_like", 0.0)]
     change = ((models[0][0] - models[1][0]) * scale / scale[:, None]) ** 2
@@ -215,7 +222,11 @@ def coupling_in_pitch_rate(evidence: Evidence) -> Numbers:
 
 
 def falls(evidence: Evidence) -> Numbers:
-    """Return the reductions (dB) of both peaks, with the design's filter and with one centred at each."""
+    """Return by how much (dB) notch filters reduce the peaks of the first and the second elastic mode.
+
+    ``first``, ``second``: by the design's filter. ``least``: first peak, the least effective of the poles of Figure 3.
+    ``first_centred``, ``second_centred``: by a filter centred at that mode.
+    """
     section, at = design("baseline").notch[0], modes.elastic_modes("paper_like")["first"].natural_frequency
     changed = [replace(section, pole_frequency=w) for w in POLE_FREQUENCIES]
     changed += [replace(section, pole_damping=damping) for damping in POLE_DAMPINGS]
@@ -229,7 +240,12 @@ def falls(evidence: Evidence) -> Numbers:
 
 
 def passed(evidence: Evidence) -> Numbers:
-    """Return the filter's effect off its centre: lag (rad), and change of gain (dB) at ten times the centre."""
+    """Return the effects of the design's filter away from its centre: phase lags (rad) and gains (dB).
+
+    ``lag`` is at the rigid-body crossover of the loop, ``slow_lag`` at 1 rad/s; ``second`` is the reduction of the
+    second peak. ``above`` is the change of gain at ten times the centre, ``unmatched`` the smallest with other poles of
+    Figure 3.
+    """
     section, crossover = design("baseline").notch[0], float(margins(evidence, {}, notched=False)[0, 0])
     slow_lag, lag = -np.angle(notch_response([section], np.array([1.0, crossover])))
     far = np.array([10.0 * section.zero_frequency])
@@ -246,7 +262,10 @@ def passed(evidence: Evidence) -> Numbers:
 
 
 def unit_circle(evidence: Evidence) -> Numbers:
-    """Return the distance of the discrete filter's zeros from the unit circle, and the gain of a deeper notch."""
+    """Return how far the discrete filter's zeros are from the unit circle, and the gain of undamped zeros.
+
+    ``ideal`` has undamped zeros, which reduce the first peak by ``gained`` (dB) more than ``ours``.
+    """
     ours = design("baseline").notch[0]
     ideal = replace(ours, zero_damping=0.0)
 
@@ -267,7 +286,10 @@ def unit_circle(evidence: Evidence) -> Numbers:
 
 
 def without_notch(evidence: Evidence) -> Numbers:
-    """Return the growth (1/s) of the loops without the notch, and the critical coupling over the paper-like one."""
+    """Return the growths (1/s) of the loops without notch filter, by vehicle, and the margin of the coupling.
+
+    ``margin`` is the critical coupling of the nominal vehicle relative to the paper-like coupling.
+    """
     limit = Feedback.of(design("baseline"), notched=False, hardware=evidence.hardware).critical_coupling()
     return {
         "paper_like": evidence.growth("paper_like", ()),
@@ -277,7 +299,10 @@ def without_notch(evidence: Evidence) -> Numbers:
 
 
 def with_notch(evidence: Evidence) -> Numbers:
-    """Return the growth, 1/s, of the loops with the notch; ``retuned``: derived coupling with its own design."""
+    """Return the growths (1/s) of the loops with notch filter, by vehicle, and the filters' centres (rad/s).
+
+    ``retuned`` and ``centre_derived`` belong to ``baseline_derived``, the design for the derived coupling.
+    """
     notch, other = design("baseline").notch, design("baseline_derived").notch
     return {
         "paper_like": evidence.growth("paper_like", notch),
@@ -289,12 +314,13 @@ def with_notch(evidence: Evidence) -> Numbers:
 
 
 def margins(evidence: Evidence, corner: Corner, *, notched: bool) -> np.ndarray:
-    """Return the :func:`phase_margins` of the loop broken at the elevator, the rigid body's, the slowest, first.
+    """Return frequency (rad/s) and phase margin (rad), (n, 2), at the crossovers of the elevator loop.
 
-    Those of an unstable loop are negative. ``corner``: relative changes of the vehicle's parameters.
+    The first row, the slowest, is that of the rigid body. Margins of an unstable loop are negative. ``corner`` holds
+    relative changes of the vehicle's parameters.
     """
     flown = design("baseline")
-    # The grid is fine near the modes, where the gain barely reaches 1.
+    # The grid is fine near the modes, where the loop gain barely reaches 1.
     top = 0.95 * np.pi / flown.period
     frequencies = np.unique(np.concatenate((np.geomspace(0.1, top, 3000), np.linspace(12.0, 22.0, 5001))))
     vehicle = load_vehicle().coupled("paper_like").perturbed(corner)
@@ -304,7 +330,10 @@ def margins(evidence: Evidence, corner: Corner, *, notched: bool) -> np.ndarray:
 
 
 def phase_margin(evidence: Evidence) -> Numbers:
-    """Return the effect (rad) of the notch on the phase margins of the loop broken at the elevator, by vehicle."""
+    """Return the gains (rad) in phase margin by the notch filter, with the loop broken at the elevator.
+
+    ``gained``: of the smallest margin, by vehicle. ``rigid``: of the rigid body's margin, nominal vehicle.
+    """
     pairs = [
         [margins(evidence, corner, notched=notched)[:, 1] for notched in (False, True)] for corner in evidence.over
     ]
@@ -314,7 +343,7 @@ def phase_margin(evidence: Evidence) -> Numbers:
 
 
 def less_uncertainty(evidence: Evidence) -> Numbers:
-    """Return the largest lumped disturbances in flight with the notch over those without, by channel."""
+    """Return the largest lumped disturbances in Case 1 with the notch filter, divided by those without, by channel."""
     over = [corner for corner in fraction(load_vehicle().uncertainty) if corner in evidence.over]
     a, b = (largest_disturbances(scenario, over) for scenario in ("case1", "case1_no_notch"))
     return {channel: a[channel].max() / b[channel].max() for channel in ("pitch_acceleration", "acceleration")} | {
@@ -323,12 +352,12 @@ def less_uncertainty(evidence: Evidence) -> Numbers:
 
 
 def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.ndarray]:
-    """Return by channel of W the largest magnitude (flights) over each flight of ``scenario``, SI.
+    """Return the largest magnitude (flights), SI, of each channel of W in the flights of ``scenario``.
 
-    It is measured as the design measures W.
+    The channels are measured as in the design of W.
 
     Args:
-        scenario: A shipped one under the tube law, with or without notch filter.
+        scenario: A shipped scenario with the tube law, with or without notch filter.
         over: Relative changes of the vehicle's parameters, one flight each.
     """
     values = flight_parameters(load_scenario(scenario))
@@ -348,7 +377,10 @@ def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.
 
 
 def conforms(evidence: Evidence) -> Numbers:
-    """Return the differences between the co-designed model and the ECM, and where they are largest."""
+    """Return the largest differences between the co-designed model and the ECM, in dB and degrees.
+
+    ``low_magnitude`` is the largest difference in magnitude below ``rigid`` (rad/s).
+    """
     frequencies, inputs = CODESIGN_FREQUENCIES, inputs_of("adjustable")
     low = frequencies < RIGID
     model, ecm = (
@@ -365,7 +397,7 @@ def conforms(evidence: Evidence) -> Numbers:
 
 
 def stabilises(evidence: Evidence) -> Numbers:
-    """Return the smallest distance of the closed-loop spectral radius from 1 over gains and vertices."""
+    """Return 1 minus the largest closed-loop spectral radius over all nominal gains and vertices."""
     flown = design("adjustable")
     A, B = flown.polytope.A, flown.polytope.B
     radius = max(float(spectral_radii(A + B @ gain).max()) for gain in flown.nominal_gains)
@@ -374,7 +406,11 @@ def stabilises(evidence: Evidence) -> Numbers:
 
 @cache
 def sets(evidence: Evidence) -> Numbers:
-    """Return half-widths (7) relative to those of Z: of Z' as flown, and of the sets under F' for W' and W / 2."""
+    """Return half-widths (7 states) of sets relative to those of Z, the set under F' for the disturbances W.
+
+    ``flown``: Z' as flown. ``measured``: the set under F' for W'; ``halved``: for W / 2. ``flown_scaled``: Z' as flown,
+    relative to tau Z.
+    """
     flown, inputs, ones = design("adjustable"), inputs_of("adjustable"), np.ones(N_RIGID)
     complete, incomplete = (
         DisturbanceSet.from_report(certificate("adjustable")["adjustable"][name]["disturbance"]["channels"])
@@ -396,13 +432,13 @@ def sets(evidence: Evidence) -> Numbers:
 
 
 def relaxed(evidence: Evidence) -> Numbers:
-    """Return the bounds of the nominal inputs relative to the baseline's."""
+    """Return the bounds of the nominal inputs of the adjustable design, divided by those of the baseline."""
     ratio = design("adjustable").nominal_input_bound / design("baseline").nominal_input_bound
     return {"fuel": ratio[0], "elevator": ratio[1]}
 
 
 def adjustable_step(evidence: Evidence) -> Numbers:
-    """Return the settling time of velocity on the step of Case 1 relative to the baseline."""
+    """Return tau, and the settling time of velocity in Case 1 with the adjustable design over the baseline's."""
     values = {**read_parameters(find_design("adjustable")), **load_scenario("case1").parameters()}
     tables = fly_over(Point(values, [{}])), evidence.corners("case1")
     adjustable, baseline = (float(table["velocity_settling_time"][0]) for table in tables)
@@ -410,7 +446,7 @@ def adjustable_step(evidence: Evidence) -> Numbers:
 
 
 def less_robust(evidence: Evidence) -> Numbers:
-    """Return tau, and the worst deviation after the fault of all vehicles, relative to that with tau = 1."""
+    """Return tau, and the worst attitude deviation after Case 2's fault relative to that at tau = 1."""
     ramp, whole = (
         worst(evidence.magnitudes(name, "post_fault_attitude_from_nominal")) for name in ("case2", "case2_tau1")
     )
@@ -418,7 +454,7 @@ def less_robust(evidence: Evidence) -> Numbers:
 
 
 def further_stable(evidence: Evidence) -> Numbers:
-    """Return the growth, 1/s, of the loops with tau minus that with 1."""
+    """Return tau, and the growths (1/s, by vehicle) of the adjustable loops at tau minus those at tau = 1."""
     flown, tau = design("adjustable"), _tau()
     like, derived = (
         [evidence.growth(coupling, flown.notch, "adjustable", factor) for factor in (tau, 1.0)]
@@ -435,7 +471,7 @@ def _tau() -> float:
 
 
 def rmpc_flexible(evidence: Evidence) -> Numbers:
-    """Return with how many gains of robust MPC the coupled model is lost, derived coupling."""
+    """Return the number of gains of robust MPC, and how many of them lose the vehicle at derived coupling."""
     changes = ("vehicle.model", "CM"), ("vehicle.coupling", "derived")
     gains = range(len(design("baseline").nominal_gains))
     lost = [evidence.changed(FAMILY, ("robust_mpc.gain_index", gain), *changes)["diverged"] for gain in gains]
@@ -443,11 +479,11 @@ def rmpc_flexible(evidence: Evidence) -> Numbers:
 
 
 def rmpc_altitude(evidence: Evidence) -> Numbers:
-    """Return the altitude error at the end with the last gain."""
+    """Return the altitude error (m) at the end of Case 1 under robust MPC with its last gain."""
     last = ("robust_mpc.gain_index", len(design("baseline").nominal_gains) - 1)
     return {"last_error": abs(evidence.changed(FAMILY, last)["altitude_end_error"])}
 
 
 def rejected_derived(evidence: Evidence) -> Numbers:
-    """Return whether the flight without filter is lost (1: yes), derived coupling."""
+    """Return 1 if the flight without notch filter is lost at the derived coupling, otherwise 0."""
     return {"lost": evidence.changed("case1_derived_no_notch")["diverged"]}

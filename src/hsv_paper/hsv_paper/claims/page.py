@@ -13,7 +13,7 @@ from hsv_paper.study import markdown
 _CORNERS = 2 ** len(load_vehicle().uncertainty)
 _SCREENED = len(screening_corners(load_vehicle().uncertainty)) - 1
 _BANDWIDTHS = {name: f"{elevator.natural_frequency:g} rad/s" for name, elevator in ELEVATORS.items()}
-"""Names of the elevators for the page."""
+"""Bandwidth of each elevator, as written on the page."""
 
 _HEADER = f"""# The paper's claims
 Made by `hsv-paper claims --out docs/claims.md`; every number is measured. Each claim is quoted word for word and has
@@ -47,7 +47,7 @@ no flight is lost and that no pole of the linear loop has a positive real part.
 
 
 def page(judged: dict[str, list[Finding]]) -> str:
-    """Return the page in Markdown."""
+    """Return the page of all claims in Markdown."""
     parts = [_HEADER, tally(judged) + "\n", summary(judged)]
     for group, findings in judged.items():
         parts += [f"## {group}\n", *map(details, findings)]
@@ -62,7 +62,7 @@ def tally(judged: dict[str, list[Finding]]) -> str:
 
 
 def summary(judged: dict[str, list[Finding]]) -> str:
-    """Return the table of all claims with their verdicts."""
+    """Return the table of all claims with their verdicts, in Markdown."""
     rows = [
         {"claim": found.claim.name, "location": found.claim.location, "verdict": found.verdict}
         for findings in judged.values()
@@ -72,7 +72,7 @@ def summary(judged: dict[str, list[Finding]]) -> str:
 
 
 def details(found: Finding) -> str:
-    """Return a claim with its quote, its verdict with the reason, and its readings."""
+    """Return the section on a claim in Markdown: quote, verdict with its reason, and table of readings."""
     named, claim = any(reading.actuators for reading in found.readings), found.claim
     rows = [
         {"reading": f"**{what}**" if number < found.leading else what}

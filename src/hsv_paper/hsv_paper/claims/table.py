@@ -1,4 +1,4 @@
-"""The table of the paper's statements, ``claims.yaml``, and how each is measured and judged."""
+"""The table of the paper's claims, ``claims.yaml``, and the measuring and judging of each claim."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Vehicle = Literal["uncertain", "nominal", "worst"]
 Actuators = Literal["none", "ideal", "elevator_150", "elevator_50", "elevator_20"]
 
 _AS_PAPER = ("", "none", IDEAL)
-"""Readings with the paper's actuators: none named, independent of actuators, and ideal."""
+"""Names of actuators whose readings need no other evidence: no name, independent of actuators, and ideal."""
 
 _VEHICLES = {"uncertain": "uncertain parameters", "nominal": "nominal vehicle", "worst": "worst corner"}
 
@@ -32,7 +32,7 @@ THRESHOLDS = {
     name: parse_quantity(value, unit, name) if unit else float(value)
     for name, (value, unit) in _TABLE.pop("thresholds").items()
 }
-"""Thresholds that several claims share, SI."""
+"""Thresholds (SI) by name that several claims share."""
 
 
 class Verdict(StrEnum):
@@ -53,21 +53,21 @@ class Reading:
     at_most: float | None = None
     at_least: float | None = None
     actuators: str = ""
-    """Name of the actuators between command and vehicle; empty for the paper's, if the claim names none."""
+    """Name of the actuators between command and vehicle; empty if the claim names none, which means the paper's."""
 
     def measured(self) -> str:
-        """Return the number with its unit, and with enough digits that rounding does not hide a violated threshold."""
+        """Return the number with its unit, with so many digits that rounding does not hide a violated threshold."""
         written = (shown(self.value, self.unit, digits) for digits in range(4, 18))
         return next(text for text in written if self.holds or not self.threshold().endswith(f" {text}"))
 
     def threshold(self) -> str:
-        """Return the threshold in words."""
+        """Return the threshold as text, such as "at most 12 ft"."""
         word, limit = ("least", self.at_least) if self.at_most is None else ("most", self.at_most)
         return f"at {word} {shown(np.nan if limit is None else limit, self.unit)}"
 
     @property
     def holds(self) -> bool:
-        """Whether the number satisfies the threshold; NaN does not."""
+        """Whether the number satisfies the threshold; NaN never does."""
         if self.at_most is not None:
             return bool(self.value <= self.at_most)
         return bool(self.at_least is not None and self.value >= self.at_least)
@@ -75,10 +75,10 @@ class Reading:
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim with its readings.
+    """A claim with its measured readings.
 
-    The first ``leading`` readings are the statement itself under the paper's own conditions, one for each number in it;
-    the others repeat it under further conditions.
+    The first ``leading`` readings are the statement itself under the paper's own conditions, one for each number in it.
+    The others repeat it under further conditions.
     """
 
     claim: Claim
@@ -87,7 +87,7 @@ class Finding:
 
     @property
     def verdict(self) -> Verdict:
-        """Whether the claim holds in all readings, only in those of the statement itself, or not in these."""
+        """The verdict: the claim holds in all readings, only in the leading ones, or not in these."""
         kept = [reading.holds for reading in self.readings]
         if not all(kept[: self.leading]):
             return Verdict.FAILS
@@ -95,7 +95,7 @@ class Finding:
 
 
 class Row(BaseModel, frozen=True, extra="forbid"):
-    """Quantity of a reading, its vehicles and its threshold; ``claims.yaml`` explains the fields."""
+    """A row of ``claims.yaml``: quantity, vehicles and threshold of readings; the file's head explains the fields."""
 
     what: str
     flight: str = ""
@@ -115,7 +115,7 @@ class Row(BaseModel, frozen=True, extra="forbid"):
 
 
 class Claim(BaseModel, frozen=True, extra="forbid"):
-    """A claim of ``claims.yaml``: quote, location in the paper, and how it is measured."""
+    """A claim of ``claims.yaml``: its quote, its location in the paper, and the rows of its readings."""
 
     name: str
     quote: str
@@ -126,7 +126,7 @@ class Claim(BaseModel, frozen=True, extra="forbid"):
     actuators: tuple[Actuators, ...] = ()
 
     def measure(self, evidence: Evidence) -> Finding:
-        """Return the readings, those of the statement itself first."""
+        """Measure and return all readings of the claim, the leading ones first."""
         measured = self._measured(evidence)
         behind = {
             name: measured if name in _AS_PAPER else self._measured(evidence.behind(name))
@@ -156,13 +156,13 @@ class Claim(BaseModel, frozen=True, extra="forbid"):
 
 @dataclass(frozen=True)
 class _Measured:
-    """The numbers of a claim's function by name, and the evidence from which its rows are measured."""
+    """The evidence that a claim's rows are measured with, and the numbers of the claim's function by name."""
 
     evidence: Evidence
     numbers: dict[str, Any]
 
     def readings(self, row: Row, what: str, actuators: str) -> list[Reading]:
-        """Return the readings of a row: one, or one per vehicle."""
+        """Return the readings of a row: a single one, or one for each kind of vehicle that the row names."""
         most, least = (None if limit is None else self.named(limit) for limit in (row.at_most, row.at_least))
         if row.vehicle or not row.flight or row.beyond is not None:
             asked = {what: row.vehicle or "nominal"}
@@ -173,13 +173,13 @@ class _Measured:
         ]
 
     def named(self, limit: float | str) -> float:
-        """Return a limit that is a number or the name of one."""
+        """Return the value of a limit, which is given as a number or as the name of a number or threshold."""
         if isinstance(limit, str):
             return float(self.numbers[limit] if limit in self.numbers else THRESHOLDS[limit])
         return limit
 
     def value(self, row: Row, vehicle: Vehicle) -> float:
-        """Return the number (SI) of a row for a vehicle; ``worst``: infinite where a lost flight does not define it."""
+        """Return the number (SI) of a row for a kind of vehicle; :func:`worst` treats lost vehicles."""
         if vehicle == "uncertain":
             return float(self._of_flights(row, self.evidence.uncertain))
         if row.flight:
@@ -199,11 +199,11 @@ class _Measured:
 
 
 GROUPS = {group: tuple(map(Claim.model_validate, claims)) for group, claims in _TABLE.items()}
-"""All claims by part of the paper and topic."""
+"""All claims, grouped by part of the paper and topic."""
 
 
 def judge(evidence: Evidence, progress: Progress = lambda what, done, total: None) -> dict[str, list[Finding]]:
-    """Return the findings on all claims, by group."""
+    """Measure all claims and return their findings by group."""
     judged: dict[str, list[Finding]] = {}
     for done, (group, claims) in enumerate(GROUPS.items()):
         progress("claims", done, len(GROUPS))

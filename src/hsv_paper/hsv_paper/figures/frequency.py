@@ -26,14 +26,14 @@ from hsv_paper.modes import elastic_modes, linearised, pitch_rate_response
 
 POLE_FREQUENCIES = (10.0, 15.0, 20.0)
 POLE_DAMPINGS = (0.2, 0.5, 0.8)
-"""Poles of the notch filters in Figure 3."""
+"""Frequencies (rad/s) and damping ratios of the notch filter's poles in Figure 3."""
 
 _POLYTOPIC: dict[str, Any] = {"color": plots.BLUE, "linestyle": ":", "linewidth": 2.0}
 _WITHOUT = {"color": plots.RED, "linestyle": "--"}
 
 
 def figure_02() -> Figure:
-    """Draw elevator to pitch rate of the polytopic model and of the decoupled model, between the samples."""
+    """Draw the Bode diagram, elevator to pitch rate, of the polytopic and the decoupled model between the samples."""
     flown, frequencies = design("baseline"), np.logspace(-2.0, 2.0, 600)
     exact = zero_order_hold(*linearise(load_vehicle().decoupled, *BETWEEN), flown.period)
     polytopic = flown.polytope.at(*BETWEEN)
@@ -42,7 +42,10 @@ def figure_02() -> Figure:
 
 
 def figure_03() -> Figure:
-    """Draw elevator to filtered pitch rate of the coupled model, one parameter of the poles changed at a time."""
+    """Draw the Bode diagram of the coupled model with filtered pitch rate, for several poles of the notch filter.
+
+    The left panels vary the frequency of the poles, the right panels their damping.
+    """
     section, frequencies = design("baseline").notch[0], np.logspace(0.0, 2.0, 1500)
     plain = pitch_rate_response("paper_like", frequencies)
     figure = plots.new_figure(5.2)
@@ -67,7 +70,7 @@ def figure_03() -> Figure:
 
 
 def figure_04() -> Figure:
-    """Draw all poles of the coupled model, and those near the origin enlarged, for both sets of coupling."""
+    """Draw all poles of the coupled model for both sets of coupling, with an enlargement near the origin."""
     figure = plots.new_figure(4.2)
     whole, near = figure.subplots(1, 2, width_ratios=(1.5, 1))
     for name, color, marker, offset, side in (
@@ -100,7 +103,7 @@ def figure_04() -> Figure:
 
 
 def figure_05() -> Figure:
-    """Draw elevator to pitch rate about both modes, with and without the design's filter, and its gain alone."""
+    """Draw the Bode diagram, elevator to pitch rate, near both modes, with and without the design's notch filter."""
     section, frequencies = design("baseline").notch, np.logspace(0.7, 1.7, 3000)
     plain, filter_ = pitch_rate_response("paper_like", frequencies), notch_response(section, frequencies)
     figure, magnitude, phase = plots.bode_panels()
@@ -122,7 +125,10 @@ def figure_05() -> Figure:
 
 
 def figure_08() -> Figure:
-    """Draw elevator to filtered pitch rate of the co-designed model and of the ECM without and with its coupling."""
+    """Draw the Bode diagram, elevator to filtered pitch rate, of the co-designed model and of the ECM.
+
+    The ECM is drawn with its coupling and without.
+    """
     inputs = inputs_of("adjustable")
     curves = (
         (extended_model(inputs, "paper_like"), "ECM with its coupling", {"color": plots.GREY, "linewidth": 0.8}),
@@ -135,7 +141,7 @@ def figure_08() -> Figure:
 def _compared(
     frequencies: np.ndarray, period: float, *models: tuple[tuple[np.ndarray, np.ndarray], str, dict[str, Any]]
 ) -> Figure:
-    """Return a figure of elevator to pitch rate of discrete models (A and B, label, style)."""
+    """Return the Bode diagram, elevator to pitch rate, of discrete models, each given as (A, B), label and style."""
     figure, magnitude, phase = plots.bode_panels()
     drawn = [frequency_response(*model, frequencies, period)[:, PITCH_RATE, ELEVATOR] for model, *_ in models]
     curves = [(response, label, style) for response, (_, label, style) in zip(drawn, models, strict=True)]

@@ -1,4 +1,4 @@
-"""Figure 6: states with and without notch filter in the invariant set at the same instants."""
+"""Figure 6: the error with and without notch filter in the invariant set, at the same instants."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, GREY, letter, new_figure
 WITH, WITHOUT = "case1_uncertain", "case1_uncertain_no_notch"
 
 INSTANTS = (0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
-"""Seconds after the fault; the same for both flights."""
+"""Seconds after the fault at which the errors of both flights are drawn."""
 
 
 class Plane(NamedTuple):
-    """Two rigid states with axis labels and factors to the paper's units."""
+    """Indices of two rigid-body states, with their axis labels and the factors from SI to the paper's units."""
 
     states: tuple[int, int]
     labels: tuple[str, str]
@@ -38,14 +38,14 @@ PLANES = (
 
 
 def errors_at(flight: FlightData, instants: Sequence[float]) -> np.ndarray:
-    """Return e = x - x_r - x_n (n, 5) of the rigid states at these seconds after the fault of a flight."""
+    """Return the errors e = x - x_r - x_n (n, 5) of the rigid-body states at ``instants`` (n), s after the fault."""
     assert flight.fault_start is not None
     steps = np.abs(flight.time[:, None] - flight.fault_start - np.asarray(instants)).argmin(axis=0)
     return (flight.state - flight.reference - flight.deviation)[steps, :N_RIGID]
 
 
 def figure_06() -> Figure:
-    """Draw three projections of the set, whole and enlarged about the states."""
+    """Draw three projections of the invariant set with the errors of both flights, whole and enlarged."""
     tube = tube_of("baseline")
     shown = (("Tube-MPC without notch", GREEN, "s", WITHOUT), ("Tube-MPC with notch", BLUE, "o", WITH))
     figure = new_figure(5.0)
@@ -69,7 +69,7 @@ def figure_06() -> Figure:
 
 
 def _projection(axis: Axes, tube: TubeSet, plane: Plane) -> None:
-    """Draw the boundary of the set's projection on a plane, its interior and its centre."""
+    """Draw the projection of the invariant set on a plane: its boundary, its interior and its centre."""
     covariance = np.linalg.inv(tube.shape)[np.ix_(plane.states, plane.states)]
     angle = np.linspace(0.0, 2.0 * np.pi, 400)
     circle = np.linalg.cholesky(covariance) @ np.vstack((np.cos(angle), np.sin(angle)))

@@ -1,4 +1,4 @@
-"""Figures 9 to 17: states and inputs over time, several controllers in one panel, in Case 1 and Case 2."""
+"""Figures 9 to 17: states and inputs over time in Case 1 and Case 2, several controllers in each panel."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _FAULT: Any = {"color": GREY, "linewidth": 0.6, "linestyle": (0, (4, 3))}
 _LIMIT: Any = {"color": "black", "linewidth": 0.7, "linestyle": (0, (1, 1.5))}
 _COMMAND: Any = {"color": "black", "linewidth": 0.9, "linestyle": ":"}
 _THIN = 0.5
-"""Width of the lines of nominal flights."""
+"""Width of the lines of flights with nominal parameters."""
 
 NOTCH = ("case1_uncertain", "case1")
 NO_NOTCH = ("case1_uncertain_no_notch", "case1_no_notch")
@@ -29,13 +29,13 @@ RMPC_SINGLE = ("case1_uncertain_rmpc", "case1_rmpc")
 ADJUSTABLE = ("case2_uncertain", "case2")
 WHOLE = ("case2_uncertain_tau1", "case2_tau1")
 BASELINE = ("case2_uncertain_baseline", "case2_baseline")
-"""Scenarios of each controller, with uncertain and with nominal parameters."""
+"""The scenarios of each controller: first with uncertain parameters, then with nominal ones."""
 
 
 class Panel(NamedTuple):
-    """A quantity over time: axis label in the paper's unit, SI unit, and the array and the column of a flight.
+    """A quantity over time: axis label in the paper's unit, SI unit, and the array and column of a flight.
 
-    ``shown``: range of the axis in the paper's unit, if a curve leaves the panel.
+    ``shown`` is the range of the axis in the paper's unit; None fits the axis to the curves.
     """
 
     label: str
@@ -46,7 +46,7 @@ class Panel(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """A controller: its scenarios with uncertain parameters and, where it is shown, with nominal ones."""
+    """A controller: its scenario with uncertain parameters, then, if it is shown, the one with nominal parameters."""
 
     label: str
     color: str
@@ -55,7 +55,7 @@ class Curve(NamedTuple):
 
 
 class Zoom(NamedTuple):
-    """An enlarged column between two times (s)."""
+    """An enlarged column of a figure: its time range (s) and its title."""
 
     start: float
     end: float
@@ -91,10 +91,10 @@ def histories(
 
     Args:
         curves: Controllers to show, the last one on top.
-        zoom: Range of an additional, enlarged column, or ``None``.
+        zoom: Time range of an additional, enlarged column, or None.
         height: Height of a row, inches.
-        reference: Whether the panels are altitude and velocity, with their commands.
-        apart: Show nominal flights in a column of their own, if vibration would hide them; otherwise they are thin
+        reference: Whether to draw the commands; the panels must be altitude and velocity.
+        apart: Draw nominal flights in a column of their own, where vibration would hide them. Otherwise they are thin
             lines on top.
     """
     # Title, width, time range, and the indices of the scenarios of each curve.
@@ -134,7 +134,7 @@ def histories(
 def _panel(
     axis: Axes, panel: Panel, drawn: Sequence[tuple[FlightData, Any]], window: Zoom | None, reference: bool
 ) -> None:
-    """Draw flights with their line styles."""
+    """Draw one quantity of several flights, each with its line style, with the fault and perhaps the commands."""
     unit, first = to_paper(1.0, panel.unit)[0], drawn[0][0]
     lines = [(flight.time, getattr(flight, panel.array), style) for flight, style in drawn]
     for time, values, style in [*lines, *([(first.time, first.reference, _COMMAND)] if reference else [])]:
@@ -155,14 +155,15 @@ _CASE_1 = (
     Curve("RMPC on the DM, fourth gain", ORANGE, RMPC),
     Curve("Tube-MPC with notch", BLUE, NOTCH),
 )
-"""The controllers of Figures 9 to 12; the one that rings most is drawn first and does not hide the others."""
+"""The controllers of Figures 9 to 12. The one that vibrates most is drawn first, so that it does not hide the others.
+"""
 
 _CASE_2 = (
     Curve("baseline", ORANGE, BASELINE, 2.0),
     Curve(r"adjustable, $\tau$ = 1", GREEN, WHOLE, 1.4),
     Curve(r"adjustable, $\tau$ = 0.8", BLUE, ADJUSTABLE, 0.9),
 )
-"""The three controllers of Figures 14 to 17, the paper's on top."""
+"""The controllers of Figures 14 to 17. The paper's own is drawn last, on top."""
 
 _SECOND_MODE = (
     Curve("Tube-MPC without notch", GREEN, ["case1_no_notch"]),
@@ -172,7 +173,7 @@ _SECOND_MODE = (
 
 
 def figure_09() -> Figure:
-    """Draw altitude and velocity; the altitude with the single gain leaves its panel."""
+    """Draw altitude and velocity in Case 1. With its single gain, robust MPC leaves the altitude panel."""
     without, robust, tube = _CASE_1
     # The curve without notch is wider, so that it stays visible where both coincide.
     curves = without._replace(width=2.0), robust, Curve("RMPC on the DM, single gain", RED, RMPC_SINGLE), tube
@@ -189,13 +190,16 @@ def figure_09() -> Figure:
 
 
 def figure_11() -> Figure:
-    """Draw the elastic states; robust MPC, which rings about as much as the tube with notch, last and thinner."""
+    """Draw the elastic states in Case 1.
+
+    Robust MPC vibrates about as much as the tube controller with notch filter, so it is drawn last and thinner.
+    """
     without, robust, tube = _CASE_1
     return histories(ELASTIC, (without, tube, robust._replace(width=0.7)), Zoom(99.0, 107.0), 1.9, apart=True)
 
 
 def figure_12() -> Figure:
-    """Draw the inputs with those of their limits that are near them."""
+    """Draw the inputs in Case 1, with both limits of the fuel equivalence ratio and the upper limit of the elevator."""
     figure = histories(INPUTS, _CASE_1, Zoom(98.0, 118.0), 2.3)
     vehicle = load_vehicle().decoupled
     fuel, _, elevator, _ = figure.axes
@@ -218,4 +222,4 @@ FIGURES: dict[int, Callable[[], Figure]] = {
     16: lambda: histories(ELASTIC, _CASE_2, Zoom(99.0, 107.0), 1.9, apart=True),
     17: lambda: histories(INPUTS, _CASE_2, Zoom(98.0, 118.0), 2.3),
 }
-"""Figures 9 to 17."""
+"""The functions that draw Figures 9 to 17, by number."""

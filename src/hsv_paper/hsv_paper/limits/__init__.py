@@ -1,1 +1,1 @@
-"""Physical limits of the vehicle by optimal control: the fastest transfer, and the deepest fault it recovers from."""
+"""Physical limits of the vehicle by optimal control: the fastest transfer, and the deepest recoverable fault."""

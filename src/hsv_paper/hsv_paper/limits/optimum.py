@@ -1,11 +1,10 @@
-"""Optimal control of the vehicle as flown, inputs held over periods, by sequential quadratic programming.
+"""Optimal control of the simulated vehicle by sequential quadratic programming, with inputs held over periods.
 
-The states at all ends of periods are unknowns next to the inputs (multiple shooting): a single trajectory of an
-unstable vehicle would amplify every change of an early input. What is linearised is the integrator of the flights, by
-the complex step. Each iteration solves a convex programme with the curvature of the Lagrangian as far as it is convex,
-a proximal term, and an exact penalty on what is missing in the dynamics (Nocedal and Wright, Numerical Optimization,
-2nd ed., section 18.5); where the curvature of the dynamics spoils a step, a second-order correction follows (section
-18.3).
+The unknowns are the inputs and the states at the ends of all periods (multiple shooting): in a single trajectory, an
+unstable vehicle would amplify every change of an early input. The integrator of the flights is linearised by the
+complex step. Each iteration solves a convex programme. Its cost has the positive part of the Lagrangian's curvature, a
+proximal term, and an exact penalty on defects of the dynamics (Nocedal and Wright, Numerical Optimization, 2nd ed.,
+section 18.5). If the curvature of the dynamics spoils a step, a second-order correction follows (section 18.3).
 """
 
 from __future__ import annotations
@@ -20,13 +19,13 @@ from hsv.model.dynamics import VehicleParameters, derivative, jacobian, transiti
 from hsv.model.signals import N_INPUTS, N_STATES
 
 STATE_SCALE = np.array([100.0, 50.0, 0.03, 0.03, 0.05, 1.0, 10.0, 1.0, 10.0])
-"""Typical changes of the states, SI."""
+"""Typical changes of the nine states, in SI units."""
 
 INPUT_SCALE = np.array([0.5, 0.2])
-"""Typical changes of fuel equivalence ratio and elevator (rad)."""
+"""Typical changes of the fuel equivalence ratio and the elevator deflection (rad)."""
 
 DEFECT = 1e-7
-"""Largest defect of an optimum, in :data:`STATE_SCALE`: a hundredth of a millimetre of altitude."""
+"""Largest defect of an optimum, relative to :data:`STATE_SCALE`: a hundredth of a millimetre of altitude."""
 
 _PENALTY = 30.0
 _ITERATIONS = 400
@@ -35,9 +34,9 @@ _SIZE = N_STATES + N_INPUTS + 1
 
 @dataclass(frozen=True)
 class Point:
-    """Scalar s, states (N + 1, 9) and inputs (N, 2): a first guess, an iterate or an optimum.
+    """The scalar s, states (N + 1, 9) and inputs (N, 2): a first guess, an iterate or an optimum.
 
-    multipliers: (N, 9) sensitivity of the cost to the states' equations, scaled; the costates.
+    multipliers: (N, 9) scaled sensitivities of the cost to the equations of the states, the costates.
     """
 
     scalar: float
@@ -46,7 +45,7 @@ class Point:
     multipliers: np.ndarray
 
     def finer(self, factor: int) -> Point:
-        """Return the point on a mesh with each period divided in ``factor``: states interpolated, inputs repeated."""
+        """Return the point with each period divided into ``factor``: states are interpolated, inputs repeated."""
         n = len(self.input)
         fine = np.arange(n * factor + 1) / factor
         state = np.stack([np.interp(fine, np.arange(n + 1), column) for column in self.state.T], axis=1)
@@ -55,15 +54,16 @@ class Point:
 
 @dataclass(frozen=True)
 class Problem:
-    """Least scalar s, over s, the states before and after each of N periods, and the inputs held over them.
+    """A problem: the least scalar s, over s, the states at the ends of N periods, and the inputs held over the periods.
 
-    period, period_slope: (N) each: a period lasts period + s period_slope (s).
-    substeps: (N) Runge-Kutta steps of each.
-    inputs, inputs_slope: (2, N, 2) lower and upper bounds of the inputs: inputs + s inputs_slope; equal: given.
-    states: (2, N + 1, 9) bounds of the states; where both agree, as at the beginning, the state is given.
-    at_rest: The last state is an equilibrium with the last input.
-    scalar: Range of s.
-    cost: Weight of s: by this factor a unit of s counts as much as the defects, in :data:`STATE_SCALE`.
+    Args:
+        period, period_slope: (N) each; the length (s) of a period is period + s period_slope.
+        substeps: (N) Runge-Kutta steps of each period.
+        inputs, inputs_slope: (2, N, 2) lower and upper bounds of the inputs, inputs + s inputs_slope; if equal, fixed.
+        states: (2, N + 1, 9) lower and upper bounds of the states; if equal, as at the beginning, fixed.
+        at_rest: Whether the last state must be an equilibrium with the last input.
+        scalar: Range of s.
+        cost: Weight of s against the defects, which are relative to :data:`STATE_SCALE`.
     """
 
     vehicle: VehicleParameters
@@ -78,15 +78,15 @@ class Problem:
     cost: float = 1.0
 
     def periods(self, scalar: float) -> np.ndarray:
-        """Return the lengths (N) of the periods for a value of s."""
+        """Return the lengths (N), s, of the periods for a value of the scalar."""
         return np.asarray(self.period + scalar * self.period_slope)
 
     def times(self, scalar: float) -> np.ndarray:
-        """Return the times (N + 1), s, of the states for a value of s."""
+        """Return the times (N + 1), s, of the states for a value of the scalar."""
         return np.concatenate(([0.0], np.cumsum(self.periods(scalar))))
 
     def defects(self, point: Point) -> np.ndarray:
-        """Return the scaled defects of the dynamics (9 N) and, for a final trim, of rest at the end (9 more)."""
+        """Return the scaled defects of the dynamics (9 N), followed, if ``at_rest``, by the state's final rates (9)."""
         end, _ = self.transitions(point)
         missing = [(end - point.state[1:]) / STATE_SCALE]
         if self.at_rest:
@@ -94,20 +94,25 @@ class Problem:
         return np.vstack(missing).ravel()
 
     def transitions(self, point: Point) -> tuple[np.ndarray, np.ndarray]:
-        """Return the states (N, 9) after all periods, and their derivatives (N, 9, 12)."""
+        """Return the states (N, 9) at the ends of all periods, and their derivatives (N, 9, 12).
+
+        The derivatives are by state, input and length of the period.
+        """
         return transitions(point.state[:-1], point.input, self.periods(point.scalar), self.substeps, self.vehicle)
 
     def merit(self, point: Point) -> float:
-        """Return the cost with the exact penalty on defects."""
+        """Return the cost plus the exact penalty on the defects."""
         return self.cost * point.scalar + _PENALTY * float(np.abs(self.defects(point)).sum())
 
     def solve(self, first: Point, tolerance: float = 1e-6) -> Point:
-        """Return the local optimum reached from the guess ``first``: no step promises more than ``tolerance`` of cost.
+        """Return the local optimum that the iteration reaches from ``first``.
+
+        It has converged when no step promises to reduce the merit by more than ``tolerance``.
 
         Raises:
-            DesignError: The iteration ends elsewhere.
+            DesignError: The iteration does not converge.
         """
-        # Steps keep to the bounds, so that the merit is of the dynamics alone: the first point must, too.
+        # The merit has no penalty on bounds, because all steps keep to them. The first point must keep to them, too.
         inputs = np.clip(first.input, *(self.inputs + first.scalar * self.inputs_slope))
         point = replace(first, state=np.clip(first.state, *self.states), input=inputs)
         weight, merit, settled = 1e-2, self.merit(point), 0
@@ -150,9 +155,9 @@ def curvatures(
     vehicle: VehicleParameters,
     weights: np.ndarray,
 ) -> np.ndarray:
-    """Return second derivatives (N, 12, 12) of the states after N periods, summed with ``weights`` (N, 9).
+    """Return the second derivatives (N, 12, 12) of the states after N periods, summed with ``weights`` (N, 9).
 
-    By state, input and length of the period: complex steps, differenced. The elastic states enter linearly: zero.
+    The derivatives, differences of complex steps, are by state, input and length of the period; zero by elastic states.
     """
     reach = {0: 1.0, 1: 1.0, 2: 1e-4, 3: 1e-4, 4: 1e-4, 9: 1e-3, 10: 1e-3, 11: 1e-5}
     curved = list(reach)
@@ -170,18 +175,18 @@ def curvatures(
 
 
 class _Local:
-    """The convex programme about a point; unknowns: changes of states 1 to N, of inputs and of s, scaled; slacks.
+    """The convex programme about a point. Unknowns: scaled changes of states 1 to N, of inputs and of s; slacks.
 
-    Slacks, two for each equation, are what is missing of it, above and below.
+    Each equation has two slacks, its positive and its negative residual.
     """
 
     def __init__(self, problem: Problem, point: Point) -> None:
         self._problem, self._point = problem, point
-        self._found = np.zeros(0)  # of the last step that was not corrected
+        self._found = np.zeros(0)  # solution of the last step without correction
         n = len(point.input)
         self._states, self._moved = n * N_STATES, n * (N_STATES + N_INPUTS) + 1
         k = np.arange(n)[:, None]
-        # The unknown of each state, input and s (N, 12) in each period; the first state is given, below zero here.
+        # Column of each state, input and s (N, 12) in each period. The first state is fixed: its columns are negative.
         state, inputs = N_STATES * (k - 1) + np.arange(N_STATES), self._states + N_INPUTS * k + np.arange(N_INPUTS)
         unknown = np.hstack((state, inputs, np.full((n, 1), self._moved - 1)))
         free = unknown >= 0
@@ -203,7 +208,7 @@ class _Local:
         self._right = np.concatenate(right)
         slack = sparse.eye(len(self._right))
         self._equations = sparse.hstack((sparse.vstack(equations), slack, -slack), format="csr")
-        # The curvature of the Lagrangian, each period's without its negative eigenvalues.
+        # The curvature of the Lagrangian, without the negative eigenvalues of each period's block.
         weights = point.multipliers / STATE_SCALE
         lengths = problem.periods(point.scalar)
         curved = curvatures(point.state[:-1], point.input, lengths, problem.substeps, problem.vehicle, weights)
@@ -213,7 +218,7 @@ class _Local:
         self._bound()
 
     def _bound(self) -> None:
-        """Write the equations and the bounds of the problem as rows of the unknowns: lower <= z - slope ds <= upper."""
+        """Write equations and bounds as rows of one matrix; a bound is lower <= z - slope ds <= upper."""
         problem, point, n, size = self._problem, self._point, len(self._point.input), self._equations.shape[1]
         sizes = np.concatenate((np.tile(STATE_SCALE, n), np.tile(INPUT_SCALE, n), [1.0]))
         value = np.concatenate((point.state[1:].ravel(), point.input.ravel(), [point.scalar]))
@@ -238,9 +243,9 @@ class _Local:
         self._matrix = sparse.vstack([self._equations, rows[given], *(part for part, _ in below)], format="csc")
 
     def step(self, weight: float, missed: np.ndarray | None = None) -> tuple[Point, float]:
-        """Return the next point with a proximal ``weight``, and by how much the merit should fall.
+        """Return the next point for a proximal ``weight``, and the predicted decrease of the merit.
 
-        ``missed``: the defects after the last step, which had the same weight; it is corrected for them.
+        ``missed``: the defects at the last step with the same weight; given, the step is corrected for them.
 
         Raises:
             DesignError: The solver fails.

@@ -1,11 +1,11 @@
 """The two problems: the fastest transfer of Case 1's step, and the deepest loss of elevator effectiveness.
 
-The transfer is between the two trims of the step, of the vehicle as flown, inputs anywhere in U. Two meanings of
-fastest: all of the vehicle is at rest in the target's trim, or, as settling times are measured, altitude and velocity
-are within 2 % of their steps of the target and stay there on a way on which it comes to rest.
+The transfer leads the simulated vehicle from one trim of the step to the other, with any inputs in U. "Fastest" has two
+meanings. Either all states are at rest in the target's trim. Or, as settling times are measured, altitude and velocity
+are within 2 % of their steps, and stay there until the vehicle is at rest.
 
-The vehicle is in its trim at the target when the effectiveness falls from 1 to P; the elevator that acts is P times the
-command. For a delay the command of the trim is kept, then any inputs within U are permitted.
+In the second problem, the vehicle is in its trim at the target when the effectiveness falls from 1 to P: only P times
+the elevator command acts. The trim's command is kept during a delay; afterwards any inputs in U are permitted.
 """
 
 from __future__ import annotations
@@ -24,31 +24,31 @@ from hsv_paper.limits.optimum import Point, Problem
 from hsv_paper.linear_loop import START, TARGET
 
 PERIOD, SUBSTEPS = 0.02, 2
-"""T (s), and its Runge-Kutta steps, as flown."""
+"""The period T (s) and its Runge-Kutta steps in flight."""
 
 LONGEST, TYPICAL = 60.0, 12.0
-"""Upper bound of the time of a transfer (s), and the longest one with the Runge-Kutta steps of flights."""
+"""Upper bound of a transfer's time (s), and the longest time with Runge-Kutta steps as short as in flight."""
 
 REST = 0.4
-"""Time from settling to rest, as a share of the time to settling: a longer one changes nothing."""
+"""Time from settling to rest, as a share of the time to settling. A longer one does not change the result."""
 
 DELAYS = (0.0, 0.1, 0.2)
-"""Times (s) after which the effectiveness is known."""
+"""Delays (s) until the effectiveness is known."""
 
 HORIZON = 10.0
-"""Time (s) in which the vehicle is to be in a trim."""
+"""Time (s) within which the vehicle must reach a trim."""
 
 COST = 10.0
-"""Weight of P against defects: a tenth of P is a unit."""
+"""Weight of P against the defects: a change of P by a tenth counts as one unit."""
 
 
 def transfer(vehicle: VehicleParameters, periods: int, *, settling: bool, rest: float = REST) -> Problem:
-    """Return the problem of the least time (s), s, from Case 1's start to its target.
+    """Return the problem of the least time s (s) of the transfer from Case 1's start to its target.
 
     Args:
-        periods: Number of periods of equal length within that time in which inputs are held.
-        settling: The time is that after which altitude and velocity are within 2 % of their steps of the target; the
-            vehicle is at rest there a share ``rest`` of the time later. Otherwise it is the time to rest.
+        periods: Number of periods of equal length, with held inputs, within that time.
+        settling: Whether the time ends when altitude and velocity are within 2 % of their steps; the vehicle is at rest
+            a share ``rest`` of that time later. Otherwise the time ends at rest.
     """
     start, target = trim(vehicle, *START), trim(vehicle, *TARGET)
     total = periods + (round(rest * periods) if settling else 0)
@@ -65,7 +65,7 @@ def transfer(vehicle: VehicleParameters, periods: int, *, settling: bool, rest: 
 
 
 def free_states(vehicle: VehicleParameters, start: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return bounds (N + 1, 9) each of states from a ``start`` (9) that leave the vehicle in the model's range."""
+    """Return lower and upper bounds (N + 1, 9) of states that begin at ``start`` (9) and keep to the model's range."""
     low = np.full((periods + 1, N_STATES), -np.inf)
     high = -low
     low[:, 2:4], high[:, 2:4] = -vehicle.angle_limit, vehicle.angle_limit
@@ -74,7 +74,7 @@ def free_states(vehicle: VehicleParameters, start: np.ndarray, periods: int) -> 
 
 
 def straight(problem: Problem, time: float) -> Point:
-    """Return a first guess of ``time`` (s): states and inputs in a straight line from trim to trim."""
+    """Return a first guess that takes ``time`` (s): straight lines of states and inputs from trim to trim."""
     start, target = trim(problem.vehicle, *START), trim(problem.vehicle, *TARGET)
     share = np.minimum(problem.times(time) / time, 1.0)[:, None]
     state = start.state + share * (target.state - start.state)
@@ -83,16 +83,16 @@ def straight(problem: Problem, time: float) -> Point:
 
 
 def recovery(vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizon: float, divide: int = 1) -> Problem:
-    """Return the problem of the least effectiveness, s, from which the vehicle comes to a trim in its envelope.
+    """Return the problem of the least effectiveness s from which the vehicle reaches a trim in the envelope.
 
-    Inputs are those that act on the vehicle. They are held for one period at first, for 2 from 1.5 s on, for 5 from
-    3 s on.
+    The inputs of the problem are those that act on the vehicle. They are held for one period at first, for two from 1.5
+    s on, and for five from 3 s on.
 
     Args:
-        envelope: The vehicle's envelope of commands, which has the trim at the end.
-        delay: s.
-        horizon: Time from the fault to the trim (s).
-        divide: In how many each period is divided, for a finer mesh.
+        envelope: The vehicle whose envelope of commands must contain the final trim.
+        delay: Time (s) for which the trim's command is kept.
+        horizon: Time from the fault to the final trim (s).
+        divide: Number of parts into which each period is divided, for a finer mesh.
     """
     before = trim(vehicle, *TARGET)
     held: list[int] = []
@@ -102,7 +102,7 @@ def recovery(vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizo
     n, kept = len(period), round(delay / PERIOD) * divide
     low, high = free_states(vehicle, before.state, n)
     low[-1, :2], high[-1, :2] = np.transpose((envelope.altitude_range, envelope.velocity_range))
-    # The fuel is between its limits, the elevator that acts between s times those of the command.
+    # The fuel is within its limits, the acting elevator deflection within s times those of the command.
     inputs, slope = np.zeros((2, n, 2)), np.zeros((2, n, 2))
     for side, limits in enumerate((vehicle.input_minimum, vehicle.input_maximum)):
         inputs[side, :, 0], slope[side, :, 1] = limits
@@ -112,14 +112,14 @@ def recovery(vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizo
 
 
 def at_trim(problem: Problem) -> Point:
-    """Return the first guess: the vehicle stays in its trim, at half of the effectiveness."""
+    """Return the first guess of the recovery: the vehicle stays in its trim, with half of the effectiveness."""
     before = trim(problem.vehicle, *TARGET)
     n = len(problem.period)
     return Point(0.5, np.tile(before.state, (n + 1, 1)), np.tile(before.input, (n, 1)), np.zeros((n, N_STATES)))
 
 
 def static_limit(vehicle: VehicleParameters, points: np.ndarray) -> float:
-    """Return the least effectiveness with which one of ``points`` (M, 2), altitude m and velocity m/s, is a trim."""
+    """Return the least effectiveness with which a trim exists at one of ``points`` (M, 2): altitude m, velocity m/s."""
     least = np.inf
     for altitude, velocity in points:
         try:
@@ -132,16 +132,16 @@ def static_limit(vehicle: VehicleParameters, points: np.ndarray) -> float:
 
 
 def envelope_points(envelope: Vehicle) -> np.ndarray:
-    """Return a grid (9, 2) of altitudes (m) and velocities (m/s) over the envelope: its corners, sides and middle."""
+    """Return nine pairs (9, 2) of altitude (m) and velocity (m/s): corners, sides and centre of the envelope."""
     return np.array([*product(*(np.linspace(*axis, 3) for axis in (envelope.altitude_range, envelope.velocity_range)))])
 
 
 def turning_limit(vehicle: VehicleParameters, delay: float, resolution: float = 1e-4) -> float:
     """Return the least effectiveness with which the elevator at its stop turns the vehicle's nose down.
 
-    Found by bisection of flights, without any optimisation: after the ``delay`` (s) the elevator goes to its stop and
-    the fuel, whose thrust lifts the nose, is shut off; the nose is turned when the angle of attack is back at
-    that of the trim.
+    It is found by bisection of flights, without optimisation. After the ``delay`` (s) the elevator goes to its stop,
+    and the fuel, whose thrust lifts the nose, is shut off. The nose has turned when the angle of attack is back at that
+    of the trim.
     """
     before, kept = trim(vehicle, *TARGET), round(delay / PERIOD)
     stop = np.array([vehicle.fuel_equivalence_ratio_minimum, vehicle.elevator_deflection_maximum])

@@ -1,4 +1,4 @@
-"""The physical limits next to what the controllers reach: ``hsv-paper limits``."""
+"""The study of ``hsv-paper limits``: the physical limits, compared with what the controllers reach."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, GREY, ORANGE, RED, lette
 from hsv_paper.study import Outcome, Scope, Study, rounded
 
 SCENARIOS = ("case1", "case1_smooth", "case1_qp", "case1_governed")
-"""Compared with the fastest transfer."""
+"""Scenarios that are compared with the fastest transfer."""
 
 PERIODS, COARSE, GUESS, TOLERANCE = 200, 50, 15.0, 1e-5
 """Periods of the published transfers and of the first mesh, time (s) of the first guess, tolerance of an optimum."""
 
 CURVE = tuple(round(0.02 * i, 2) for i in range(16))
-"""Delays (s) of the figure's curves."""
+"""Delays (s) at which the figure's curves are computed."""
 
 BLEND = 5.0
-"""Half the time (s) in which the rates of the governed reference change."""
+"""Half the time (s) over which the rates of the governed reference change."""
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """An optimum of a problem, and that on another mesh, half or twice as fine."""
+    """The optimum of a problem, and the same optimum on another mesh, half or twice as fine."""
 
     problem: Problem
     found: Point
@@ -48,12 +48,12 @@ class Optimum:
 
     @property
     def change(self) -> float:
-        """Change (%) of the least scalar with the mesh."""
+        """Change (%) of the optimal scalar from one mesh to the other."""
         return 100.0 * abs(self.other.scalar / self.found.scalar - 1.0)
 
 
 def fastest_transfer(vehicle: VehicleParameters, periods: int, *, settling: bool) -> Optimum:
-    """Return the fastest transfer; its inputs are held over ``periods`` equal intervals."""
+    """Return the fastest transfer, with inputs held over ``periods`` equal intervals until it ends."""
     first, half, whole = (problems.transfer(vehicle, n, settling=settling) for n in (COARSE, periods // 2, periods))
     coarse = first.solve(problems.straight(first, GUESS), 10.0 * TOLERANCE)
     coarser = half.solve(coarse.finer(periods // 2 // COARSE), TOLERANCE)
@@ -61,14 +61,14 @@ def fastest_transfer(vehicle: VehicleParameters, periods: int, *, settling: bool
 
 
 def deepest_fault(vehicle: VehicleParameters, envelope: Vehicle, delay: float) -> Optimum:
-    """Return the deepest loss of effectiveness; see :func:`hsv_paper.limits.problems.recovery`."""
+    """Return the deepest loss of effectiveness; :func:`hsv_paper.limits.problems.recovery` states the problem."""
     problem, fine = (problems.recovery(vehicle, envelope, delay, problems.HORIZON, divide) for divide in (1, 2))
     found = problem.solve(problems.at_trim(problem), TOLERANCE)
     return Optimum(problem, found, fine.solve(found.finer(2), TOLERANCE))
 
 
 def fault_row(fault: Optimum, delay: float) -> dict[str, Any]:
-    """Return the row of ``fault``: the deepest one by optimisation, beside the limits known without it."""
+    """Return the table row of a deepest fault: the optimum next to the limits that are known without optimisation."""
     vehicle, found = fault.problem.vehicle, fault.found
     numbers = {
         "least P": found.scalar,
@@ -82,7 +82,10 @@ def fault_row(fault: Optimum, delay: float) -> dict[str, Any]:
 def corner_limits(
     vehicle: VehicleParameters, envelope: Vehicle, over: Sequence[Corner], delays: tuple[float, ...]
 ) -> np.ndarray:
-    """Return limits (vehicles, 2 + delays): static at the target, static in the envelope, turning after each delay."""
+    """Return least values of effectiveness (vehicles, 2 + delays).
+
+    Columns: a trim at the target exists, a trim in the envelope exists, the nose can be turned after each delay.
+    """
     points = problems.envelope_points(envelope)
     rows = []
     for corner in over:
@@ -93,7 +96,7 @@ def corner_limits(
 
 
 def run(scope: Scope) -> Outcome:
-    """Solve both problems; a coarse study has half as many periods, and few corners."""
+    """Solve both problems and compare; a coarse study has half as many periods and fewer corners."""
     whole = scope.coarseness <= 1.0
     envelope = load_vehicle()
     vehicle = envelope.coupled("paper_like")
@@ -108,7 +111,7 @@ def run(scope: Scope) -> Outcome:
     scope.progress("corners", 2, 4)
     over = corners(envelope.uncertainty)[:: 1 if whole else min(512, round(64 * scope.coarseness))]
     limits = corner_limits(vehicle, envelope, over, CURVE)
-    needed = np.maximum(limits[:, 2:], limits[:, 1:2])  # to turn the vehicle, and to hold it
+    needed = np.maximum(limits[:, 2:], limits[:, 1:2])  # to turn the nose, and to hold a trim
     scope.progress("deepest faults", 3, 4)
     faults = [deepest_fault(vehicle, envelope, delay) for delay in problems.DELAYS]
     scope.progress("done", 4, 4)
@@ -147,9 +150,9 @@ def run(scope: Scope) -> Outcome:
 
 
 def settling_times(flight: FlightData) -> np.ndarray:
-    """Return the times (2), s, from which altitude and velocity stay within 2 % of the whole change up to the fault.
+    """Return the times (2), s, from which altitude and velocity stay within 2 % of their change until the fault.
 
-    The change is from the first state to the last reference, whether that is a step or not; infinite: not settled.
+    The change is from the first state to the last reference, be it a step or a ramp. Infinite: not settled by then.
     """
     before = flight.time < (np.inf if flight.fault_start is None else flight.fault_start - 1e-9)
     target = flight.reference[-1, :2]
@@ -166,7 +169,7 @@ def _figure(
     optima = ((rest, "to rest", BLUE), (settled, "to 2 %", RED))
 
     def drawn(axis: Axes, optimum: Optimum, values: np.ndarray, end: float, **style: Any) -> None:
-        """Draw values at the steps of an optimum, the last one until ``end`` (s): the vehicle stays in its trim."""
+        """Draw the values at an optimum's times, extended to ``end`` (s): the vehicle stays in its last trim."""
         axis.plot([*optimum.problem.times(optimum.found.scalar), end], [*values, values[-1]], **style)
         axis.set_xlim(0.0, end)
 

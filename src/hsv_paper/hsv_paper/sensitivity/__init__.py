@@ -1,4 +1,4 @@
-"""Sensitivity studies: what the results depend on, and where each controller is lost."""
+"""Sensitivity studies: on what the results depend, and where each controller loses the vehicle."""
 
 from __future__ import annotations
 
@@ -19,4 +19,4 @@ STUDIES = {
         Study("hardware", "Actuators, delay and noise", hardware.run, 8),
     )
 }
-"""All sensitivity studies by name."""
+"""All sensitivity studies, by name."""

@@ -1,4 +1,4 @@
-"""Benefit and cost of the adjustable factor tau: the designs of section 4 over tau, flown until the loop is lost."""
+"""Benefit and cost of the adjustable factor tau: designs of section 4 and their flights for several values of tau."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, RED, ZERO, new_figure
 from hsv_paper.study import Outcome, Scope, in_words, rounded
 
 FACTORS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
-"""Tube factors of the designs that are made and flown."""
+"""Values of tau for which designs are made and flown."""
 
 FINE = np.linspace(0.25, 1.0, 76)
-"""Tube factors of the linear loops."""
+"""Values of tau for which linear loops are computed."""
 
 ATTITUDE = "post_fault_attitude_from_nominal"
 
 
 def run(scope: Scope) -> Outcome:
-    """Design and fly at each factor, and find the factors at which the linear loops are stable and certified."""
+    """Design and fly at each tau, and find the values at which the linear loops are stable and certified."""
     inputs = read_inputs(find_inputs("adjustable"))
     gains = replace(design_gains(inputs, scope.progress).design, filtered=True)
     least = min(tau for tau in FINE.tolist() if is_certified(gains, inputs, tau))
@@ -81,12 +81,12 @@ def run(scope: Scope) -> Outcome:
 
 
 def growth(gains: ControlDesign, coupling: str, over: Corners, tau: float) -> float:
-    """Return the rightmost pole (1/s) of the loops with ``tau`` around the vehicles ``over``, the worst of all."""
+    """Return the largest growth (1/s) of the loops at ``tau`` around the vehicles ``over``."""
     return Feedback.of(gains, tau).growth(load_vehicle().coupled(coupling), over)
 
 
 def is_certified(gains: ControlDesign, inputs: DesignInputs, tau: float) -> bool:
-    """Return whether one Lyapunov function is found for ``tau`` and everything up to 1, with the fault and without."""
+    """Return whether one Lyapunov function is found for all factors from ``tau`` to 1, with and without the fault."""
     loops = certified_loops(_with(gains, tau), inputs.flown_vehicle, inputs.disturbance.elevator_effectiveness)
     try:
         common_lyapunov(loops, inputs.error_scale(), f"tau = {tau:g}")
@@ -96,7 +96,7 @@ def is_certified(gains: ControlDesign, inputs: DesignInputs, tau: float) -> bool
 
 
 def _rows(gains: ControlDesign, inputs: DesignInputs, scope: Scope) -> list[dict[str, float]]:
-    """Return a row for each factor, in the units of the page; the first factor is 1."""
+    """Return a table row for each tau, in the units of the page. The first tau is 1, to which others are relative."""
     one = _with(gains, 1.0)
     complete = measured_set(one, Region(one, inputs, 1.0), inputs, lambda *_: None)
     target, factors = inputs.nominal.target, FACTORS[:: scope.every]

@@ -1,4 +1,4 @@
-"""Sweeps of flights: coupling, sampling period, size of the uncertainty, depth of the fault, length of the ramp."""
+"""Studies by flights: coupling, sampling period, size of the uncertainty, depth of the fault, length of the ramp."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from hsv_paper.study import Outcome, Scope, in_words, rounded
 FLOWN = (*ALL, RMPC_DECOUPLED)
 
 PAPER_LIKE = load_vehicle().coupling_scale("paper_like")
-"""kappa of the paper-like set."""
+"""Multiple kappa of the derived coupling that is the paper-like coupling."""
 
 RAMPED = (
     Controller("baseline", "case2_baseline", plots.ORANGE),
@@ -47,14 +47,14 @@ PERIODS = {
     period: Controller(f"T = {period:g} s", "case1", color)
     for period, color in ((0.01, plots.GREEN), (0.02, plots.BLUE), (0.05, plots.RED))
 }
-"""Controllers by sampling period (s)."""
+"""Labels and colours by sampling period (s), as controllers."""
 
 INTEGRATION_STEP = 0.01
-"""s: of the vehicle, as at the shipped period."""
+"""Integration step (s) of the vehicle, as in the shipped scenarios."""
 
 
 def coupling(scope: Scope) -> Outcome:
-    """Fly and linearise every controller over the coupling, beginning at kappa = 0, the decoupled model."""
+    """Fly and linearise every controller for couplings kappa from 0, the decoupled model, upwards."""
     kappas = scope.grid(COUPLING_SCALES[0], COUPLING_SCALES[-1], 0.05)
 
     def point(controller: Controller, kappa: float) -> Point:
@@ -91,12 +91,12 @@ def coupling(scope: Scope) -> Outcome:
 
 
 def sampling(scope: Scope) -> Outcome:
-    """Design at each period, linearise over the coupling with and without notch, and fly Case 1."""
+    """Design the baseline at each sampling period, linearise it over the coupling, and fly Case 1."""
     kappas = scope.grid(COUPLING_SCALES[0], COUPLING_SCALES[-1], 0.05)
     designs = {period: _design_at(period, scope) for period in PERIODS}
 
     def point(controller: Controller, period: float) -> Point:
-        # The integration keeps its step, whatever the control period.
+        # The integration step stays the same at every sampling period.
         substeps = max(1, round(period / INTEGRATION_STEP))
         values = {**designs[period].to_parameters(), **load_scenario("case1").parameters(), "substeps": substeps}
         return Point(values, scope.over)
@@ -133,7 +133,7 @@ def sampling(scope: Scope) -> Outcome:
 
 
 def parameters(scope: Scope) -> Outcome:
-    """Fly every controller with 0 to 6 times the paper's parameter bounds."""
+    """Fly every controller with 0 to 6 times the paper's bounds on the parameters."""
     scales = scope.grid(0.0, 6.0, 0.25)
     results = sweep(scope, FLOWN, scales.tolist(), lambda c, scale: Point(c.parameters(), scope.corners(scale)))
     figure = plots.new_figure(7.2)
@@ -150,7 +150,7 @@ def parameters(scope: Scope) -> Outcome:
 
 
 def fault(scope: Scope) -> Outcome:
-    """Fly every controller with an elevator effectiveness from 1 down to 0.3."""
+    """Fly every controller with an elevator effectiveness from 1 down to 0.3 after the fault."""
     shares = scope.grid(0.3, 1.0, 0.025)
 
     def point(controller: Controller, left: float) -> Point:
@@ -160,7 +160,7 @@ def fault(scope: Scope) -> Outcome:
     figure = plots.new_figure(7.2)
     label = "elevator effectiveness after the fault (0.9: the paper's)"
     axes = draw_losses(figure, shares, {c: results[c] for c in ALL}, label)
-    # Without a fault the excursions are tiny, and that end of the curves would take most of the axis.
+    # Without a fault the excursions are tiny; on the logarithmic axes they would take most of the height.
     axes[1].set_ylim(bottom=0.05)
     axes[2].set_ylim(bottom=1.0)
     for axis in axes:
@@ -175,7 +175,7 @@ def fault(scope: Scope) -> Outcome:
 
 
 def ramp(scope: Scope) -> Outcome:
-    """Fly Case 2 with ramps of 15 s to 80 s; the last ends when the fault occurs."""
+    """Fly Case 2 with ramps of 15 s to 80 s; the longest ends when the fault occurs."""
     lengths = scope.grid(15.0, 80.0, 5.0)
 
     def command(controller: Controller) -> CommandTable:
@@ -230,7 +230,7 @@ def ramp(scope: Scope) -> Outcome:
 def draw_growth(
     axis: Axes, kappas: np.ndarray, loop: Feedback, over: Corners, widths: tuple[float, float], **style: Any
 ) -> None:
-    """Draw the growth of a loop over the coupling: the nominal vehicle, and the worst of ``over`` dashed."""
+    """Draw the growth of a loop over the coupling: solid for the nominal vehicle, dashed for the worst of ``over``."""
     values = np.array([loop.growths(load_vehicle().coupled(kappa), over) for kappa in kappas.tolist()])
     axis.plot(kappas, values[:, 0], linewidth=widths[0], **style)
     axis.plot(kappas, values.max(axis=1), "--", linewidth=widths[1], color=style["color"])
@@ -238,7 +238,7 @@ def draw_growth(
 
 
 def mark_couplings(axes: Sequence[Axes], growths: Sequence[Axes]) -> None:
-    """Mark the limit of stability in the panels of growths, and the paper-like and the derived coupling in all."""
+    """Mark the paper-like and the derived coupling in all panels, and the limit of stability in ``growths``."""
     for axis in growths:
         axis.axhline(0.0, **plots.ZERO)
     for axis in axes:
@@ -247,14 +247,14 @@ def mark_couplings(axes: Sequence[Axes], growths: Sequence[Axes]) -> None:
 
 
 def coupling_limits(loop: Feedback, over: Corners) -> dict[str, str]:
-    """Return cells with kappa up to which a linear loop is stable, nominal vehicle and worst of ``over``."""
+    """Return table cells with the largest kappa of a stable linear loop: nominal vehicle, and worst of ``over``."""
     limits = {"nominal": loop.critical_coupling(), "worst": loop.critical_coupling(over)}
     beyond = f"≥ {COUPLING_SCALES[-1]:g}"
     return {f"stable up to κ, {which}": beyond if k is None else f"{k:.2f}" for which, k in limits.items()}
 
 
 def _design_at(period: float, scope: Scope) -> ControlDesign:
-    """Return the gains of the baseline's inputs at ``period`` (s)."""
+    """Return the baseline designed for a ``period`` (s): the shipped design, or new gains from the same inputs."""
     inputs = read_inputs(find_inputs("baseline"))
     if period == inputs.model.period:
         return read_design(find_design("baseline"))

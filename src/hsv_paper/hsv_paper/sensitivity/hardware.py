@@ -20,13 +20,13 @@ from hsv_paper.study import Outcome, Scope, in_words, rounded
 FUEL, SURFACE = ACTUATOR_SETS["fuel_10"], ACTUATOR_SETS["elevator_50"]
 
 ELEVATORS = {"ideal": Hardware.of("ideal"), "50 rad/s": Hardware.of("elevator_50")}
-"""Elevators whose tolerated delays are compared."""
+"""Hardware for which tolerated delays are compared, by bandwidth of the elevator."""
 
 BANDWIDTHS = tuple(np.geomspace(3.0, 2000.0, 61).tolist())
-"""rad/s, of elevators of the second order."""
+"""Bandwidths (rad/s) of second-order elevators, between which limits of stability are bracketed."""
 
 DELAYS = tuple(np.arange(0.0, 0.3001, 0.01).tolist())
-"""s, in which the limit is bracketed."""
+"""Delays (s) between which limits of stability are bracketed."""
 
 KNOWING = Controller("tube that knows its actuators", "case1", GREEN, "realistic")
 
@@ -46,28 +46,28 @@ CASES = tuple(
         (WIDER_NOTCH, "derived", GREY),
     )
 )
-"""Controllers with the coupling of their vehicle."""
+"""The compared controllers, each with the coupling of its vehicle."""
 
 
 def elevator(bandwidth: float, delay: float = 0.0) -> Hardware:
-    """Return the realistic elevator with another ``bandwidth`` (rad/s), its fuel delivery, and a ``delay`` (s)."""
+    """Return an elevator of this ``bandwidth`` (rad/s) with the 10 rad/s fuel delivery, and a ``delay`` (s)."""
     return Hardware((FUEL, replace(SURFACE, natural_frequency=bandwidth)), delay)
 
 
 def growth(case: Controller, hardware: Hardware, over: Corners = NOMINAL) -> float:
-    """Return the largest real part (1/s) of all poles over both ends of the step, fault and corners."""
+    """Return the largest growth (1/s) of a case with this hardware, over both ends of the step, fault and vehicles."""
     return replace(case.loop, hardware=hardware).growth(case.vehicle, over)
 
 
 def tolerated_delay(case: Controller, hardware: Hardware, over: Corners = NOMINAL) -> float | None:
-    """Return the delay (s) at which the loop becomes unstable; ``None``: beyond all of :data:`DELAYS`."""
+    """Return the delay (s) at which the loop becomes unstable; None if it is longer than all of :data:`DELAYS`."""
     return stability_limit(lambda delay: growth(case, replace(hardware, delay=delay), over), DELAYS)
 
 
 def rms(case: Controller, hardware: Hardware, sensors: str) -> float:
-    """Return the rms elevator command (rad) from the noise of a sensor set, the worse end of the step.
+    """Return the rms elevator command (rad) due to the noise of a set of sensors, at the worse end of the step.
 
-    NaN where the loop is unstable.
+    It is NaN if the loop is unstable.
     """
     channels = SENSOR_SETS[sensors].channels
     noise = np.array([channels.get(name, {}).get("noise", 0.0) for name in STATE_NAMES])
@@ -78,7 +78,7 @@ def rms(case: Controller, hardware: Hardware, sensors: str) -> float:
 
 
 def stability(case: Controller, over: Corners) -> dict[str, Any]:
-    """Return cells with the bandwidths at which a loop is stable."""
+    """Return table cells with the ranges of elevator bandwidth in which the loop is stable."""
     cells: dict[str, Any] = {"case": case.label}
     for which, vehicles, along in (("nominal", NOMINAL, BANDWIDTHS), ("worst", over, BANDWIDTHS[::2])):
 
@@ -95,7 +95,7 @@ def stability(case: Controller, over: Corners) -> dict[str, Any]:
 
 
 def tolerances(case: Controller, over: Corners) -> dict[str, Any]:
-    """Return cells with the delays that a loop tolerates, and with its response to sensor noise at 50 rad/s."""
+    """Return table cells with the delays that a loop tolerates, and its response to sensor noise with 50 rad/s."""
     cells: dict[str, Any] = {"case": case.label}
     for name in ("ideal", "50 rad/s"):
         for which, vehicles in (("nominal", NOMINAL), ("worst", over)):
@@ -108,7 +108,7 @@ def tolerances(case: Controller, over: Corners) -> dict[str, Any]:
 
 
 def run(scope: Scope) -> Outcome:
-    """Linearise every controller with elevators of all bandwidths and with delays."""
+    """Compute the linear loop of every controller for elevators of different bandwidths and for delays."""
     bandwidths = np.geomspace(5.0, 500.0, scope.count(31, 4)).tolist()
     delays = np.linspace(0.0, 0.16, scope.count(33, 3)).tolist()
     figure = new_figure(6.4)

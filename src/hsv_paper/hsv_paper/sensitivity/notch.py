@@ -1,4 +1,4 @@
-"""Permitted frequencies of the notch filter, and its required depth."""
+"""The permitted frequencies of the notch filter, and its required depth."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ SETS = (
     Controller("paper-like coupling", "case1", BLUE),
     Controller("derived coupling", "case1_derived", RED),
 )
-"""Both have the gains of the baseline and its filter, with another centre or depth."""
+"""Both couplings are flown with the baseline's gains and its filter, moved to another centre or depth."""
 
 
 def run(scope: Scope) -> Outcome:
-    """Linearise the loop over centre and depth, and fly it over the centre, for both sets of coupling."""
+    """Compute the linear loop over centre and depth of the notch and fly over the centre, for both couplings."""
     own = design("baseline").notch[0]
     centres = scope.grid(8.0, 26.0, 0.5)
     depths = np.geomspace(0.005, own.pole_damping, scope.count(17, 3))
@@ -90,10 +90,10 @@ def run(scope: Scope) -> Outcome:
 
 
 def stable_range(coupled: Controller, over: Corners, centres: np.ndarray, depths: np.ndarray) -> dict[str, str]:
-    """Return cells with the range of stability of the worst of the vehicles ``over``.
+    """Return table cells with the range in which the loops around all vehicles ``over`` are stable.
 
-    While the centre (rad/s) is varied, the damping of the zeros is the baseline's, and the other way round; the limits
-    are bracketed in ``centres`` and ``depths``.
+    While the centre (rad/s) varies, the damping of the zeros is the baseline's, and vice versa. The limits are
+    bracketed in ``centres`` and ``depths``.
     """
     own = design("baseline").notch[0]
     around = np.union1d(centres, own.zero_frequency)
@@ -122,13 +122,13 @@ def stable_range(coupled: Controller, over: Corners, centres: np.ndarray, depths
 
 
 def _growths(coupled: Controller, centre: float, zero_damping: float, over: Corners) -> np.ndarray:
-    """Return the growth (1/s) by vehicle with the baseline's section moved to a ``centre`` (rad/s)."""
+    """Return the growths (1/s), by vehicle, with the baseline's notch moved to a ``centre`` (rad/s)."""
     section = NotchSection(centre, zero_damping, centre, design("baseline").notch[0].pole_damping)
     return replace(coupled.loop, notch=(section,)).growths(coupled.vehicle, over)
 
 
 def _draw_map(axis: Axes, centres: np.ndarray, depths: np.ndarray, values: np.ndarray) -> Any:
-    """Draw growths (centres, depths, vehicles), the nominal vehicle first; return the base of a colour bar."""
+    """Draw a map of growths (centres, depths, vehicles), nominal vehicle first; return it for a colour bar."""
     levels = np.array([-0.4, -0.3, -0.2, -0.1, 0.0, 0.25, 0.5, 1.0, 1.5])
     nominal, worst = values[..., 0].T, values.max(axis=-1).T
     shown = axis.contourf(centres, depths, nominal, levels=levels, cmap="RdYlBu_r", extend="both", vmin=-1.0, vmax=1.0)

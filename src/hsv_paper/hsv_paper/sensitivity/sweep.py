@@ -1,4 +1,4 @@
-"""The controllers that the studies compare, the runner of all sweeps of flights, and the plots and cells of one."""
+"""The controllers that the studies compare; sweeps of their flights, with the plots and table cells of a sweep."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from hsv_paper.plots import BLUE, GREEN, ORANGE, PURPLE, RED, letter, plain_log
 from hsv_paper.study import Scope
 
 Columns = dict[str, np.ndarray]
-"""Numbers of one controller over the points of a sweep, by name."""
+"""Arrays (points of a sweep) of one controller, by name."""
 
 SATURATED_STEPS = 50
-"""Limited steps, one second, up to which a flight does not count as saturated."""
+"""A flight whose command is limited in more steps than these, one second, counts as saturated."""
 
 LOSSES = "(a) Share of the flights that are not lost (solid), and of those that are not saturated (dotted)."
-"""Description of the plot of :func:`draw_losses`."""
+"""Caption of panel (a) of :func:`draw_losses`."""
 
 
 @dataclass(frozen=True)
 class Controller:
-    """A scenario with changes, and its colour in the plots."""
+    """A scenario with changed parameters, and its label and colour in the plots."""
 
     label: str
     scenario: str
@@ -45,7 +45,7 @@ class Controller:
     changes: tuple[tuple[str, Any], ...] = ()
 
     def parameters(self) -> dict[str, Any]:
-        """Flat parameters of the flight."""
+        """Return the flat parameters of the flight."""
         return {
             **(read_parameters(find_design(self.design)) if self.design else {}),
             **scenario_parameters(load_scenario(self.scenario)),
@@ -54,12 +54,12 @@ class Controller:
 
     @cached_property
     def vehicle(self) -> VehicleParameters:
-        """The nominal vehicle with the coupling of the flight."""
+        """The nominal vehicle, with the coupling of the flight."""
         return load_vehicle().coupled(self.parameters()["vehicle.coupling"])
 
     @cached_property
     def loop(self) -> Feedback:
-        """The feedback of the linear loop."""
+        """The state feedback of the linear loop."""
         values = self.parameters()
         design = ControlDesign.from_parameters(values)
         gain = design.adjusted_gain(design.tau)
@@ -88,7 +88,7 @@ def sweep(
     values: Sequence[float],
     point: Callable[[Controller, float], Point],
 ) -> dict[Controller, Columns]:
-    """Fly every controller at the points of all values and return the columns."""
+    """Fly every controller at the points of all values, and return its columns."""
     results = {}
     for controller in controllers:
         tables = []
@@ -100,7 +100,7 @@ def sweep(
 
 
 def columns_of(tables: Sequence[Table]) -> Columns:
-    """Return the columns of one controller from the table of each point, SI.
+    """Return the columns (SI) of one controller from the tables of its flights, one table per point.
 
     A metric that a lost flight does not define is NaN, for the nominal vehicle and for the worst.
     """
@@ -117,12 +117,12 @@ def columns_of(tables: Sequence[Table]) -> Columns:
 
 
 def widths(count: int) -> np.ndarray:
-    """Return line widths for curves drawn one after another, each thinner, so that none hides another."""
+    """Return line widths for curves drawn in this order. Later ones are thinner, so that no curve hides another."""
     return 0.8 + 0.3 * np.arange(count)[::-1]
 
 
 def draw_metric(axis: Axes, x: np.ndarray, results: Mapping[Controller, Columns], name: str, label: str) -> None:
-    """Draw a metric of every controller in the paper's unit: nominal vehicle solid, worst dashed."""
+    """Draw a metric of every controller in the paper's unit, solid for the nominal vehicle and dashed for the worst."""
     factor = to_paper(1.0, METRICS[name].unit)[0]
     for (controller, columns), width in zip(results.items(), widths(len(results)), strict=True):
         for suffix, style in (("nominal", "-"), ("worst", "--")):
@@ -134,9 +134,9 @@ def draw_losses(figure: Figure, x: np.ndarray, results: Mapping[Controller, Colu
     """Draw and return three panels over ``x``: flights not lost or saturated, attitude excursion, altitude error.
 
     Args:
-        x: Values along the sweeps.
+        x: Values along the sweep.
         results: Columns by controller.
-        label: Label of ``x``.
+        label: Label of the horizontal axis.
     """
     axes = np.asarray(figure.subplots(3, 1, sharex=True))
     for (controller, columns), width in zip(results.items(), widths(len(results)), strict=True):
@@ -154,7 +154,7 @@ def draw_losses(figure: Figure, x: np.ndarray, results: Mapping[Controller, Colu
 
 
 def legend(figure: Figure, *, shares: bool) -> None:
-    """Add a legend of controllers and line styles above the panels; ``shares``: panel (a) shows shares."""
+    """Add a legend of controllers and line styles; ``shares`` adds the styles of panel (a), shares of flights."""
     controllers, _ = figure.axes[0].get_legend_handles_labels()
     nominal = "nominal vehicle; (a): flown to the end" if shares else "nominal vehicle"
     styles: Any = {"-": nominal, "--": "worst corner"} | ({":": "(a): not a second at the limits"} if shares else {})
@@ -163,12 +163,12 @@ def legend(figure: Figure, *, shares: bool) -> None:
 
 
 def lost_where(x: np.ndarray, columns: Columns, digits: int = 2, *, rising: bool = True) -> dict[str, str]:
-    """Return cells with the points between which flights begin to saturate and to be lost.
+    """Return table cells with the values between which flights begin to saturate and to be lost.
 
     Args:
         x: Values along the sweep, increasing.
-        digits: Decimals of a value.
-        rising: Begin at the smallest value, otherwise at the largest.
+        digits: Decimals of a printed value.
+        rising: Whether to search from the smallest value up; otherwise from the largest down.
     """
     order = slice(None) if rising else slice(None, None, -1)
     along, cells = [f"{value:.{digits}f}" for value in x[order]], {}

@@ -1,4 +1,4 @@
-"""The weights of F and K and the input bounds of K, which the paper leaves open."""
+"""Sensitivity to the weights of F and K and to the input bounds of K, which the paper leaves open."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from hsv_paper.sensitivity.sweep import RMPC_DECOUPLED, WITH_NOTCH, Columns, Con
 from hsv_paper.study import Outcome, Scope, in_words, rounded
 
 FACTORS = (0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0)
-"""Factors by which a group is multiplied; 1: the baseline's own value."""
+"""Factors on a group of weights or bounds; 1 is the baseline itself."""
 
 FLOWN = FACTORS[::2]
-"""Factors with which flights are flown."""
+"""Factors for which flights are simulated."""
 
 ATTITUDE = "post_fault_attitude_from_nominal_worst"
 
 
 @dataclass(frozen=True)
 class Group:
-    """Fields of a table of design inputs that are varied together, and their colour in the plots."""
+    """Design inputs that are varied together: fields ``names`` of the table ``table``, with a label and a colour."""
 
     label: str
     color: str
@@ -42,7 +42,7 @@ class Group:
     names: tuple[str, ...]
 
     def times(self, part: Any, factor: float) -> Any:
-        """Return the inputs of F or of K, ``part``, with this group times ``factor``."""
+        """Return ``part``, the design inputs of F or of K, with the fields of this group multiplied by ``factor``."""
         table = getattr(part, self.table)
         changed = table.model_copy(update={name: factor * getattr(table, name) for name in self.names})
         return part.model_copy(update={self.table: changed})
@@ -57,13 +57,13 @@ WEIGHTS = (
     Group("scale of the fuel equivalence ratio", ORANGE, "input_scale", ("fuel_equivalence_ratio",)),
     ELEVATOR,
 )
-"""The weights are one over the squares of these scales: psi and sigma of K (eq. 31), and those of F."""
+"""Groups of scales. A weight is one over the square of a scale: psi and sigma of K (eq. 31), and those of F."""
 
 BOUNDS = Group("bounds of the nominal inputs", PURPLE, "input_bound", ("fuel_equivalence_ratio", "elevator_deflection"))
-"""The bounds of K (eq. 35)."""
+"""The bounds of the nominal inputs, which K keeps (eq. 35)."""
 
 GROUPS = {"F": WEIGHTS, "K": (*WEIGHTS, BOUNDS)}
-"""Varied groups by law."""
+"""The groups to vary, for F and for K."""
 
 Results = dict[Group, Columns]
 
@@ -75,7 +75,7 @@ def _inputs() -> DesignInputs:
 
 @cache
 def varied(law: str, group: Group, factor: float) -> ControlDesign:
-    """Return the baseline with F or the family of K recomputed, with ``group`` of its weights or bounds multiplied.
+    """Return the baseline with F, or the family of K, recomputed with ``factor`` times a group of its inputs.
 
     Raises:
         DesignError: There is no solution.
@@ -98,7 +98,7 @@ def varied(law: str, group: Group, factor: float) -> ControlDesign:
 
 
 def run(scope: Scope) -> Outcome:
-    """Design F and K with each group of weights times each factor, linearise and fly Case 1 with them."""
+    """Redesign F and K for each group and factor, and compute the linear loops and the flights of Case 1."""
 
     def flown(law: str, flown: Controller) -> Results:
         fixed = load_scenario(flown.scenario).parameters()
@@ -127,7 +127,7 @@ def run(scope: Scope) -> Outcome:
     figure.legend(loc="outside upper center", ncols=2, frameon=False)
 
     def rows(law: str, columns: Callable[[Group, int], dict[str, Any]]) -> list[dict[str, Any]]:
-        """Return the rows of the baseline's own weights, and of the smallest and the largest factor of each group."""
+        """Return table rows for the baseline itself, and for the smallest and largest factor on each group."""
         chosen = [(ELEVATOR, FLOWN.index(1.0)), *((group, i) for group in GROUPS[law] for i in (0, len(FLOWN) - 1))]
         return [
             {law: "own weights" if FLOWN[i] == 1.0 else f"{group.label} times {FLOWN[i]:g}"} | columns(group, i)
