@@ -1,1 +1,1 @@
-"""Errors, units, files with limits, progress and interruption."""
+"""Errors, units, parameters, files with limits, progress and interruption."""

@@ -1,4 +1,4 @@
-"""Exceptions of the library: one base class, and one subclass per cause that also inherits the standard one."""
+"""Exceptions of the library: one base class, and one subclass per cause that also inherits a built-in one."""
 
 import difflib
 import os
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 
 class HsvError(Exception):
-    """Base of all errors of this library; the message names the field, its value and the expectation."""
+    """Base class of all errors of this library; the message names the field, its value and what was expected."""
 
 
 class QuantityError(HsvError, ValueError):
@@ -22,7 +22,7 @@ class VehicleError(HsvError, ValueError):
 
 
 class DocumentError(HsvError, ValueError):
-    """A file that cannot be read, or a text that is not as expected; the message does not name it."""
+    """A file that cannot be read or parsed; the message lacks the name of the file, which the caller adds."""
 
 
 class ScenarioError(HsvError, ValueError):
@@ -30,15 +30,15 @@ class ScenarioError(HsvError, ValueError):
 
 
 class DesignError(HsvError, ValueError):
-    """A design file, or a parameter of a controller, that is missing, malformed or does not stabilise."""
+    """A design file or controller parameter that is missing or malformed, or a design that does not stabilise."""
 
 
 class GovernorError(HsvError, ValueError):
-    """A command for which no reference fits into the inputs of the nominal plan."""
+    """A wrong command to the governor, or one that no reference can follow within the input limits of the plan."""
 
 
 class RecordingError(HsvError, ValueError):
-    """A bag that is missing, foreign or damaged."""
+    """A bag that is missing, damaged, not recorded by this project, or cannot be written."""
 
 
 class RunError(HsvError, RuntimeError):
@@ -50,7 +50,7 @@ class ControllerError(RunError):
 
 
 class SignalError(RunError):
-    """A signal with wrong contents; the message begins with the field, and ``signal`` names it."""
+    """A signal with a wrong value; the message begins with the name of the signal, which is also in ``signal``."""
 
     def __init__(self, signal: str, wrong: str) -> None:
         super().__init__(signal, wrong)
@@ -61,11 +61,11 @@ class SignalError(RunError):
 
 
 class ProcessError(RunError):
-    """A process with foreign code that crashed or hangs."""
+    """A process that runs external code has crashed or does not answer."""
 
 
 class CampaignError(HsvError, ValueError):
-    """A Monte Carlo campaign with a wrong setting, or its results missing, foreign or of another campaign."""
+    """A campaign with a wrong setting, or results that are missing, unusable or those of another campaign."""
 
 
 class ParameterError(HsvError, ValueError):
@@ -73,7 +73,7 @@ class ParameterError(HsvError, ValueError):
 
 
 def one_of(known: Iterable[str], name: str, also: str = "") -> str:
-    """Return the end of a message about an unknown ``name``: ``one of`` all known ones, a remark, and the nearest."""
+    """Return the end of a message about an unknown ``name``: ``one of`` the known ones, ``also``, and the nearest one."""
     return f"one of {', '.join(known := [*known])}{also}{did_you_mean(name, known)}"
 
 
@@ -86,5 +86,5 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def reason(error: OSError) -> str:
-    """Return the reason of a system error on one line, without what libraries add."""
+    """Return the reason for a system error on one line, without the error number and the name of the file."""
     return os.strerror(error.errno) if error.errno else " ".join(str(error).split())

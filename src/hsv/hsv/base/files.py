@@ -1,7 +1,7 @@
 """Read TOML, YAML and JSON files with limits on size and nesting, and TOML files that extend another one.
 
-Reading any file ends, with values or with one line of error: a pipe, a device, a text that is too large or nested too
-deep is refused before anything else is done with it.
+Reading always ends, with values or with an error message of one line: a pipe, a device, and a text that is too large or
+nested too deeply are refused.
 """
 
 from __future__ import annotations
@@ -44,23 +44,23 @@ MAX_BYTES = 2**22
 """Maximum size of a text, bytes; designs and certificates are at least thirty times smaller."""
 
 MAX_LEVELS = 64
-"""Depth of tables and lists."""
+"""Maximum nesting depth of tables and lists."""
 
 MAX_NODES = 10**6
-"""Values of a YAML text; an alias counts as all values that it stands for."""
+"""Maximum number of values in a YAML text; an alias counts as all the values that it stands for."""
 
 _MAX_DIGITS = 4000
 _LARGEST = 10**_MAX_DIGITS
 
 _LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MAX_LEVELS}}}""")
-"""A dotted key that nests too deep: the parser needs a time quadratic in its length."""
+"""A dotted TOML key with too many parts; it is refused first because parsing time is quadratic in its length."""
 
 
 def open_regular(path: Path) -> BufferedReader:
-    """Return the file ``path``, open for reading.
+    """Open the regular file ``path`` for reading and return it.
 
     Raises:
-        DocumentError: The system refuses, or the file is not a regular one: reading a pipe need not end.
+        DocumentError: The file cannot be opened, or it is not a regular file; reading a pipe might never end.
     """
     try:
         # Without O_NONBLOCK, opening a pipe would wait for a writer.
@@ -89,7 +89,7 @@ def read_bytes(path: Path, max_bytes: int | None = None) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Return the text in the file ``path``, without a byte order mark and with the line ends of Unix."""
+    """Return the text in the file ``path``, without a byte order mark and with Unix line ends."""
     try:
         return read_bytes(path, MAX_BYTES).decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
@@ -120,7 +120,7 @@ def parse_json(text: str | bytes) -> Any:
 
 
 def parse_yaml(text: str) -> Any:
-    """Return the value in a YAML text, of plain types.
+    """Return the value in a YAML text, built from Python's basic types only.
 
     Raises:
         DocumentError: The text is not YAML, too long or nested too deep, a key occurs twice in a mapping, or aliases
@@ -136,7 +136,7 @@ def parse_yaml(text: str) -> Any:
 
 
 class _Loader(Composer, _Parser, SafeConstructor, Resolver):
-    """The safe loader on the parser of the C library, whose own composer overflows the stack on deep nesting."""
+    """PyYAML's safe loader with the fast parser in C and the composer in Python, which does not overflow the stack."""
 
     def __init__(self, stream: str) -> None:
         _Parser.__init__(self, stream)
@@ -147,7 +147,7 @@ class _Loader(Composer, _Parser, SafeConstructor, Resolver):
         self._sizes: dict[Any, int] = {}
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        """Return the next node; count levels, and nodes including those of aliases."""
+        """Return the next node; check the nesting depth and the number of nodes, including those behind aliases."""
         event, before = self.peek_event(), self._nodes
         self._levels += 1
         if self._levels > MAX_LEVELS:
@@ -166,7 +166,7 @@ class _Loader(Composer, _Parser, SafeConstructor, Resolver):
         return node
 
     def compose_mapping_node(self, anchor: Any) -> Any:
-        """Return the next mapping; its keys must differ."""
+        """Return the next mapping; refuse a key that occurs twice."""
         node = super().compose_mapping_node(anchor)
         seen: set[tuple[str, str]] = set()
         for key, _ in node.value:
@@ -177,7 +177,7 @@ class _Loader(Composer, _Parser, SafeConstructor, Resolver):
         return node
 
 
-# A number for ROS and YAML 1.2, but a text for YAML 1.1, which wants a point and a sign: 5665e-11.
+# 5665e-11 is a number in ROS and YAML 1.2, but a text in YAML 1.1, which requires a decimal point and a sign.
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float", re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)[eE][-+]?\d+$"), list("-+.0123456789")
 )
@@ -212,7 +212,7 @@ def _check_length(text: str | bytes) -> None:
 
 
 def _check(value: object) -> None:
-    """Refuse values that are nested too deep, and numbers that Python refuses to print."""
+    """Raise a DocumentError if values are nested too deeply or an integer is too long for Python to print."""
     level = [value]
     for _ in range(MAX_LEVELS + 1):
         if any(isinstance(one, int) and abs(one) >= _LARGEST for one in level):
@@ -233,7 +233,7 @@ def _too_deep() -> DocumentError:
 
 
 EXTENDS = "extends"
-"""The key that names the extended file, by name or by path relative to the folder of the extending file."""
+"""Key whose value is the extended file: its name, or its path relative to the folder of the extending file."""
 
 Tables = dict[str, Any]
 
@@ -251,13 +251,13 @@ def follow_extends(
 
     Args:
         name: Name or path of the file.
-        read: Returns the contents of a file by name or path.
-        refuse: Returns the error for a file, by name or path, and what is wrong with it.
+        read: Function that returns the contents of a file, given its name or path.
+        refuse: Function that returns an error, given the name or path of a file and what is wrong with it.
         replaced: Top-level tables that are replaced, not merged.
         values: Keys that mark a table as one value, which is replaced, not merged.
 
     Raises:
-        HsvError: Error of ``refuse``: ``extends`` is not the name of a file, or the files extend each other.
+        HsvError: The error from ``refuse``, if ``extends`` is not the name of a file or files extend each other.
     """
     chain, layers = [name], [dict(read(name))]
     while EXTENDS in layers[-1]:
@@ -278,7 +278,7 @@ def follow_extends(
 
 
 def is_path(name: str) -> bool:
-    """Tell whether a scenario or design is named by its path."""
+    """Return whether ``name`` is the path of a TOML file rather than a registered name."""
     return "/" in name or name.endswith(".toml")
 
 
@@ -291,9 +291,9 @@ def _merged(base: Tables, own: Tables, values: set[str]) -> Tables:
 
 
 def json_text(values: Mapping[str, Any], indent: int | None = None) -> str:
-    """Return ``values`` as JSON, on one line without ``indent``.
+    """Return ``values`` as JSON, on one line if ``indent`` is None.
 
-    JSON lacks numbers that are not finite: they are null.
+    Numbers that are not finite become null, because JSON has no such numbers.
     """
     return json.dumps(_finite(values), indent=indent, allow_nan=False)
 

@@ -1,4 +1,4 @@
-"""Parameters of the components: one table for each, from which nodes declare them and files are checked."""
+"""Parameters of the components: each has one table, by which nodes declare their parameters and files are checked."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ class Parameter:
     name: str
     """Dotted name, as in ROS 2."""
     default: Value
-    """Default value; an empty list is an array of doubles that a design or a flight must provide."""
+    """Default value; an empty list stands for an array of doubles that has no default."""
     description: str
     """Short description."""
     unit: str = ""
     """SI unit; empty for a dimensionless parameter."""
     minimum: float = -math.inf
-    """Smallest admissible value of the number or of each element."""
+    """Smallest admissible value of a number, or of each element of an array."""
     maximum: float = math.inf
-    """Largest admissible number (of every element)."""
+    """Largest admissible value of a number, or of each element of an array."""
     choices: tuple[str, ...] = ()
-    """Admissible words; empty: any."""
+    """Admissible texts; if empty, any text."""
     read_only: bool = True
-    """Whether it is fixed once the node has started."""
+    """Whether the value is fixed once the node has started."""
     whole: bool = False
-    """Whether the doubles must be integer-valued, as numbers of steps are."""
+    """Whether a double must be integer-valued, such as a number of steps."""
     needs: str = ""
-    """Name of the parameter without which a file may not set this one: it would have no effect."""
+    """Name of another parameter that a file must set too, because this one has no effect without it."""
 
     @property
     def kind(self) -> str:
@@ -57,11 +57,11 @@ class Parameter:
         return f"{self.kind.replace('_', ' ')}{words}{' ' + self.unit if self.unit else ''}{whole}"
 
     def check(self, value: object) -> Any:
-        """Return ``value`` if it is admissible.
+        """Return ``value``, an array as a list, if it is admissible.
 
         Raises:
-            ParameterError: Wrong type (an integer is not a double), not finite, not whole, outside the range or the
-                choices.
+            ParameterError: The type is wrong (an integer is not a double), or the value is not finite, not
+                integer-valued where that is required, outside the range or not one of the choices.
         """
         if self.kind.endswith("_array"):
             if not isinstance(value, list | tuple) and not hasattr(value, "tolist"):
@@ -85,7 +85,7 @@ class Parameter:
         return value
 
     def refusal(self, value: object) -> ParameterError:
-        """Return the error for an invalid ``value``, with a hint how to write an integer as a double."""
+        """Return the error for an invalid ``value``; for an integer it says how to write a double."""
         hint = ""
         if self.kind == "double" and _is_whole(value):
             hint = f" (write {float(cast(int, value))})"
@@ -122,19 +122,19 @@ def _shown(value: object) -> str:
 
 
 def validate(table: Iterable[Parameter], values: Mapping[str, object]) -> dict[str, Any]:
-    """Return the values of all parameters of a table, with defaults filled in; other names are ignored.
+    """Return the value of every parameter in ``table`` by name, or its default; other names in ``values`` are ignored.
 
     Raises:
-        ParameterError: A value that its parameter does not admit.
+        ParameterError: A value is not admissible.
     """
     return {p.name: p.check(values.get(p.name, p.default)) for p in table}
 
 
 def one_or(name: str, given: list[float], standard: float) -> float:
-    """Return the one value of the parameter ``name``, or the ``standard`` if none is given.
+    """Return the only value in ``given``, the array of the parameter ``name``, or ``standard`` if it is empty.
 
     Raises:
-        ParameterError: There are several.
+        ParameterError: ``given`` has several values.
     """
     if len(given) > 1:
         raise ParameterError(f"parameter {name}: {len(given)} values, expected one, or none for the set's")
@@ -142,7 +142,7 @@ def one_or(name: str, given: list[float], standard: float) -> float:
 
 
 def check_lengths(values: Mapping[str, Any], first: str, *others: str) -> None:
-    """Refuse the arrays of ``others`` that have another number of values than that of ``first``."""
+    """Raise a ParameterError unless the arrays named ``others`` have as many values as the array named ``first``."""
     for name in others:
         if len(values[name]) != len(values[first]):
             raise ParameterError(
@@ -151,14 +151,14 @@ def check_lengths(values: Mapping[str, Any], first: str, *others: str) -> None:
 
 
 def read_number(parameter: Parameter, text: object, field: str) -> float:
-    """Return the number (SI) written in ``text`` in a file, for a ``parameter`` or one of its elements.
+    """Return the number (SI) that a file gives as ``text`` for a ``parameter`` or for one of its elements.
 
     Raises:
-        ParameterError, QuantityError: Not a quantity in its unit, not integer-valued, or out of its range, which the
-            message states in the unit given.
+        ParameterError, QuantityError: The text is not a quantity of the right dimension, or the number is out of range
+            or not integer-valued where that is required. The message states the range in the unit of the text.
     """
     whole = " a whole number" if parameter.whole else ""
-    # A bool is an int to Python.
+    # In Python a bool is an int.
     value = math.nan if whole and isinstance(text, bool) else parse_quantity(text, parameter.unit or "1", field)
     if not parameter.admits(value):
         raise ParameterError(f"{field} = {_shown(text)}: expected{whole}{limits_in_words(parameter, text)}")
@@ -166,7 +166,7 @@ def read_number(parameter: Parameter, text: object, field: str) -> float:
 
 
 def limits_in_words(parameter: Parameter, text: object) -> str:
-    """Return the range of a parameter with a space before it, in the unit in which the quantity ``text`` is written."""
+    """Return the range of a ``parameter`` in words, after a space, in the unit of the quantity ``text``."""
     ends, unit = in_unit_of((parameter.minimum, parameter.maximum), parameter.unit or "1", text)
     return _range(*ends) + unit
 
@@ -174,18 +174,18 @@ def limits_in_words(parameter: Parameter, text: object) -> str:
 def table_values(
     parameters: Iterable[Parameter], tables: Mapping[str, Any], read: Callable[..., float] = read_number
 ) -> dict[str, Any]:
-    """Return the flat values (SI) of the ``parameters`` that the ``tables`` of a file set.
+    """Return the values (SI) that the ``tables`` of a file set, by the dotted names of their ``parameters``.
 
-    A single value is accepted for an array of one.
+    For an array of one element, the element alone is accepted as well.
 
     Args:
         parameters: Known parameters.
         tables: Nested tables; their keys, joined by dots, are names of parameters.
-        read: Reads a number, with the arguments of :func:`read_number`.
+        read: Function that reads a number; it has the arguments of :func:`read_number`.
 
     Raises:
-        ParameterError, QuantityError: A table, key or value that is not admitted, named; or a parameter without the
-            one that it needs.
+        ParameterError, QuantityError: A table, key or value is not admissible, and the message names it; or a parameter
+            is set without the one that it needs.
     """
     known = {parameter.name: parameter for parameter in parameters}
     values = _flat_values(known, tables, read)
@@ -198,7 +198,7 @@ def table_values(
 def _flat_values(
     known: Mapping[str, Parameter], tables: Mapping[str, Any], read: Callable[..., float]
 ) -> dict[str, Any]:
-    """Return the values of nested ``tables`` by the names of the ``known`` parameters, see :func:`table_values`."""
+    """Return the values in nested ``tables`` by the names of the ``known`` parameters, see :func:`table_values`."""
     values: dict[str, Any] = {}
     for name, entry in tables.items():
         parameter = known.get(name)
@@ -227,7 +227,7 @@ def _flat_values(
 
 
 def _entries_of(name: str, entry: object, known: Iterable[str]) -> Mapping[str, Any]:
-    """Return the entries of the table ``name``; refuse an unknown key, and an entry that is no table."""
+    """Return the ``entry`` of the key ``name`` if it must be a table and is one; else raise a ParameterError."""
     depth = name.count(".") + 1
     within, _, own = name.rpartition(".")
     inside = [other.split(".")[depth] for other in known if other.startswith(f"{name}.")]

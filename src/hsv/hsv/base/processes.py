@@ -1,4 +1,4 @@
-"""Interruption by Ctrl-C, threads and progress of long computations."""
+"""Interruption by Ctrl-C, the end of processes, and threads and progress of long computations."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ _LATER = 0.02
 _PR_SET_PDEATHSIG = 1
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals that ask a process to end; SIGHUP comes from a terminal that is closed."""
+"""Signals that ask a process to end; SIGHUP is sent when the terminal is closed."""
 
 _WHOLE: set[CodeType] = set()
-"""Code of functions that are not interrupted."""
+"""Code objects of the functions that are not interrupted."""
 
 
 def uninterrupted(function: Callable[P, R]) -> Callable[P, R]:
     """Decorate a short ``function`` so that Ctrl-C takes effect only after it has returned.
 
-    So a started process is always recorded before Ctrl-C takes effect. Effective after :func:`take_interrupts`. Longer
-    work, and processes that must never receive Ctrl-C, use :func:`ctrl_c_held_back`.
+    A function that starts a process, for example, can then always record it. This works after :func:`take_interrupts`.
+    Use :func:`ctrl_c_held_back` for longer work, and for processes that must never receive Ctrl-C.
     """
     _WHOLE.add(function.__code__)
     return function
@@ -44,11 +44,12 @@ def uninterrupted(function: Callable[P, R]) -> Callable[P, R]:
 def interrupt(number: int, frame: FrameType | None) -> None:
     """Handle a signal: raise ``KeyboardInterrupt`` at once, or after the current import or uninterrupted function.
 
-    An interrupted import of a compiled module fails with another error, and callbacks of the import system swallow the
-    exception. The timer survives an ``exec`` of another program.
+    Imports are not interrupted, because that of a compiled module would fail with another error, and callbacks of the
+    import system swallow the exception. Instead, a timer calls this function again after ``_LATER``;
+    it would outlive an ``exec`` of another program.
 
     Raises:
-        KeyboardInterrupt: Always, now or later.
+        KeyboardInterrupt: The exception need not be postponed.
     """
     while frame is not None:
         if frame.f_code in _WHOLE or frame.f_code.co_filename.startswith("<frozen importlib"):
@@ -59,9 +60,9 @@ def interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def take_signals(handler: Callable[[int, FrameType | None], object]) -> None:
-    """Have ``handler`` called at the :data:`ENDING` signals, also for those that came while they were blocked.
+    """Install ``handler`` for the :data:`ENDING` signals and unblock them, so that it receives pending ones as well.
 
-    The starter of this process may have blocked them for that time. SIGHUP stays ignored, as ``nohup`` has it.
+    The parent process may have blocked them while it started this one. SIGHUP stays ignored under ``nohup``.
     """
     for number in ENDING:
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
@@ -70,7 +71,7 @@ def take_signals(handler: Callable[[int, FrameType | None], object]) -> None:
 
 
 def take_interrupts() -> None:
-    """Let the :data:`ENDING` signals interrupt this process; it may have been started with them blocked."""
+    """Let the :data:`ENDING` signals raise ``KeyboardInterrupt``, even if the process was started with them blocked."""
     signal.signal(signal.SIGALRM, interrupt)
     take_signals(interrupt)
     sys.unraisablehook = _interrupt_again
@@ -78,7 +79,7 @@ def take_interrupts() -> None:
 
 
 def ignore_ctrl_c_at_end() -> None:
-    """Keep the exit code of a process that is interrupted while Python shuts down.
+    """Ignore Ctrl-C while Python shuts down, so that it does not change the exit code of the process.
 
     At shutdown Python restores the default effect of signals and then needs some tens of milliseconds to unload
     compiled libraries; a pending timer may expire in that time.
@@ -88,7 +89,7 @@ def ignore_ctrl_c_at_end() -> None:
 
 
 def end_with_parent(parent: int) -> None:
-    """Let Linux terminate this process when the thread of ``parent`` that started it ends."""
+    """Have Linux terminate this process when the thread that started it, of the process ``parent``, ends."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
         if os.getppid() != parent:  # it has ended already
@@ -98,7 +99,7 @@ def end_with_parent(parent: int) -> None:
 def choose_log_folder() -> None:
     """Have the nodes of this process and its children log to a temporary folder if the usual one cannot be written.
 
-    Otherwise they would not start.
+    Without a writable folder, the nodes would not start.
     """
     places = (("ROS_LOG_DIR",), ("ROS_HOME", "log"), ("HOME", ".ros", "log"))
     folder = next((Path(value, *rest) for name, *rest in places if (value := os.environ.get(name))), None)
@@ -138,9 +139,10 @@ def over_threads(
 
 @contextmanager
 def ctrl_c_held_back() -> Iterator[None]:
-    """Delay Ctrl-C to the end of the block; threads and processes started in it never receive it.
+    """Delay Ctrl-C until the end of the ``with`` block; threads and processes started in the block never receive it.
 
-    A pool that is interrupted while it starts does not close. The command ends such processes itself.
+    A pool of workers needs this because it cannot be closed if it is interrupted while it starts. The command ends
+    the processes of the pool itself.
     """
     resource_tracker.ensure_running()  # its start would unblock SIGINT
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -151,4 +153,4 @@ def ctrl_c_held_back() -> Iterator[None]:
 
 
 Progress = Callable[[str, int, int], None]
-"""Function of the stage, the number of finished items, and their total number."""
+"""Callback with the name of the stage, the number of finished items, and their total number."""

@@ -1,7 +1,7 @@
-"""The edge between quantities with units, as people write them, and the SI numbers used everywhere inside.
+"""Conversion between quantities with units, as people write them, and the SI numbers used inside the library.
 
-A conversion is one rounding: numbers are read and factors multiplied as fractions, so that constants are the same
-numbers on every machine and under every version of the units library.
+Each conversion rounds once: numbers are read and factors are multiplied as fractions. Constants therefore have the same
+bits on every machine and with every version of pint, the units library.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ PAPER_UNITS = {
     "Pa": "lbf/ft^2",
     "m s": "ft s",
 }
-"""The unit in which the paper (or the literature it cites) prints a quantity of an SI unit of ours."""
+"""For each SI unit, the unit in which the paper (or the literature that it cites) prints such a quantity."""
 
 METRIC_UNITS = {"rad": "deg"}
-"""The unit in which people read a quantity of an SI unit of ours, where that is another one."""
+"""For each SI unit that people rarely read, the metric unit that is shown instead."""
 
 
 class UnitSystem(StrEnum):
-    """Units in which something is printed or drawn for people."""
+    """Systems of units in which values are printed and plotted."""
 
     metric = "metric"
     """SI, but angles in degrees and shares in percent"""
@@ -60,41 +60,41 @@ _QUANTITY = re.compile(
     rf"\s*(?P<unit>(1?\s*/\s*)?{_TERM}(\s*[*/ ]\s*{_TERM})*)?",
     re.IGNORECASE,
 )
-"""A decimal number and, if anything follows, a product or quotient of units with one-digit exponents."""
+"""A decimal number and, optionally, a product or quotient of units with exponents below 10."""
 
 _ROOT_BITS = 80
-"""Binary digits of a square root before it is rounded to the 53 of a number."""
+"""Bits to which a square root is computed before it is rounded to the 53 bits of a double."""
 
 
 @cache
 def registry() -> pint.UnitRegistry:
-    """Return the registry of units, with fractions as factors; created only for unknown units, because it is slow."""
+    """Return the registry of pint, with fractions as factors; it is slow to create, and only rare units need it."""
     import pint
 
     return pint.UnitRegistry(autoconvert_offset_to_baseunit=False, non_int_type=Fraction)
 
 
 def is_finite(value: float) -> bool:
-    """Return whether ``value`` is a finite number in the range of a double; an integer may exceed it."""
+    """Return whether ``value`` is finite and within the range of a double, which an integer may exceed."""
     return abs(value) <= sys.float_info.max
 
 
 def rounded(value: float) -> float:
-    """Return ``value`` to 15 digits: as written, without the last-digit error of a sum or a product."""
+    """Return ``value`` rounded to 15 significant digits, which removes the rounding error of a sum or product."""
     return float(f"{value:.15g}")
 
 
 @cache
 def factor(unit: str, to: str) -> float:
-    """Return the number that turns a value in ``unit`` into one in ``to``; both multiplicative."""
+    """Return the factor that converts a value in ``unit`` into one in ``to``, a unit of the same dimension."""
     return _scaled(Fraction(1), _squared(unit)[0] / _squared(to)[0])
 
 
 def unit_system(name: str) -> UnitSystem:
-    """Return the units called ``name``.
+    """Return the unit system called ``name``.
 
     Raises:
-        QuantityError: There are none.
+        QuantityError: There is no such system.
     """
     if name not in [*UnitSystem]:
         raise QuantityError(f"units = {name!r}: expected {one_of(UnitSystem, name)}")
@@ -102,7 +102,7 @@ def unit_system(name: str) -> UnitSystem:
 
 
 def unit_in(system: UnitSystem, unit: str) -> str:
-    """Return the unit of an SI unit in ``system``, of a quotient without one that of the dividend converted."""
+    """Return the unit of ``system`` for the SI ``unit``; in most quotients, only the dividend changes."""
     if system is UnitSystem.si:
         return unit
     own = PAPER_UNITS if system is UnitSystem.paper else METRIC_UNITS
@@ -116,8 +116,8 @@ def in_system(value: float, unit: str, system: UnitSystem, *, share: bool = Fals
     Args:
         value: The number.
         unit: Its SI unit.
-        system: Units of what is printed.
-        share: Whether it is a share of something, which the metric system has in percent.
+        system: Unit system of the result.
+        share: Whether the value is a share (0 to 1), which the metric system shows in percent.
     """
     if share and system is UnitSystem.metric:
         return 100.0 * value, "%"
@@ -131,18 +131,18 @@ def to_paper(value: float, unit: str) -> tuple[float, str]:
 
 
 def readable(value: float, unit: str, system: UnitSystem = UnitSystem.metric) -> str:
-    """Return ``value``, given in the SI ``unit``, in that of ``system``, with its name; angles in degrees."""
+    """Return ``value``, given in the SI ``unit``, as text with up to 10 digits and its unit in ``system``."""
     number, shown = in_system(value, unit, system)
     return f"{number:.10g}" + ("" if shown == "1" else f" {shown}")
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """Return ``value`` with ``digits`` significant digits; integer parts up to 999999 are complete."""
+    """Return ``value`` as text with ``digits`` significant digits, but with its whole integer part up to 999999."""
     return f"{value:.0f}" if float(f"1e{digits - 1}") <= abs(value) < 999999.5 else f"{value:.{digits}g}"
 
 
 def in_words(value: float, unit: str, system: UnitSystem) -> str:
-    """Return ``value``, given in the SI ``unit``, with three significant digits and its unit, as people read it."""
+    """Return ``value``, given in the SI ``unit``, as text with three significant digits and its unit in ``system``."""
     number, name = in_system(value, unit, system)
     return significant(number) + ("" if name in ("", "1") else f" {name}")
 
@@ -156,7 +156,7 @@ def duration_in_words(seconds: float) -> str:
 
 
 def si_unit_of(text: object) -> str:
-    """Return the SI unit of a quantity as written, ``"1"`` if it has no unit or is no quantity."""
+    """Return the SI base units of the quantity ``text``; ``"1"`` without a unit or a quantity."""
     try:
         base = _squared(_number_and_unit(text)[1] if isinstance(text, str) else "")[1]
     except ValueError:
@@ -169,28 +169,28 @@ def si_unit_of(text: object) -> str:
 
 
 def base_units(unit: str) -> dict[str, float]:
-    """Return the exponents of the base units of an SI unit: kg, m and s of ``"N"``."""
+    """Return the exponents of the SI base units in ``unit``: of ``"N"``, 1 for kg, 1 for m and -2 for s."""
     return {name: power / 2 for name, power in _squared(unit)[1]}
 
 
 def written(value: float, unit: str) -> float | str:
-    """Return a number for a file: a text with its ``unit``, or the number if it has none; no digit is lost."""
+    """Return ``value`` for a file: a text with its ``unit``, or the number if ``unit`` is ``"1"``; no bit is lost."""
     return value if unit == "1" else f"{value!r} {unit}"
 
 
 def percent(share: float) -> str:
-    """Return a share in percent for a file, without loss of digits."""
+    """Return a ``share`` (0 to 1) as text in percent for a file, without loss of digits."""
     return f"{Decimal(repr(share)).scaleb(2).normalize():f} %"
 
 
 def has_unit(text: object) -> bool:
-    """Tell whether a quantity is written with a unit."""
+    """Return whether ``text`` is a quantity that is written with a unit."""
     found = _QUANTITY.fullmatch(text.strip()) if isinstance(text, str) else None
     return bool(found and found["unit"])
 
 
 def in_unit_of(values: Sequence[float], unit: str, text: object) -> tuple[list[float], str]:
-    """Return ``values``, given in the SI ``unit``, in the one of the quantity ``text``, and its name after a space."""
+    """Return ``values``, given in the SI ``unit``, in the unit of the quantity ``text``, and this unit with a space."""
     found = _QUANTITY.fullmatch(text.strip()) if isinstance(text, str) else None
     own = (found["unit"] or "") if found else ""
     if not own:
@@ -208,8 +208,8 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
         field: Name used in the error message.
 
     Raises:
-        QuantityError: The text cannot be read, its unit has another dimension, or the value is not finite. Angles are
-            no bare numbers, nor frequencies angular frequencies: "15 Hz" is refused where rad/s are due.
+        QuantityError: The text cannot be read, its unit has another dimension, or the value is not finite. Radians
+            count as a dimension: an angle needs its unit, and "15 Hz" is refused where rad/s are expected.
     """
     expected = f"expected a finite quantity such as {_EXAMPLES.get(unit, f'1.0 {unit}')!r}"
     if isinstance(text, bool) or not isinstance(text, str | int | float):
@@ -240,7 +240,7 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
 
 @lru_cache(maxsize=4096)
 def _converted(text: str, unit: str) -> float | None:
-    """Return a quantity in ``unit``, or ``None`` if the dimensions differ; cached for campaigns."""
+    """Return the quantity ``text`` in ``unit``, or ``None`` if the dimensions differ; cached for campaigns."""
     number, written = _number_and_unit(text)
     (square, dimension), (other_square, other) = _squared(written), _squared(unit)
     return _scaled(number, square / other_square) if dimension == other else None
@@ -255,13 +255,14 @@ def _number_and_unit(text: str) -> tuple[Fraction, str]:
 
 
 class _UnknownUnitError(ValueError):
-    """There is no such unit."""
+    """A unit that neither this module nor pint knows."""
 
 
 Square = tuple[Fraction, tuple[tuple[str, int], ...]]
-"""Square of the factor from a unit to base units, and the base units of the square by symbol, with their exponents.
+"""The square of a unit: its factor in SI base units, and the symbol and exponent of each base unit.
 
-The literature gives elastic modes in roots of a mass: squares have whole exponents.
+The literature gives elastic modes in roots of a mass, such as kg^0.5 m. The squares of such units have integer
+exponents.
 """
 
 
@@ -287,7 +288,7 @@ _KNOWN: dict[str, tuple[Fraction, dict[str, int]]] = {
     "kN": (Fraction(10**6), _FORCE),
     "Pa": (Fraction(1), _PRESSURE),
     "kPa": (Fraction(10**6), _PRESSURE),
-    # pint rounds these, and their products again, to 16 digits.
+    # The values of pint, which rounds each of these units, and each product of them, to 16 digits.
     "slug": (Fraction("212.98200294060055"), {"kg": 2}),
     "slug ft^2": (Fraction("1.838242309017568"), {"kg": 2, "m": 4}),
     "slug/ft": (Fraction("2292.519200024031"), {"kg": 2, "m": -2}),
@@ -298,7 +299,7 @@ _KNOWN: dict[str, tuple[Fraction, dict[str, int]]] = {
     "lbf/ft^2": (Fraction("2292.519200024031"), _PRESSURE),
     "lbf/slug^0.5": (Fraction("1.3558179483314006"), {"kg": 1, "m": 2, "s": -4}),
 }
-"""Squares of the units that shipped files are written in: to import pint takes longer than a flight."""
+"""Squares of the units in the shipped files, because importing pint takes longer than a flight."""
 
 
 @cache
@@ -311,7 +312,7 @@ def _squared(unit: str) -> Square:
 
 
 def _composed(unit: str) -> tuple[Fraction, dict[str, int]]:
-    """Return the square of a product or quotient of known units; a KeyError names one that is not known."""
+    """Return the square of a product or quotient of the units in ``_KNOWN``; a KeyError names an unknown one."""
     if unit in _KNOWN:
         return _KNOWN[unit]
     if product := re.fullmatch(r"(.*)([*/ ])([^*/ ]+)", unit):
@@ -327,10 +328,10 @@ def _composed(unit: str) -> tuple[Fraction, dict[str, int]]:
 
 
 def square_by_pint(unit: str) -> Square:
-    """Return the unit of the square of ``unit``.
+    """Return the square of ``unit`` from the definitions of pint.
 
     Raises:
-        ValueError: It knows no such unit, or its exponents are neither whole nor halves.
+        ValueError: pint knows no such unit, or an exponent is not a multiple of one half.
     """
     import pint
 
@@ -353,8 +354,8 @@ def _scaled(number: Fraction, square: Fraction) -> float:
     if not number:
         return 0.0
     product = number * number * square
-    # An integer of at least _ROOT_BITS bits. Its last bit is set if the root has further digits, so that rounding once
-    # is exact.
+    # The root is computed as an integer of at least _ROOT_BITS bits. If digits are cut off, its last bit is set, so
+    # that the final rounding goes to the correct side.
     shift = max(0, _ROOT_BITS - (product.numerator.bit_length() - product.denominator.bit_length()) // 2)
     whole, rest = divmod(product.numerator << 2 * shift, product.denominator)
     root = math.isqrt(whole)
