@@ -1,9 +1,9 @@
-"""List the properties of a flight that its certificate does not cover: vehicle, hardware, air, law and faults.
+"""List the properties of a flight that the certificate of its design does not cover.
 
 A certificate holds for a vehicle with its uncertainty, the actuators of the design, ideal sensors and links, still air
 of the model's density, and a loss of elevator effectiveness down to the value in the inputs of the design. A flight
-outside these limits can succeed, and ``hsv certify`` may extend the certificate to it, but this certificate makes no
-statement about it.
+outside these limits can succeed, and ``hsv certify`` may find a certificate that covers it, but the existing one makes
+no statement about it.
 """
 
 from __future__ import annotations
@@ -48,17 +48,17 @@ _CERTIFIED = {
     "density": "the model's density",
     "estimator": "a loop without one",
 }
-"""Hardware of the certificate, by the table of the parameters."""
+"""Hardware for which a certificate holds, in words, by the first part of the parameter's name."""
 
 _SHAPING = (
     *("drift_time", "burst", "checksum"),
     *("shear_altitude", "length", "length_forward", "length_up", "lengths", "stays", "starts"),
 )
-"""Parameters that have no effect without another one of their table."""
+"""Last parts of the names of parameters that have no effect without another one of their table."""
 
 
 def uncovered_hardware(values: Mapping[str, Any], design: ControlDesign) -> list[str]:
-    """Return a message for each parameter of the hardware that the certificate of ``design`` does not cover."""
+    """Return a message for each hardware parameter in ``values`` that the certificate of ``design`` does not cover."""
     v = validate(HARDWARE_PARAMETERS, values)
     sets = {f"actuator.{ACTUATOR_SETS[name].channel}.set": name for name in design.actuators}
     standards = {f"sensors.{channel}.{field.name}": field.standard for channel in STATE_NAMES for field in FIELDS}
@@ -91,7 +91,10 @@ def uncovered_hardware(values: Mapping[str, Any], design: ControlDesign) -> list
 
 
 def uncovered_vehicle(values: Mapping[str, Any], design: ControlDesign) -> list[str]:
-    """Return a message for each property of vehicle and law that the certificate of ``design`` does not cover."""
+    """Return a message for each property of vehicle, notch filter and control law that the certificate does not cover.
+
+    ``values`` are the flat parameters of the flight.
+    """
     found = []
     coupling, digest = values.get("vehicle.coupling", design.coupling), values.get("vehicle.digest", design.vehicle)
     if coupling != design.coupling:
@@ -152,11 +155,11 @@ def uncovered(
     Args:
         values: Flat parameters of the flight.
         design: Design of the flight.
-        certificate: Certificate of the design, if available.
+        certificate: Certificate of the design, or None if it is not available.
         faults: Channel, type and parameters (SI) of each fault.
 
     Raises:
-        ParameterError: A wrong value, named.
+        ParameterError: A parameter is wrong; the message names it.
         DesignError: The certificate does not state which loss of effectiveness it covers.
     """
     controller = str(validate(CONTROLLER_PARAMETERS, values)["controller"])
@@ -184,7 +187,10 @@ def _effectiveness(certificate: Mapping[str, Any]) -> float:
 
 
 def commanded(design: ControlDesign) -> np.ndarray:
-    """Return the largest magnitude (2) of a command: certified plan plus feedback in the tube."""
+    """Return the largest magnitude (2) of a certified command of each input: plan plus feedback in the tube.
+
+    Without bounds of the plan, it is that of the input limits.
+    """
     bounds = design.plan_bounds
     if bounds is None:
         return np.maximum(np.abs(design.input_minimum), np.abs(design.input_maximum))
@@ -194,7 +200,7 @@ def commanded(design: ControlDesign) -> np.ndarray:
 
 
 def _written(value: float, unit: str, name: str = "") -> str:
-    # Angles are read in degrees, but natural frequencies in rad/s.
+    # Angles are shown in degrees, but natural frequencies in rad/s.
     system = UnitSystem.si if name in ("natural_frequency", "lag") else UnitSystem.paper
     number, shown = in_system(value, unit or "1", system)
     return f"{number:.4g}" + ("" if shown == "1" else f" {shown}")

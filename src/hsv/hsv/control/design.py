@@ -1,4 +1,4 @@
-"""A controller design: its parameters, the numbers that fly, its file and its certificate."""
+"""A controller design: its parameters, its numbers in flight, its file and its certificate."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TAU = Parameter("feedback.tau", [1.0], f"adjustable factor of the feedback gain:
 TAU_MINIMUM = Parameter("feedback.tau_minimum", [1.0], f"least certified factor, up to 1: {FACTORS}", "", 0.0, 1.0)
 
 _SAME_SHARE = 1e-9
-"""Difference of two shares that is rounding."""
+"""Difference between two shares that counts as rounding."""
 
 TAU_CHANGE_PARAMETERS = (
     Parameter("tau_change.starts", [], "simulated times at which feedback.tau changes, in order", "s", 0.0),
@@ -36,10 +36,10 @@ TAU_CHANGE_PARAMETERS = (
 
 
 def rigid_factors(values: Sequence[float], name: str) -> np.ndarray:
-    """Return the factor of each rigid state (5) from one ``values`` for all or five.
+    """Return the factors (5) of the rigid states from ``values``, which holds one for all states or one for each.
 
     Raises:
-        ParameterError: Another number of them, or one that is not above zero.
+        ParameterError: The parameter ``name`` has another number of values, or one that is not above zero.
     """
     tau = np.array(values, float)
     if tau.shape not in ((1,), (N_RIGID,)):
@@ -50,17 +50,17 @@ def rigid_factors(values: Sequence[float], name: str) -> np.ndarray:
 
 
 def certified(values: Sequence[float], minimum: np.ndarray, name: str = TAU.name) -> np.ndarray:
-    """Return the factors (5) in ``values`` if they lie on the way from their certified ``minimum`` (5) to 1.
+    """Return the factors tau (5) in ``values``, one or five, if they are certified.
 
-    Between the two closed loops everything is certified, by one Lyapunov function; a factor that is small in one
-    dimension and large in another is not between them.
+    The certified factors lie on the straight line from ``minimum`` (5) to ones: one Lyapunov function covers the closed
+    loops along it. Factors that are small for one state and large for another are not on this line.
 
     Raises:
-        ParameterError: Names the value that does not, and the range.
+        ParameterError: The factors are not certified; the message names a value and the range.
     """
     tau = rigid_factors(values, name)
     outside = np.flatnonzero(~((tau >= minimum) & (tau <= 1.0)))
-    # One value for a range that differs by dimension: the range of any one of them would mislead.
+    # One value for all states whose ranges differ: naming the range of one state would mislead.
     blurred = len(values) == 1 and np.ptp(minimum) > 0.0
     for index in [] if blurred else outside[:1]:
         place = f"[{index}]" if len(values) > 1 else ""
@@ -78,15 +78,20 @@ def certified(values: Sequence[float], minimum: np.ndarray, name: str = TAU.name
 
 
 def compact(tau: np.ndarray) -> np.ndarray:
-    """Return the one value of ``tau`` (5) if all are equal, else all five."""
+    """Return the factors ``tau`` (5) as an array of one value if all are equal, else a copy of all five."""
     return tau[:1].copy() if np.all(tau == tau[0]) else tau.copy()
 
 
 def scheduled_changes(values: Mapping[str, Any], minimum: np.ndarray, period: float) -> list[tuple[int, np.ndarray]]:
-    """Return first step and factors (5) of each change in :data:`TAU_CHANGE_PARAMETERS`.
+    """Return first step and factors tau (5) of each change in the parameters :data:`TAU_CHANGE_PARAMETERS`.
+
+    Args:
+        values: Flat parameters.
+        minimum: Smallest certified factors (5).
+        period: Control period, s.
 
     Raises:
-        ParameterError: Arrays that do not match, times that decrease, or a factor that is not certified.
+        ParameterError: The arrays do not match, times decrease, or a factor is not certified.
     """
     v = validate(TAU_CHANGE_PARAMETERS, values)
     starts, flat = v["tau_change.starts"], v["tau_change.values"]
@@ -104,7 +109,7 @@ def scheduled_changes(values: Mapping[str, Any], minimum: np.ndarray, period: fl
 
 
 def change_parameters(changes: Sequence[tuple[int, np.ndarray]], period: float) -> dict[str, list[float]]:
-    """Return ``changes`` as :data:`TAU_CHANGE_PARAMETERS`."""
+    """Return the parameters :data:`TAU_CHANGE_PARAMETERS` for ``changes``: first step and factors tau (5) of each."""
     return {
         "tau_change.starts": [start * period for start, _ in changes],
         "tau_change.values": [float(value) for _, tau in changes for value in tau],
@@ -113,9 +118,9 @@ def change_parameters(changes: Sequence[tuple[int, np.ndarray]], period: float) 
 
 @dataclass(frozen=True)
 class TubeSet:
-    """c + {v: v' P v <= 1} for errors of the rigid states and the notch filter (n), SI.
+    """The invariant set (e - c)' P (e - c) <= 1 for errors e (n) of the rigid states and the notch filter, SI.
 
-    ``centre`` c (n), ``shape`` P (n, n), ``half_width`` z (n) of the box around it.
+    ``centre`` is c (n), ``shape`` P (n, n), and ``half_width`` (n) that of the box around the set.
     """
 
     centre: np.ndarray
@@ -123,7 +128,7 @@ class TubeSet:
     half_width: np.ndarray
 
     def farthest(self, error: np.ndarray) -> str:
-        """Return the name of the component of e - c that is largest for its half-width."""
+        """Return the name of the component of e - c that is largest relative to its half-width, for an error e (n)."""
         with np.errstate(over="ignore"):
             index = int(np.argmax(np.abs(error - self.centre) / self.half_width))
         return STATE_NAMES[index] if index < N_RIGID else f"filter_{index - N_RIGID + 1}"
@@ -133,9 +138,9 @@ class TubeSet:
 class PlanBounds:
     """Bounds of the total nominal input u_r + u_n and of the nominal pitch acceleration, SI.
 
-    ``input_minimum`` and ``input_maximum`` (2): U minus F Z, beyond which the feedback may find no room.
-    ``region_minimum`` and ``region_maximum`` (3: both inputs, pitch acceleration): what the certified plans reach. The
-    disturbance set is that of flights along those plans; a plan that moves more disturbs more.
+    ``input_minimum`` and ``input_maximum`` (2) are U minus F Z; beyond them the feedback may saturate.
+    ``region_minimum`` and ``region_maximum`` (3: both inputs, pitch acceleration) follow the range of the certified
+    plans. The disturbance set was measured in flights along those plans, and faster plans cause larger disturbances.
     """
 
     input_minimum: np.ndarray
@@ -145,12 +150,12 @@ class PlanBounds:
 
     @property
     def lower(self) -> np.ndarray:
-        """Smallest inputs (2) inside both bounds."""
+        """Smallest inputs (2) within both kinds of bounds."""
         return np.maximum(self.input_minimum, self.region_minimum[:2])
 
     @property
     def upper(self) -> np.ndarray:
-        """Largest inputs (2) inside both bounds."""
+        """Largest inputs (2) within both kinds of bounds."""
         return np.minimum(self.input_maximum, self.region_maximum[:2])
 
     @property
@@ -193,16 +198,17 @@ DESIGN_PARAMETERS = (
     Parameter("input.minimum", [], "least fuel equivalence ratio (-) and elevator deflection (rad)"),
     Parameter("input.maximum", [], "largest fuel equivalence ratio (-) and elevator deflection (rad)"),
 )
-"""Parameters of a design, as declared by the nodes."""
+"""Parameters of a design, as the nodes declare them."""
 
 NO_DESIGN = "none"
-"""Name of the design in the parameters of a node that flies without one: nodes have a default."""
+"""Value of ``design.name`` with which a node flies without a design; otherwise it would load its default one."""
 
 
 def digest(values: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of a design's flat parameters.
+    """Return the SHA-256 of a design's flat parameters, in hexadecimal.
 
-    Left out are ``design.hash``, ``feedback.tau``, which may be anything certified, and what is empty or as if absent.
+    ``design.hash`` itself and ``feedback.tau``, which may have any certified value, are left out. So are empty values
+    and values that mean the same as an absent parameter.
     """
     known = {p.name for p in DESIGN_PARAMETERS} - {"design.hash", TAU.name}
     absent = {TAU_MINIMUM.name: TAU_MINIMUM.default, "nominal.filtered": False, "nominal.interpolated": False}
@@ -212,10 +218,10 @@ def digest(values: Mapping[str, Any]) -> str:
 
 
 def shaped(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the array of a parameter; a size of -1 follows from its length.
+    """Return the values of the parameter ``name`` as an array of the given ``shape``, in which one size may be -1.
 
     Raises:
-        DesignError: It has another number of values.
+        DesignError: The number of values does not fit the shape.
     """
     array = np.array(values[name], float)
     unit = int(np.prod([n for n in shape if n > 0]))
@@ -226,7 +232,7 @@ def shaped(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np.n
 
 
 def positive(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the array of a parameter whose values must be positive."""
+    """Return the array of a parameter as :func:`shaped` does; a DesignError refuses values that are not positive."""
     array = shaped(values, name, shape)
     if not np.all(array > 0.0):
         raise DesignError(f"parameter {name} = {array.tolist()}: expected values above zero")
@@ -234,7 +240,7 @@ def positive(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np
 
 
 def samples(values: Mapping[str, Any], axis: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return breakpoints (n) and weights (n, v) along an axis of scheduling."""
+    """Return the breakpoints (n) along a scheduling axis and the weights (n, v) of its v vertices there."""
     breakpoints = np.array(values[f"{axis}.breakpoints"], float)
     if len(breakpoints) < 2:
         raise DesignError(f"parameter {axis}.breakpoints: {len(breakpoints)} values, expected at least 2")
@@ -243,12 +249,13 @@ def samples(values: Mapping[str, Any], axis: str) -> tuple[np.ndarray, np.ndarra
 
 @dataclass(frozen=True)
 class ControlDesign:
-    """The numbers a Tube-MPC controller flies with, SI, state order as in :mod:`hsv.model.dynamics`.
+    """The numbers of a Tube-MPC controller in flight, SI, with states in the order of :mod:`hsv.model.signals`.
 
-    ``feedback_gain`` F (2, 9); ``nominal_gains`` K (g, 2, 9) and ``nominal_ellipsoids`` P (g, 5, 5), x' P x <= 1 on the
-    rigid states, outermost first; the nominal cost's ``nominal_state_scale`` (5) and ``nominal_input_scale`` (2), and
-    ``nominal_input_bound`` (2), the largest |u_n| of the gains; ``input_minimum`` and ``input_maximum`` (2); ``notch``:
-    the filter it was designed with.
+    ``feedback_gain`` is F (2, 9). ``nominal_gains`` K (g, 2, 9) and ``nominal_ellipsoids`` P (g, 5, 5), x' P x <= 1 on
+    the rigid states, come outermost first. ``nominal_state_scale`` (5) and ``nominal_input_scale`` (2) are the scales
+    of the nominal cost, ``nominal_input_bound`` (2) is the largest |u_n| of the gains. ``input_minimum`` and
+    ``input_maximum`` (2) limit the input, and ``notch`` is the filter of the design. ``altitude_samples`` and
+    ``velocity_samples`` are breakpoints (n) and weights (n, v) of the vertices along each scheduling axis.
     """
 
     name: str
@@ -267,38 +274,38 @@ class ControlDesign:
     input_maximum: np.ndarray
     notch: tuple[NotchSection, ...]
     coupling: str = ""
-    """Set of inertial coupling that the tube is certified for, empty: the design carries no tube."""
+    """Set of inertial coupling for which the tube is certified; empty if the design has no tube."""
     actuators: tuple[str, ...] = ()
-    """Names of the actuators that the tube is certified for, ideal where a channel has none."""
+    """Names of the actuators for which the tube is certified; an input that none of them drives has an ideal one."""
     vehicle: str = ""
-    """Digest of the vehicle that the design is for, empty: the default one."""
+    """Digest of the vehicle of the design; empty: the default vehicle."""
     tube: TubeSet | None = None
-    """The invariant set of the tube error, ``None``: the design carries none."""
+    """The invariant set of the tube error, or ``None`` if the design has none."""
     plan_bounds: PlanBounds | None = None
-    """Bounds of the total nominal input; ``None``: the design has no tightened inputs."""
+    """Bounds of the total nominal input, or ``None`` if the design has no tightened inputs."""
     tau: np.ndarray = field(default_factory=lambda: np.ones(N_RIGID))
-    """Factor (5) of each rigid state's feedback that the design flies with."""
+    """Factors tau (5) of the feedback of the rigid states in flight."""
     tau_minimum: np.ndarray = field(default_factory=lambda: np.ones(N_RIGID))
-    """Smallest certified factors tau (5) of the feedback; the certificate covers the range up to 1."""
+    """Smallest certified factors tau (5); the certificate covers the line from these factors to ones."""
     interpolated: bool = False
-    """Whether the nominal gain between two ellipsoids is one between theirs: then u_n is continuous."""
+    """Whether the nominal gain is interpolated between two ellipsoids, which makes u_n continuous, or switched."""
     filtered: bool = False
-    """Whether the pitch-rate feedback subtracts the plan's pitch rate after the same notch filter (eq. 48)."""
+    """Whether the pitch rate of the plan, which the feedback subtracts, passes the notch filter, too (eq. 48)."""
     modified: bool = False
-    """Whether the parameters were changed after the design was written, by their digest."""
+    """Whether the parameters were changed after the design was written; their digest then differs from design.hash."""
 
     def adjusted_gain(self, tau: np.ndarray) -> np.ndarray:
-        """Return F (2, 9) with each rigid state's column times its factor ``tau`` (5) (paper eq. 48, eq. 54)."""
+        """Return F (2, 9) with the columns of the rigid states times their factors ``tau`` (5) (eq. 48, eq. 54)."""
         gain = self.feedback_gain.copy()
         gain[:, :N_RIGID] *= tau
         return gain
 
     def with_tau(self, values: Sequence[float]) -> Self:
-        """Return the design that flies with the factors ``values``, one or five.
+        """Return a copy of the design with the factors tau in ``values``, one or five.
 
         Raises:
-            ParameterError: They are not certified.
-            DesignError: The closed loop is not stable with them.
+            ParameterError: The factors are not certified.
+            DesignError: The closed loop with these factors is not stable.
         """
         tau = certified(TAU.check(values), self.tau_minimum)
         _check_stable(TAU.name, self.polytope, self.adjusted_gain(tau))
@@ -306,16 +313,16 @@ class ControlDesign:
 
     @property
     def actuator_sets(self) -> tuple[ActuatorSet, ...]:
-        """The actuators that the design knows."""
+        """The data of the actuators for which the tube is certified."""
         return tuple(ACTUATOR_SETS[name] for name in self.actuators)
 
     @property
     def digest(self) -> str:
-        """The digest of the parameters as they are."""
+        """The digest of the current parameters, see :func:`digest`."""
         return str(self.to_parameters()["design.hash"])
 
     def to_parameters(self) -> dict[str, Any]:
-        """Return the flat ROS 2 parameters, digest included."""
+        """Return the flat ROS 2 parameters by name, with arrays as lists row by row, and the digest."""
         values: dict[str, Any] = {
             "design.name": self.name,
             "period": self.period,
@@ -351,15 +358,15 @@ class ControlDesign:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any]) -> Self:
-        """Return the design in ``values``, checked: types, sizes, finite numbers, and a stable closed loop.
+        """Return the design in the flat parameters ``values``, after checking types, sizes, ranges and stability.
 
         Raises:
-            DesignError: Names the parameter that is wrong and what was expected.
+            DesignError: A parameter is wrong; the message names it and says what was expected.
         """
         try:
             v = validate(DESIGN_PARAMETERS, values)
             notch = flown_sections(v)
-            discretise(notch, v["period"])  # refuses centres that the period has no room for
+            discretise(notch, v["period"])  # refuses centre frequencies above the Nyquist frequency
             tau_minimum = rigid_factors(v[TAU_MINIMUM.name], TAU_MINIMUM.name)
             tau = certified(v[TAU.name], tau_minimum)
         except ParameterError as error:
@@ -419,13 +426,13 @@ _ARRAYS = {
     "input_minimum": ("input.minimum", (N_INPUTS,)),
     "input_maximum": ("input.maximum", (N_INPUTS,)),
 }
-"""Parameter and shape of the fields that are one array each."""
+"""Parameter and shape of each field of :class:`ControlDesign` that is an array."""
 
 _POSITIVE = ("nominal_state_scale", "nominal_input_scale", "nominal_input_bound")
 
 
 def design_of(values: Mapping[str, Any]) -> ControlDesign | None:
-    """Return the design in the flat parameters of a flight, or ``None``."""
+    """Return the design in the flat parameters of a flight, or ``None`` if they contain no design."""
     flown_with_any = {parameter.name for parameter in (*DESIGN_NOTCH_PARAMETERS, TAU)}
     known = [parameter.name for parameter in DESIGN_PARAMETERS if parameter.name not in flown_with_any]
     if values.get("design.name") == NO_DESIGN or not any(name in values for name in known):
@@ -461,7 +468,7 @@ def _plan_bounds(values: Mapping[str, Any]) -> PlanBounds | None:
 
 
 def _check_stable(name: str, polytope: Polytope, gain: np.ndarray) -> None:
-    # The flexible states follow the rigid ones and have poles of their own: all nine must be inside the unit circle.
+    # All nine poles must lie inside the unit circle, also those of the flexible states, which are not fed back.
     for vertex, (a, b) in enumerate(zip(polytope.A, polytope.B, strict=True)):
         with np.errstate(over="ignore", invalid="ignore"):
             closed = a + b @ gain
@@ -475,13 +482,13 @@ def _check_stable(name: str, polytope: Polytope, gain: np.ndarray) -> None:
 
 
 _SHIPPED = Path(__file__).parents[1] / "designs"
-"""In a checkout a link to ``offline_design``, in an installed package a folder of its own."""
+"""Folder of the shipped designs: a link to ``offline_design`` in a checkout, a copy in an installed package."""
 
 _DESIGN_NAMES = [parameter.name for parameter in DESIGN_PARAMETERS]
 
 
 def write_design(path: Path, design: ControlDesign, comment: str) -> None:
-    """Write ``design`` as ROS 2 parameter YAML for all nodes, with ``comment`` lines on top."""
+    """Write ``design`` to ``path`` as ROS 2 parameter YAML for all nodes, with the lines of ``comment`` at the top."""
     tree: dict[str, Any] = {}
     for name, value in design.to_parameters().items():
         *groups, leaf = name.split(".")
@@ -495,10 +502,10 @@ def write_design(path: Path, design: ControlDesign, comment: str) -> None:
 
 
 def read_parameters(path: Path) -> dict[str, Any]:
-    """Return the flat parameters for all nodes in a ROS 2 parameter YAML.
+    """Return the flat parameters that the ROS 2 parameter file at ``path`` sets for all nodes, in section ``/**``.
 
     Raises:
-        DesignError: The file is missing or is not parameter YAML.
+        DesignError: The file is missing, or it has no parameters for all nodes.
     """
     try:
         text = read_text(path)
@@ -508,10 +515,10 @@ def read_parameters(path: Path) -> dict[str, Any]:
 
 
 def parse_parameters(text: str, source: str) -> dict[str, Any]:
-    """Return the flat parameters in the ``text`` of a parameter YAML, as :func:`read_parameters`.
+    """Return the flat parameters for all nodes in the ``text`` of a ROS 2 parameter file.
 
     Raises:
-        DesignError: The text is not parameter YAML; the message names ``source``.
+        DesignError: There are no such parameters; the message names ``source``.
     """
     if flat := parse_sections(text, source).get("/**"):
         return flat
@@ -519,7 +526,11 @@ def parse_parameters(text: str, source: str) -> dict[str, Any]:
 
 
 def parse_sections(text: str, source: str) -> dict[str, dict[str, Any]]:
-    """Return the flat parameters of every section in the ``text`` of a parameter YAML, ``"/**"`` for all nodes."""
+    """Return the flat parameters in the ``text`` of a ROS 2 parameter file, by section; ``"/**"`` is for all nodes.
+
+    Raises:
+        DesignError: There are no parameters, or one occurs twice; the message names ``source``.
+    """
     try:
         tree = parse_yaml(text)
     except DocumentError as error:
@@ -542,7 +553,7 @@ def _no_parameters(source: str) -> DesignError:
 
 
 def read_design(path: Path) -> ControlDesign:
-    """Return the design in a parameter file; errors name the file and the parameter (see :class:`ControlDesign`)."""
+    """Return the design in the parameter file at ``path``; a DesignError names the file and the wrong parameter."""
     values = read_parameters(path)
     try:
         for name in values:
@@ -556,16 +567,18 @@ def read_design(path: Path) -> ControlDesign:
 
 
 def find_design(name: str) -> Path:
-    """Return the parameter file of a design given by path, or by name: in ``HSV_DESIGN_PATH``, or a shipped one.
+    """Return the path of the parameter file of a design, given by that path or by name.
+
+    A name is looked up in the folders of the environment variable ``HSV_DESIGN_PATH``, then among the shipped designs.
 
     Raises:
-        DesignError: No such file.
+        DesignError: There is no such file.
     """
     return find_file(name, ".yaml")
 
 
 def find_file(name: str, suffix: str) -> Path:
-    """Return a design's file of the given ``suffix``; see :func:`find_design`."""
+    """Return the path of a design's file with the given ``suffix``, looked up as in :func:`find_design`."""
     if "/" in name or name.endswith(suffix):
         candidates = [Path(name)]
     else:
@@ -596,16 +609,16 @@ CERTIFICATE_PARAMETERS = (
 
 
 def certificate_path(design_file: Path) -> Path:
-    """Return where the certificate of a parameter file lies: ``baseline.yaml`` has ``baseline.certificate.json``."""
+    """Return the path of the certificate for a parameter file: ``baseline.certificate.json`` for ``baseline.yaml``."""
     return design_file.with_suffix(".certificate.json")
 
 
 def find_certificate(design: str, named: str = "") -> Path | None:
-    """Return the path of the certificate ``named``, by default the one next to the design file; None without one.
+    """Return the path of the certificate of a design, or None if there is none.
 
     Args:
-        design: Name of the design, or path of its parameter file.
-        named: Path of a certificate; not looked for.
+        design: Name of the design, or path of its parameter file; the certificate lies next to this file.
+        named: Path of another certificate, returned even if there is no such file; empty: none.
     """
     if named:
         return Path(named)
@@ -617,12 +630,12 @@ def find_certificate(design: str, named: str = "") -> Path | None:
 
 
 def write_certificate(path: Path, report: dict[str, Any]) -> None:
-    """Write the report of a design; the same report gives the same bytes."""
+    """Write the ``report`` on a design as its certificate; the same report gives the same bytes."""
     path.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def read_certificate(path: Path) -> dict[str, Any]:
-    """Return the report of a design.
+    """Return the contents of a certificate.
 
     Raises:
         DesignError: The file is missing or is not a certificate.
@@ -637,10 +650,10 @@ def read_certificate(path: Path) -> dict[str, Any]:
 
 
 def design_files(design: Path) -> dict[str, str]:
-    """Return the attachments of a bag that belong to its design, by name: parameters and certificate."""
+    """Return the texts that a bag stores of its design, by attachment name: parameters and, if any, certificate."""
     return {"design.yaml": read_text(design)} | attached_certificate(certificate_path(design))
 
 
 def attached_certificate(path: Path | None) -> dict[str, str]:
-    """Return the attachment of a bag that is the certificate, by name; none without one."""
+    """Return the text of the certificate by its attachment name in a bag; empty if there is no such file."""
     return {"certificate.json": read_text(path)} if path and path.is_file() else {}

@@ -1,19 +1,19 @@
-"""Linear matrix inequalities posed so that they have one answer, which every processor finds.
+"""Linear matrix inequalities posed so that they have a unique solution, which every processor finds.
 
-The optimum of a semidefinite programme need not be unique, and near it a solver's last steps are decided by rounding:
-nominal gains that differ by half have the same cost to 1e-4. The answer is therefore not the optimum but a point of its
-central path, the minimum of
+The optimum of a semidefinite programme need not be unique, and rounding decides the last steps of a solver near it:
+nominal gains that differ by half have the same cost to 1e-4. The solution returned is therefore not the optimum but a
+point of the central path, the minimum of
 
     t c'x - sum_k log det G_k(x)
 
-where t is such that the cost is above its optimum by about the share :data:`GAP`. That function is smooth and
-strictly convex. Among all points that cost nearly the least, its minimum is the one farthest from the bounds of all
-inequalities, by the product of their eigenvalues. Newton's method finds it to rounding, from any start inside; Clarabel
-gives one.
+over the unknowns x, with cost c'x and inequalities G_k(x) >= 0. The factor t is chosen so that the cost exceeds its
+optimum by about the share :data:`GAP`. This function is smooth and strictly convex. Among all points of nearly minimal
+cost, its minimum is farthest from the bounds of all inequalities, as measured by the product of their eigenvalues.
+Newton's method finds it to rounding from any interior point; Clarabel provides one.
 
 Unscaled, or scaled by typical sizes only, the inequalities of a fast-sampled integrator chain defeat interior-point
-solvers. In coordinates whitened by a central LQR problem (:class:`Whitening`) the Lyapunov matrices are near multiples
-of the identity. What one stage of a design hands to the next is rounded to the digits that mean something.
+solvers. In coordinates whitened by an LQR problem at the mean vertex (:class:`Whitening`), the Lyapunov matrices are
+near multiples of the identity. The results of each stage of a design are rounded to their significant digits.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from hsv.base.errors import DesignError
 
 @dataclass(frozen=True)
 class SolverReport:
-    """Report on a solved problem: versions, ``status``, ``iterations`` and the ``objective`` returned."""
+    """Report on a solved problem: versions of solver and modelling tool, status, iterations and objective value."""
 
     solver: str
     modelling: str
@@ -41,12 +41,12 @@ class SolverReport:
     objective: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report for JSON, the same at every run."""
+        """Return the report as a dictionary for JSON, the same at every run."""
         return asdict(self)
 
 
 def smallest_eigenvalues(matrices: np.ndarray) -> np.ndarray:
-    """Return the smallest eigenvalue (r) of each symmetric matrix (r, k, k)."""
+    """Return the smallest eigenvalue (r) of the symmetric part of each matrix (r, k, k)."""
     return np.linalg.eigvalsh(0.5 * (matrices + np.swapaxes(matrices, -1, -2)))[..., 0]
 
 
@@ -58,12 +58,12 @@ def spectral_radii(matrices: np.ndarray) -> np.ndarray:
 def image(Q: np.ndarray, name: str, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
     """Return the largest singular value (...) of L^-1 [M L, columns] with Q = L L'.
 
-    At most 1: M takes the ellipsoid x' Q^-1 x <= 1 into itself. The smallest eigenvalue of [Q, (M Q)'; M Q, Q], scaled
-    to a unit diagonal, is 1 less this value.
+    If it is at most 1, M maps the ellipsoid x' Q^-1 x <= 1 into itself. Without further columns, the smallest
+    eigenvalue of [Q, (M Q)'; M Q, Q], with its diagonal blocks scaled to the identity, is 1 minus this value.
 
     Args:
-        Q: (n, n) the matrix of the ellipsoid.
-        name: Its name, for the error message.
+        Q: (n, n) matrix of the ellipsoid.
+        name: Name of the ellipsoid, for the error message.
         M: (..., n, n) matrices.
         columns: (..., n, d) further columns.
 
@@ -78,28 +78,28 @@ def image(Q: np.ndarray, name: str, M: np.ndarray, *columns: np.ndarray) -> np.n
 
 
 def inverse(Q: np.ndarray) -> np.ndarray:
-    """Return Q^-1, symmetric."""
+    """Return Q^-1 (n, n), made exactly symmetric."""
     P = np.linalg.inv(Q)
     return np.asarray(0.5 * (P + P.T))
 
 
 VERTEX_DIGITS = 12
-"""Digits kept of vertices, below the scales of the model: two processors agree on ten, but the slow modes in the Bode
-plot need twelve. Entries that are zero in the physical model are below 1e-14 and become zero."""
+"""Digits to which vertices are rounded, relative to the scales of the model. Two processors agree on ten, but the slow
+modes in the Bode plot need twelve. Entries that are zero in the physical model are below 1e-14 and become zero."""
 
 GAIN_DIGITS = 6
-"""Digits kept of gains, below the scales of their problem; processors agree on eight."""
+"""Digits to which gains are rounded, relative to the scales of their problem; processors agree on eight."""
 
 MATRIX_DIGITS = 11
-"""Digits kept of ellipsoids, their centres and multipliers, below their own sizes. Processors agree on eight, but an
-ellipsoid must also be invariant and nested in its thinnest direction, where its entries cancel."""
+"""Digits to which ellipsoids, their centres and multipliers are rounded, relative to their own sizes. Processors agree
+on eight, but an ellipsoid must also be invariant and nested in its thinnest direction, where its entries cancel."""
 
 BOUND_DIGITS = 6
-"""Digits kept of bounds of disturbances and inputs."""
+"""Significant digits to which the bounds of disturbances and inputs are rounded."""
 
 
 def rounded(values: np.ndarray, size: Any, digits: int) -> np.ndarray:
-    """Return ``values`` as decimal numbers with ``digits`` digits below the leading one of each ``size``."""
+    """Return ``values`` rounded to decimal numbers with ``digits`` digits after the leading digit of their ``size``."""
     values = np.asarray(values, float)
     leading = np.floor(np.log10(np.broadcast_to(np.asarray(size, float), values.shape))).astype(int)
     flat = [round(v, digits - k) for v, k in zip(values.ravel().tolist(), leading.ravel().tolist(), strict=True)]
@@ -108,7 +108,10 @@ def rounded(values: np.ndarray, size: Any, digits: int) -> np.ndarray:
 
 
 def rounded_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Return a positive definite matrix (n, n) rounded, below the roots of its diagonal."""
+    """Return a positive definite ``matrix`` (n, n) rounded to :data:`MATRIX_DIGITS`, and symmetric.
+
+    The size of an entry is the root of the product of its two diagonal entries.
+    """
     root = np.sqrt(np.diag(matrix))
     return rounded(0.5 * (matrix + matrix.T), np.outer(root, root), MATRIX_DIGITS)
 
@@ -116,21 +119,21 @@ def rounded_matrix(matrix: np.ndarray) -> np.ndarray:
 def outward(values: np.ndarray) -> np.ndarray:
     """Return ``values`` rounded away from zero to :data:`BOUND_DIGITS` significant digits.
 
-    A value that exceeds such a number by a relative 1e-12 or less becomes that number.
+    A value above a number with so many digits, by a relative 1e-12 or less, is rounded to that number instead.
     """
     values = np.asarray(values, float)
     size = np.where(values == 0.0, 1.0, np.abs(values))
     quantum = 10.0 ** (np.floor(np.log10(size)) - BOUND_DIGITS + 1)
-    # The margin is for a value that is a multiple but for the rounding of the division.
+    # The margin keeps a multiple of the quantum, of which the division made slightly more.
     multiples = np.ceil(np.abs(values) / quantum * (1.0 - 1e-12))
     return rounded(np.sign(values) * multiples * quantum, size, BOUND_DIGITS)
 
 
 @dataclass(frozen=True)
 class Whitening:
-    """New coordinates: state z = ``to_white`` x, input v = u / ``input_scale``.
+    """New coordinates of a linear system: state z = ``to_white`` x, input v = u / ``input_scale``.
 
-    ``to_white`` and its inverse ``from_white`` (n, n); ``input_scale`` (m).
+    ``from_white`` (n, n) is the inverse of ``to_white`` (n, n); ``input_scale`` has shape (m).
     """
 
     to_white: np.ndarray
@@ -138,15 +141,15 @@ class Whitening:
     input_scale: np.ndarray
 
     def dynamics(self, A: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return A (..., n, n) and B (..., n, m) in the new coordinates."""
+        """Return the matrices ``A`` (..., n, n) and ``B`` (..., n, m) of a system in the new coordinates."""
         return self.to_white @ A @ self.from_white, self.to_white @ B * self.input_scale
 
     def gain(self, K: np.ndarray) -> np.ndarray:
-        """Return a gain (m, n), found in the new coordinates, in the original ones."""
+        """Return in the original coordinates a gain ``K`` (m, n) that is given in the new ones."""
         return np.asarray(self.input_scale[:, None] * (K @ self.to_white))
 
     def covariance(self, N: np.ndarray) -> np.ndarray:
-        """Return a matrix N (n, n) of the kind x' N^-1 x <= 1, found in the new coordinates, in the original ones."""
+        """Return in the original coordinates the ``N`` (n, n) of an ellipsoid z' N^-1 z <= 1 in the new ones."""
         return _symmetric(self.from_white @ N @ self.from_white.T)
 
 
@@ -155,11 +158,11 @@ def _symmetric(matrix: np.ndarray) -> np.ndarray:
 
 
 def lqr_whitening(A: np.ndarray, B: np.ndarray, state_scale: np.ndarray, input_scale: np.ndarray) -> Whitening:
-    """Return the whitening by the Cholesky factor of the Riccati solution at the mean of the vertices.
+    """Return the coordinates in which the solution of the Riccati equation at the mean of the vertices is the identity.
 
     Args:
-        A: (r, n, n) vertices.
-        B: (r, n, m) vertices.
+        A: (r, n, n) state matrices of the vertices, discrete time.
+        B: (r, n, m) input matrices of the vertices.
         state_scale: (n) deviations that weigh equally in the LQR cost, SI.
         input_scale: (m) inputs that weigh as much, SI.
 
@@ -179,39 +182,40 @@ def lqr_whitening(A: np.ndarray, B: np.ndarray, state_scale: np.ndarray, input_s
 
 
 GAP = 1e-3
-"""Relative gap between the cost of the solution and the minimum, up to a factor of at most the root of 2."""
+"""Intended relative gap between the cost of a solution and the minimum; within a factor of the root of 2."""
 
 _INSIDE = (1e-5, 1e-4, 1e-3, 1e-8)
-"""Smallest eigenvalues of the inequalities to require of a start, tried in order until the solver returns one inside.
+"""Margins of the inequalities in the search for an interior start: lower bounds of their eigenvalues, tried in order.
 
-What it calls inaccurate may be off by 1e-5; where there is little room, less has to do.
+A solution that the solver calls inaccurate may be off by 1e-5; if the inequalities leave little room, a smaller margin
+has to do.
 """
 
 _STEPS = 500
 """Maximum number of Newton steps; about twenty to eighty are needed."""
 
 _CONVERGED = 1e-7
-"""Newton decrement after which one more step leaves nothing but rounding."""
+"""Newton decrement below which one more step reaches the minimum to rounding."""
 
 _NEAR = 1e-4
-"""Newton decrement below which one that no longer falls is rounding, too."""
+"""Newton decrement below which rounding alone can keep the decrement from falling; the iteration then ends, too."""
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """A matrix sought: ``shape`` (m, n), or symmetric (n, n)."""
+    """An unknown matrix of an optimisation problem, of the given ``shape`` (m, n), or symmetric (n, n)."""
 
     shape: tuple[int, int]
     symmetric: bool = False
 
     @property
     def size(self) -> int:
-        """Number of its free entries."""
+        """Number of free entries of the matrix."""
         m, n = self.shape
         return n * (n + 1) // 2 if self.symmetric else m * n
 
     def matrix(self, x: np.ndarray) -> np.ndarray:
-        """Return the matrix with the free entries ``x``, row by row; of a symmetric one, of its upper triangle."""
+        """Return the matrix with the free entries ``x``, row by row; for a symmetric one, of its upper triangle."""
         if not self.symmetric:
             return x.reshape(self.shape)
         value = np.zeros(self.shape)
@@ -220,15 +224,18 @@ class Unknown:
 
 
 Inequalities = Callable[..., Sequence[np.ndarray]]
-"""Function from the unknown matrices to symmetric matrices, affine in them, that must be positive semidefinite."""
+"""Function of the unknown matrices that returns symmetric matrices, affine in them and to be positive semidefinite."""
 
 Cost = Callable[..., float]
-"""Function from the unknown matrices to a linear cost."""
+"""Function of the unknown matrices that returns the cost, which is linear in them."""
 
 
 @dataclass(frozen=True)
 class _Inequality:
-    """G(x) = ``constant`` (k, k) + sum_j x[``acting``[j]] ``slopes`` (a, k, k)[j]."""
+    """A linear matrix inequality G(x) >= 0 with G(x) = constant + sum_j x[acting[j]] slopes[j].
+
+    ``constant`` (k, k); ``acting`` (a): indices of the entries of x that occur; ``slopes`` (a, k, k).
+    """
 
     constant: np.ndarray
     acting: np.ndarray
@@ -241,16 +248,16 @@ class _Inequality:
 def minimise(
     unknowns: Sequence[Unknown], cost: Cost, inequalities: Inequalities, name: str
 ) -> tuple[list[np.ndarray], SolverReport]:
-    """Return the unknown matrices on the central path, about :data:`GAP` above the minimum cost.
+    """Return the solution on the central path, at a cost about :data:`GAP` above the minimum, and the solver's report.
 
     Args:
-        unknowns: Unknown matrices.
-        cost: Linear; if it is zero throughout, the answer is the solver's.
-        inequalities: Affine, with entries near one.
+        unknowns: Unknown matrices, in the order of the solution.
+        cost: Linear cost; if it is zero for all unknowns, the solution is that of the solver.
+        inequalities: Affine inequalities, with entries near one.
         name: Name of the result, for error messages.
 
     Raises:
-        DesignError: No solution inside the inequalities.
+        DesignError: There is no solution inside the inequalities.
     """
     ends = np.cumsum([unknown.size for unknown in unknowns])
     n = int(ends[-1])
@@ -272,22 +279,23 @@ def minimise(
         return split(x), report
     x, report = _inside(c, found, name)
     degree = sum(len(one.constant) for one in found)
-    # A power of two: the solver's optimum, which has few digits that count, chooses among few.
+    # A power of two, so that differences between processors in the solver's optimum rarely change t.
     t = 2.0 ** round(np.log2(degree / (GAP * max(abs(report.objective), 1e-12))))
     x = _centre(t * c, found, x, name)
     return split(x), replace(report, objective=float(c @ x))
 
 
 def _solved(c: np.ndarray, found: list[_Inequality], least: float, name: str) -> tuple[np.ndarray, SolverReport]:
-    """Return the minimum of c'x by Clarabel, in one thread, with no eigenvalue of an inequality below ``least``.
+    """Return the x that minimises c'x, found by Clarabel, and the solver's report.
 
-    The same input gives the same bits on the same machine. "optimal_inaccurate" passes: every caller recomputes its
+    No eigenvalue of an inequality may be below ``least``. Clarabel runs in one thread, so that the same input gives the
+    same bits on the same machine. The status "optimal_inaccurate" is accepted, because every caller recomputes its
     inequalities from the returned matrices.
 
     Raises:
-        DesignError: Infeasible, unbounded, or the solver gave up.
+        DesignError: The problem is infeasible or unbounded, or the solver gave up.
     """
-    import cvxpy as cp  # takes a second, which a flight need not pay
+    import cvxpy as cp  # imported here, as it takes a second that flights do not need
 
     x = cp.Variable(len(c))
     constraints = []
@@ -317,7 +325,7 @@ def _solved(c: np.ndarray, found: list[_Inequality], least: float, name: str) ->
 
 
 def _inside(c: np.ndarray, found: list[_Inequality], name: str) -> tuple[np.ndarray, SolverReport]:
-    """Return a point near the minimum of c'x at which all inequalities hold strictly."""
+    """Return an x near the minimum of c'x at which all inequalities hold strictly, and the solver's report."""
     failure = DesignError(f"{name}: no solution inside all inequalities, expected a feasible design")
     for least in _INSIDE:
         try:
@@ -339,7 +347,7 @@ def _factors(found: list[_Inequality], x: np.ndarray) -> list[np.ndarray] | None
 
 
 def _centre(c: np.ndarray, found: list[_Inequality], x: np.ndarray, name: str) -> np.ndarray:
-    """Return the minimum of c'x - sum log det G_k(x), by Newton's method from ``x`` inside."""
+    """Return the x that minimises c'x - sum log det G_k(x), by Newton's method from an interior point ``x``."""
 
     def value(at: np.ndarray, factors: list[np.ndarray]) -> float:
         return float(c @ at - 2.0 * sum(np.log(np.diag(L)).sum() for L in factors))
@@ -359,12 +367,12 @@ def _centre(c: np.ndarray, found: list[_Inequality], x: np.ndarray, name: str) -
         try:
             step = -size * cho_solve(cho_factor(hessian * np.outer(size, size)), size * gradient)
         except np.linalg.LinAlgError:
-            break  # so near a bound that rounding has taken the curvature along it
+            break  # x is so near a bound that rounding makes the Hessian singular
         decrement = float(np.sqrt(max(-gradient @ step, 0.0)))
         if decrement < _CONVERGED or last <= decrement < _NEAR:
             return np.asarray(x + step)
         last = decrement
-        # The last length is safe by self-concordance; longer ones are taken where they pay.
+        # The last step length is safe by self-concordance; a longer one is taken if it lowers the value enough.
         now = value(x, factors)
         for length in (1.0, 0.5, 0.25, 1.0 / (1.0 + decrement)):
             there = _factors(found, x + length * step)
