@@ -2,7 +2,9 @@
 
     u = tau F' (x' - x_n' - x_r') + K' x_n' + u_r,   0 < tau <= 1                                             (48), (54)
 
-The steps: model (45), F' (24), W' (47), Z' for all factors from tau to 1 (25)-(28), U minus F' Z' (53), K' (49)-(52).
+Primes denote the co-designed model, in which the notch filter is a part. The steps are the model (45), the gain F'
+(24), the disturbance set W' (47), the invariant set Z' for all factors from tau to 1 (25)-(28), the tightened inputs
+U minus F' Z' (53), and the nominal gains K' (49)-(52).
 """
 
 from __future__ import annotations
@@ -44,14 +46,16 @@ from hsv.model.vehicle import Vehicle
 
 
 def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) -> DesignResult:
-    """Return the adjustable design: co-designed model, F', the set Z' for tau F', the nominal gains K'.
+    """Return the adjustable design: co-designed model, gain F', invariant set Z' for tau F', nominal gains K'.
 
     W' is W with the fault and the parameter bounds scaled by tau (paper eq. 47). Z' is invariant under tau F' and under
-    F', so that tau may change in flight between its value here and 1; the paper's Z' = tau Z, which holds only if W'
-    were tau W under F' itself, is reported as well. The bounds of K' grow as U minus F' Z' does (eq. 52, eq. 53).
+    F', so that tau may change in flight between its value here and 1. The paper's Z' = tau Z would require W' = tau W
+    under F'; its half-widths are reported for comparison. The bounds of |u_n| for K' grow with U minus F' Z' (eq. 52,
+    eq. 53).
 
-    Arguments and errors as for :func:`hsv.design.baseline.design_baseline`; a DesignError, too, where ``inputs`` has no
-    adjustable factor, chooses what such a design cannot have, or where a plan has no room at a certified factor.
+    Arguments and errors are those of :func:`hsv.design.baseline.design_baseline`. DesignError is also raised if
+    ``inputs`` has no adjustable factor or an option that an adjustable design does not allow, or if the nominal plan
+    exceeds the inputs tightened for the factor 1.
     """
     tau = _checked(inputs).array()
     tell = progress or (lambda stage, done, total: None)
@@ -66,7 +70,7 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
     full = full_state_report(inputs, design, gains.model.whole, columns)
     tell("common Lyapunov function", 2, 2)
 
-    # Z for W at tau = 1, and Z' for W' at the factor in use, from which the relaxed bounds of K' follow.
+    # The relaxed bounds for K' follow from two sets: Z for W at the factor 1, and Z' for W' at the factor tau.
     one = replace(design, tau=np.ones(N_RIGID), tau_minimum=np.ones(N_RIGID))
     at_one: Progress = lambda stage, *done: tell(f"{stage}, tau = 1", *done)  # noqa: E731
     complete = measured_set(one, Region(one, inputs, 1.0), inputs, at_one)
@@ -144,9 +148,10 @@ def _report(
 
 
 def certified_loops(design: ControlDesign, vehicle: Vehicle, effectiveness: float) -> np.ndarray:
-    """Return the closed loops (r, n, n) of error and filter that must share a Lyapunov function.
+    """Return the closed-loop state matrices (r, n, n) of error and notch filter that must share a Lyapunov function.
 
-    Vertices x tube factors (the smallest, 1) x elevator effectiveness (1, ``effectiveness``).
+    There is one for each vertex, elevator effectiveness (1, ``effectiveness``) and tube factor (the smallest, 1); the
+    vertex varies fastest, the tube factor slowest. n: five rigid states, then those of the filter.
     """
     polytope, model = design.polytope, ChannelModel(design, vehicle)
 
@@ -160,12 +165,13 @@ def certified_loops(design: ControlDesign, vehicle: Vehicle, effectiveness: floa
 def relaxed_bound(
     bound: np.ndarray, trim_input: np.ndarray, complete: TightenedInputs, incomplete: TightenedInputs
 ) -> np.ndarray:
-    """Return the bounds (2) of |u_n| in (52): ``bound``, grown as U minus F' Z' is wider than U minus F Z.
+    """Return the bounds (2) of |u_n| in (52): ``bound`` (2) scaled by the growth of the tightened inputs, and rounded.
 
-    Both are compared about the target's ``trim_input`` (2), on the side with less room (paper eq. 53), and rounded.
+    The growth is the ratio of U minus F' Z' (``incomplete``) to U minus F Z at tau = 1 (``complete``). The size of
+    either is the distance from the target's ``trim_input`` (2) to the nearer bound (paper eq. 53).
 
     Raises:
-        DesignError: The tightened constraints are empty at tau = 1 or at the factor.
+        DesignError: The trim input is not inside the tightened bounds at tau = 1 or at the factor.
     """
     before, after = complete.symmetric(trim_input), incomplete.symmetric(trim_input)
     for name, room in (("U minus F Z at tau = 1", before), ("U minus F' Z'", after)):
@@ -175,10 +181,12 @@ def relaxed_bound(
 
 
 def room_at_one(design: ControlDesign, vehicle: Vehicle, tube: dict[str, Any]) -> np.ndarray:
-    """Return the smallest room (2) that the nominal plan of the certificate ``tube`` has at the factor 1.
+    """Return the smaller margin (2), one per input, of the nominal plan to the inputs tightened for the factor 1.
+
+    ``tube`` is the report on the tube of ``design``; it contains the plan, the invariant set and the disturbance set.
 
     Raises:
-        DesignError: The feedback leaves nothing of an input there.
+        DesignError: The feedback at the factor 1 needs the whole range of an input.
     """
     one = replace(design, tau_minimum=np.ones(N_RIGID))
     problem = tube_problem(one, vehicle, DisturbanceSet.from_report(tube["disturbance"]["channels"]))

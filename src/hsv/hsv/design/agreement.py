@@ -13,9 +13,10 @@ from hsv.control.tolerances import PARAMETERS, RECOMPUTED_DESIGN, entry_size
 
 @dataclass(frozen=True)
 class Deviation:
-    """Largest deviation of a parameter, at its entry ``[index]``: ``value`` where ``expected`` was shipped, SI.
+    """Largest deviation of one parameter of a recomputed design from the shipped design.
 
-    ``scaled``: their difference over the larger of the shipped entry and the entry's size.
+    At the entry ``index`` the recomputed ``value`` deviates most from the shipped value ``expected`` (SI). ``scaled``:
+    their difference, divided by the larger of the shipped magnitude and the typical size of the entry.
     """
 
     parameter: str
@@ -26,7 +27,7 @@ class Deviation:
 
     @property
     def ok(self) -> bool:
-        """Whether the two agree."""
+        """Whether the two values agree within :data:`RECOMPUTED_DESIGN`."""
         return self.scaled <= RECOMPUTED_DESIGN
 
     def __str__(self) -> str:
@@ -38,7 +39,10 @@ class Deviation:
 
 
 def deviations(design: ControlDesign, shipped: Subject) -> list[Deviation]:
-    """Return the largest deviation of each parameter of ``design`` from ``shipped``, infinite for other sizes."""
+    """Return the largest deviation of each parameter of ``design`` from that of ``shipped``.
+
+    If the numbers of entries differ, ``value`` and ``expected`` are these numbers and ``scaled`` is infinite.
+    """
     values, expected = design.to_parameters(), shipped.design.to_parameters()
     return [
         _largest(name, values.get(name, []), expected.get(name, []), entry_size(name, shipped.certificate))

@@ -1,4 +1,4 @@
-"""The baseline design: from inputs to the gains a Tube-MPC controller flies with, and the evidence for them."""
+"""The baseline design (paper section 3): gains and tube of a Tube-MPC controller, and the evidence for them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from hsv.model.trim import trim
 
 @dataclass(frozen=True)
 class DesignResult:
-    """A design with its model and its report (ready for JSON, SI)."""
+    """A design with its polytopic model and its report (SI, ready for JSON)."""
 
     design: ControlDesign
     model: DesignModel
@@ -36,18 +36,18 @@ class DesignResult:
 
 
 def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> DesignResult:
-    """Return the baseline design (paper section 3) with its tube: gains, disturbances, invariant set, bounds.
+    """Return the baseline design (paper section 3) with its tube: gains, disturbance set, invariant set, input bounds.
 
-    The report is the certificate. It holds nothing that differs between two runs on one machine.
+    The report is the certificate; it is the same at every run on one machine.
 
     Args:
         inputs: Design inputs, from :func:`hsv.design.inputs.read_inputs`.
-        progress: Called after each part.
+        progress: Called with each stage, the parts of it that are done, and their total number.
 
     Raises:
-        DesignError: A problem without a solution, a solution that fails when recomputed, or a nominal plan that does
-            not fit into the tightened inputs.
-        TrimError: A flight point of ``inputs`` outside the trimmable envelope.
+        DesignError: A problem has no solution, a solution fails when recomputed, or the nominal plan does not fit into
+            the tightened inputs.
+        TrimError: A flight point of ``inputs`` cannot be trimmed.
     """
     tell = progress or (lambda stage, done, total: None)
     gains = design_gains(inputs, tell)
@@ -71,14 +71,14 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of the packages that compute a design."""
+    """Return the versions of the packages with which a design is computed, by package name."""
     return {package: version(package) for package in ("numpy", "scipy", "cvxpy", "clarabel")}
 
 
 def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> DesignResult:
-    """Return the part of the baseline design without a tube: polytopic model, feedback gain F, nominal gains K.
+    """Return the baseline design without its tube: polytopic model, feedback gain F, nominal gains K.
 
-    Arguments and errors as for :func:`design_baseline`.
+    Arguments and errors are those of :func:`design_baseline`.
     """
     tell = progress or (lambda stage, done, total: None)
     vehicle = inputs.flown_vehicle
@@ -87,7 +87,7 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
     notch = tuple(NotchSection(**section.model_dump()) for section in inputs.notch)
     model = design_model(inputs.model, vehicle, notch)
     polytope = model.polytope
-    # The flexible states of the decoupled model follow the rigid ones: gains act on the rigid states alone.
+    # In the decoupled model the flexible states do not act on the rigid ones; the gains act on the rigid ones only.
     A, B = polytope.A[:, :N_RIGID, :N_RIGID], polytope.B[:, :N_RIGID]
     tell("polytopic model", 1, 1)
 
@@ -129,7 +129,7 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
 
 
 def nominal_problem(inputs: DesignInputs, polytope: Polytope, input_bound: np.ndarray) -> NominalProblem:
-    """Return the problem (31)-(35) of the rigid states of ``polytope``, |u_n| at most ``input_bound`` (2)."""
+    """Return the LMI problem (31)-(35) of the gains K on the rigid states, with |u_n| at most ``input_bound`` (2)."""
     return NominalProblem(
         polytope.A[:, :N_RIGID, :N_RIGID],
         polytope.B[:, :N_RIGID],
@@ -141,7 +141,10 @@ def nominal_problem(inputs: DesignInputs, polytope: Polytope, input_bound: np.nd
 
 
 def nominal_family(inputs: DesignInputs, problem: NominalProblem, progress: Progress) -> list[NominalGain]:
-    """Return the nested nominal gains along the design's step; errors as for :func:`nested_gains`."""
+    """Return one nominal gain for each scale of the design's step, the outermost ellipsoid first.
+
+    Errors are those of :func:`hsv.control.nominal_gain.nested_gains`.
+    """
     deviation = initial_deviation(inputs)
     return nested_gains(
         problem,
@@ -153,7 +156,7 @@ def nominal_family(inputs: DesignInputs, problem: NominalProblem, progress: Prog
 
 
 def with_family(design: ControlDesign, problem: NominalProblem, gains: list[NominalGain]) -> ControlDesign:
-    """Return ``design`` with other nominal gains."""
+    """Return ``design`` with the nominal ``gains`` and the input bound of their ``problem``."""
     return replace(
         design,
         nominal_gains=np.stack([_all_states(gain.K) for gain in gains]),
@@ -163,16 +166,17 @@ def with_family(design: ControlDesign, problem: NominalProblem, gains: list[Nomi
 
 
 def initial_deviation(inputs: DesignInputs) -> np.ndarray:
-    """Return x_n(0) (5) of the design's step: trim at its start less trim at its target, SI."""
+    """Return x_n(0) (5), the initial nominal state of the design's step: trim at start minus trim at target, SI."""
     start, target = inputs.nominal.start, inputs.nominal.target
     points = (start.altitude, start.velocity), (target.altitude, target.velocity)
     return step_deviation(inputs.flown_vehicle.decoupled, *points)
 
 
 def disturbance_columns(inputs: DesignInputs) -> np.ndarray:
-    """Return the disturbance columns (5, 4) whose response F attenuates, at mid-envelope, SI per period.
+    """Return the disturbance columns (5, 4) whose responses F attenuates: changes of the rigid states per period, SI.
 
-    The lost share of the trim elevator, and steady errors of the velocity, angle-of-attack and pitch-rate equations.
+    The columns are the lost share of the trim elevator, and constant errors of the derivatives of velocity, angle of
+    attack and pitch rate, all linearised at mid-envelope.
     """
     vehicle, centre = inputs.flown_vehicle.decoupled, inputs.flown_vehicle.centre
     A, B = (matrix[:N_RIGID] for matrix in linearise(vehicle, *centre))
@@ -184,7 +188,10 @@ def disturbance_columns(inputs: DesignInputs) -> np.ndarray:
 
 
 def _literal(inputs: DesignInputs, bounds: TightenedInputs) -> DesignInputs:
-    """Return the inputs with the largest bound of |u_n| (eq. 35) that eq. 30 leaves about the target's trim input."""
+    """Return ``inputs`` with the largest bound of |u_n| (eq. 35) that fits into ``bounds`` (eq. 30) about the trim.
+
+    The trim input is that of the target.
+    """
     target = inputs.nominal.target
     bound = bounds.symmetric(trim(inputs.flown_vehicle.decoupled, target.altitude, target.velocity).input)
     if not bound.min() > 0.0:
@@ -224,7 +231,7 @@ def _report(
 
 
 def nominal_report(inputs: DesignInputs, design: ControlDesign, nominal: list[NominalGain]) -> list[dict[str, Any]]:
-    """Return the nominal gains of ``design`` with their evidence, for JSON."""
+    """Return one entry for each nominal gain of ``design``, with its scale and its evidence, for JSON."""
     A, B = design.polytope.A, design.polytope.B
     return [
         {"scale": scale, **gain.report(), "spectral_radius_all_states": float(spectral_radii(A + B @ K).max())}

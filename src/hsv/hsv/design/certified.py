@@ -1,4 +1,4 @@
-"""A certified design, read back from its two files, and the flight of its nominal vehicle."""
+"""A certified design, read from its parameter file and its certificate, and the plan of its nominal vehicle."""
 
 from __future__ import annotations
 
@@ -34,81 +34,85 @@ from hsv.model.signals import N_RIGID
 
 @dataclass(frozen=True)
 class CertifiedDesign(Subject):
-    """A design and its certificate."""
+    """A design and its certificate, with the sets that the certificate states."""
 
     @cached_property
     def inputs(self) -> DesignInputs:
-        """The design inputs in the certificate, checked."""
+        """The design inputs in the certificate, validated."""
         return inputs_from_report(self.certificate["inputs"])
 
     @property
     def disturbance(self) -> DisturbanceSet:
-        """W as certified."""
+        """The disturbance set W in the certificate."""
         return DisturbanceSet.from_report(self.certificate["tube"]["disturbance"]["channels"])
 
     @property
     def lag_feedback(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Minimum and maximum (2 each) of the feedback to the lag of the plan; None for ideal actuators."""
+        """Minimum and maximum (2 each) of the feedback due to the actuators' lag behind the plan, or None."""
         lag = self.certificate["tube"]["tightening"].get("lag_feedback")
         return (np.array(lag["lower"]), np.array(lag["upper"])) if lag else None
 
     def invariant_set(self) -> InvariantSet:
-        """Return the set of the certificate, for the design as it flies."""
+        """Return the invariant set in the certificate, with the error system of the design file."""
         problem = tube_problem(self.design, self.vehicle, self.disturbance)
         return InvariantSet.from_report(problem, self.certificate["tube"]["invariant_set"])
 
 
 def load_certified(path: Path) -> CertifiedDesign:
-    """Return the parameter file at ``path`` with its certificate.
+    """Return the design in the parameter file at ``path``, with its certificate.
 
     Raises:
-        DesignError: A file that is missing or malformed.
+        DesignError: One of the two files is missing or malformed.
     """
     return CertifiedDesign(**vars(load_subject(path)))
 
 
 @dataclass(frozen=True)
 class Plan:
-    """The plan of the nominal vehicle's ``flight`` (k rows); its bounds are inflated like those of the design."""
+    """The plan (nominal trajectory) of the simulated ``flight`` of the nominal vehicle, with k steps.
+
+    Bounds of it are multiplied by the factor :attr:`inflation`, as those of the disturbance set are.
+    """
 
     subject: CertifiedDesign
     flight: Flight
 
     @classmethod
     def of(cls, subject: CertifiedDesign) -> Plan:
-        """Return the plan of the nominal vehicle's flight with the declared fault of ``subject``."""
+        """Simulate the nominal vehicle with the fault that the design declares, and return the plan of the flight."""
         inputs = subject.inputs
         return cls(subject, Region(subject.design, inputs, incomplete_share(inputs)).fly({}))
 
     @property
     def states(self) -> np.ndarray:
-        """x_r + x_n (k, 5)."""
+        """Rigid states of the nominal trajectory, x_r + x_n (k, 5), SI."""
         return np.asarray((self.flight.reference + self.flight.history.deviation)[:, :N_RIGID])
 
     @property
     def inflation(self) -> float:
-        """Inflation of bounds."""
+        """Factor on all measured bounds, from the design inputs."""
         return float(self.subject.inputs.disturbance.inflation)
 
     @property
     def half_width(self) -> np.ndarray:
-        """Half-widths (5) of the rigid states in the certified set."""
+        """Half-widths (5) of the certified invariant set in the rigid states, SI."""
         return np.array(self.subject.certificate["tube"]["invariant_set"]["half_width"][:N_RIGID])
 
     def largest(self) -> np.ndarray:
-        """Return the largest magnitude (5) of the rigid states."""
+        """Return the largest magnitude (5) of each rigid state along the plan, inflated, SI."""
         return np.asarray(self.inflation * np.abs(self.states).max(axis=0))
 
     def change(self, steps: np.ndarray) -> np.ndarray:
-        """Return the largest change of each rigid state (5) over the given number of steps (5)."""
+        """Return the largest change (5) of each rigid state of the plan over its number of ``steps`` (5), inflated."""
         pairs = [(self.states[n:, i], self.states[: len(self.states) - n, i]) for i, n in enumerate(steps)]
         return np.array([self.inflation * np.abs(later - before).max() for later, before in pairs])
 
     def scheduling(self, errors: np.ndarray) -> np.ndarray:
-        """Return the widening (7) of the structured set that errors (2) of altitude and velocity cause.
+        """Return by how much measurement ``errors`` (2: m, m/s) widen the channels (7) of the disturbance set.
 
-        The nominal model is scheduled with the measurement, so its prediction of x_n is off by
-        [A(p + error) - A(p)] x_n + [B(p + error) - B(p)] u_n. Both ends of both errors are looked at.
+        The nominal model is scheduled with the measured altitude and velocity. An error of theirs changes the next x_n
+        by [A(p + error) - A(p)] x_n + [B(p + error) - B(p)] u_n. The result is the largest magnitude over the plan and
+        the four combinations of signs, by channel, inflated.
         """
         polytope, h = self.subject.design.polytope, self.flight.history
         points = h.state[:, :2]
@@ -125,13 +129,13 @@ class Plan:
         return self.inflation * largest
 
     def remeasured(self, equipment: Mapping[str, Any]) -> np.ndarray:
-        """Return by how much flights with ``equipment``, flat parameters of sensors, leave the structured set (7).
+        """Return by how much disturbances with ``equipment`` exceed the bounds (7) of the disturbance set, at least 0.
 
-        Noise moves the elevator, and the model does not explain all of the response. The rest is measured as the set
-        is: in flights of the nominal vehicle and 32 corners, inflated.
+        Sensor noise moves the elevator, and the model does not explain all of the response. The unexplained part is
+        measured in flights of the nominal vehicle and 32 corners, and inflated. ``equipment``: flat sensor parameters.
 
         Raises:
-            DesignError: A flight is lost or limited.
+            DesignError: A flight diverges or saturates an input.
         """
         subject, inputs = self.subject, self.subject.inputs
         region = Region(subject.design, inputs, incomplete_share(inputs), equipment)
@@ -142,9 +146,10 @@ class Plan:
         return np.maximum(np.maximum(bounds.lower - lower, upper - bounds.upper), 0.0)
 
     def actuators(self, design: ControlDesign) -> tuple[np.ndarray, np.ndarray]:
-        """Return the states (k, a) of the actuators of ``design`` along the plan and its lag, without an error.
+        """Return the states (k, a) and the commands (k, 2) of the actuators of ``design`` along the plan, SI.
 
-        And the commands (k, 2) that move them: the plan's, and the feedback to its lag.
+        The tube error is zero. The commands are the plan plus the feedback due to the actuators' lag behind it. Both
+        arrays are deviations from the rest position before the flight.
         """
         model = ChannelModel(design, self.subject.vehicle)
         commands = self.flight.plan - model.at_rest(self.flight)

@@ -1,4 +1,4 @@
-"""The invariant sets of a design side by side: ellipsoid, star norms, and what no set can be below."""
+"""Comparison of the invariant sets of a design: ellipsoid, star norms, and the lower bound by counter-examples."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from hsv.model.signals import N_RIGID
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the comparison: a set with half-widths and feedback, SI, or the reason why there is none (``note``).
+    """A row of the comparison: one kind of set with its half-widths and its feedback on both inputs (2), SI.
 
-    ``size``: geometric mean of the half-widths of the rigid states over their scales. ``lower`` and ``upper`` (2): the
-    tightened bounds of u_n + u_r, where anything is left.
+    ``note``: the error if there is no such set or no range of an input is left. ``size``: geometric mean of the scaled
+    half-widths of the rigid states. ``lower`` and ``upper`` (2): tightened bounds of u_n + u_r, or None.
     """
 
     name: str
@@ -44,12 +44,12 @@ class Row:
 
 
 def compare_sets(design: ControlDesign, problem: TubeProblem, inputs: InvariantSetInputs) -> list[Row]:
-    """Return a row for the ellipsoid, for star norms, and for the counter-examples.
+    """Return the rows of the ellipsoid, the star norms and the counter-examples, in this order.
 
     Args:
         design: Gains and vertices.
-        problem: The error system with its disturbances.
-        inputs: Scales, and contractions for the ellipsoid.
+        problem: Error system and disturbances.
+        inputs: Scales of the sets, and contractions to try for the ellipsoid.
     """
     scale, rows = inputs.state_scale.array(), []
     try:

@@ -1,17 +1,19 @@
 """Disturbance sets of the error system (paper eq. 13 to eq. 19): boxes, and the structured set with one-sided fault.
 
-Delta(k) = x(k+1) - phi_T(x_r(k), u_r(k)) - A(p) (x(k) - x_r(k)) - B(p) (u(k) - u_r(k)), u the commanded input, is what
-the polytopic model does not explain; the nominal vehicle takes the reference to phi_T = x_r(k+1) + d_r(k), which is x_r
-itself where it is constant (see :mod:`hsv.control.reference_trajectory`). w = B(p) (P - I) u, the fault, is known
-exactly: u in it is the *total* elevator, trim included. f = Delta - w is the rest: linearisation, interpolation,
-parameters, flexible coupling.
+The error of the polytopic model over one period, with the commanded input u, is
 
-The structured set writes the rigid part of Delta as three accelerations held over a period, the lost elevator through
-the column B_e(p), and what remains in altitude and pitch angle; a seventh channel is the part of the feedback that
-comes from filtering the nominal pitch rate, F_q (notch(q_n) - q_n), which acts through B(p) F_q. Nothing is left out.
+    Delta(k) = x(k+1) - phi_T(x_r(k), u_r(k)) - A(p) (x(k) - x_r(k)) - B(p) (u(k) - u_r(k)).
 
-Where the design knows its actuators, u above is their mean position over the period under the command,
-and w is what of the lost elevator comes through them; see :mod:`hsv.design.error_system` for the lag of the plan.
+The nominal vehicle takes the reference to phi_T = x_r(k+1) + d_r(k); where the reference is constant, this is x_r (see
+:mod:`hsv.control.reference_trajectory`). The fault w = B(p) (P - I) u is known exactly: u in it is the *total*
+elevator, trim included. The rest, f = Delta - w, comes from linearisation, interpolation, parameters and flexibility.
+
+The structured set represents the rigid part of Delta completely: by three accelerations held over a period, by the lost
+elevator, which acts through the elevator's column B_e(p), and by residuals of altitude and pitch angle. The seventh
+channel is notch(q_n) - q_n, with q_n the nominal pitch rate. It acts by B(p) F_q, with F_q the pitch-rate column of F.
+
+If the design includes actuators, u in Delta is their mean position over the period, and w is their response to the lost
+elevator. For their lag behind the plan see :mod:`hsv.design.error_system`.
 """
 
 from __future__ import annotations
@@ -39,7 +41,7 @@ from hsv.model.vehicle import Vehicle
 
 
 class Channel(NamedTuple):
-    """One channel of the structured set."""
+    """One channel of the structured set: its name, SI unit and meaning."""
 
     name: str
     unit: str
@@ -55,15 +57,18 @@ CHANNELS = (
     Channel("altitude_residual", "m", "altitude that the accelerations do not explain, per period"),
     Channel("pitch_angle_residual", "rad", "pitch angle that the accelerations do not explain, per period"),
 )
-"""Order of the columns of G in :class:`hsv.design.error_system.ErrorSystem`."""
+"""The channels of the structured set, in the order of the columns of G in the error system."""
 
 _FILTERED_NOMINAL = 4
 ACCELERATED, REMAINING = [1, 2, 4], [0, 3]
-"""Rigid states that the three accelerations act on, and those in which a residual remains."""
+"""Indices of the rigid states whose rates the acceleration channels are, and of those with a residual channel."""
 
 
 def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
-    """Return the effect (5, 3) on the rigid states of unit accelerations held over ``period`` (s), at mid-envelope."""
+    """Return the change (5, 3) of the rigid states over ``period`` (s) by a unit of each of the acceleration channels.
+
+    The accelerations are held over the period; the vehicle is linearised at mid-envelope.
+    """
     A, _ = linearise(vehicle.decoupled, *vehicle.centre)
     unit = np.zeros((N_RIGID, 3))
     unit[ACCELERATED, [0, 1, 2]] = 1.0
@@ -71,7 +76,10 @@ def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
 
 
 class Signals(NamedTuple):
-    """Disturbances of a flight, a row per step: ``channels`` (n, 7), ``delta`` and ``fault`` (n, 9), SI per period."""
+    """Disturbances of a flight, a row per step, SI: ``channels`` (n, 7) in the order of :data:`CHANNELS`.
+
+    ``delta`` and ``fault`` (n, 9) are Delta and w, changes of the state per period.
+    """
 
     channels: np.ndarray
     delta: np.ndarray
@@ -79,15 +87,15 @@ class Signals(NamedTuple):
 
     @property
     def remainder(self) -> np.ndarray:
-        """Delta - w (n, 9), the f of (13)."""
+        """The disturbance f = Delta - w (n, 9) of (13)."""
         return self.delta - self.fault
 
 
 @dataclass(frozen=True)
 class ChannelModel:
-    """Decomposition of Delta into the channels of ``design``, which is for ``vehicle``.
+    """Decomposition of the model error Delta into the disturbance channels of a ``design`` for ``vehicle``.
 
-    Where the nominal pitch rate is filtered as the measured one is, its channel is zero.
+    The channel of the filtered nominal rate is zero if the design filters the nominal pitch rate like the measured one.
     """
 
     design: ControlDesign
@@ -95,22 +103,22 @@ class ChannelModel:
 
     @cached_property
     def notch(self) -> Struct:
-        """The discrete filter."""
+        """The notch filter of the design, in discrete time."""
         return discretise(self.design.notch, self.design.period)
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """Effect (5, 3) of the accelerations over a period."""
+        """Change (5, 3) of the rigid states over a period by a unit of each acceleration channel."""
         return acceleration_channels(self.vehicle, self.design.period)
 
     @cached_property
     def actuators(self) -> Struct | None:
-        """The actuators of the design."""
+        """The sampled actuators of the design; None: ideal actuators."""
         known = self.design.actuator_sets
         return sampled_actuators(known, self.design.period) if known else None
 
     def signals(self, flight: Flight) -> Signals:
-        """Return the disturbances f, w and Delta that acted in a flight (paper eq. 13, eq. 16, eq. 18)."""
+        """Return the disturbances f, w and Delta of ``flight`` and their channels (paper eq. 13, eq. 16, eq. 18)."""
         h = flight.history
         commanded, lost = h.command, h.actuator[:, 1] - h.command[:, 1]
         through = lost
@@ -125,9 +133,9 @@ class ChannelModel:
         return signals
 
     def errors(self, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
-        """Return the error in the tube (n + 1, states), and the feedback (n + 1, 2) to the lag of the plan.
+        """Return the tube error (n + 1, states) of ``flight`` and the feedback (n + 1, 2) due to the actuators' lag.
 
-        The latter is none without actuators; the former is e less the effect of that lag.
+        The tube error is e minus the effect of the lag behind the plan. For ideal actuators both effects are zero.
         """
         h = flight.history
         if self.actuators is None:
@@ -138,7 +146,7 @@ class ChannelModel:
         return e - late, feedback
 
     def lag(self, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
-        """Return the effect of the lag of the plan on e (n + 1, states) and on the feedback (n + 1, 2)."""
+        """Return the effect of the actuators' lag behind the plan on e (n + 1, states) and the feedback (n + 1, 2)."""
         assert self.actuators is not None
         at_rest, design = self.at_rest(flight), self.design
         lag = at_rest + respond(self.actuators, flight.plan - at_rest)[1] - flight.plan
@@ -146,7 +154,7 @@ class ChannelModel:
         return lag_response(design.polytope, gain, self.notch, self.actuators, scheduled_at, lag)
 
     def at_rest(self, flight: Flight) -> np.ndarray:
-        """Return where actuators rest before the flight (2): in the trim that it starts in."""
+        """Return the rest positions (2) of the actuators before ``flight``: the trim input at its first state."""
         return trim(self.vehicle.decoupled, *flight.history.state[0, :2]).input
 
 
@@ -163,20 +171,20 @@ def decompose(
     """Return the disturbances of a flight; sums run over columns in a fixed order, with the same bits on every machine.
 
     Args:
-        polytope: The design's model.
-        notch: The discrete filter.
-        inverse: (3, 3) from the rates that accelerations change to the accelerations.
-        remaining: (2, 3) effect of the accelerations on altitude and pitch angle.
-        flight: n + 1 rows.
-        command: (n + 1, 2) commanded input, or where the actuators are on average.
-        lost: (n + 1) lost elevator.
-        through: (n + 1) what of it comes through the actuators.
+        polytope: The polytopic model of the design.
+        notch: The notch filter in discrete time.
+        inverse: (3, 3) inverse of the rows :data:`ACCELERATED` of :func:`acceleration_channels`.
+        remaining: (2, 3) rows :data:`REMAINING` of :func:`acceleration_channels`.
+        flight: The flight, with n + 1 rows in its history.
+        command: (n + 1, 2) commanded input, or mean actuator position over each period if the design has actuators.
+        lost: (n + 1) lost elevator: actuator input minus command, rad.
+        through: (n + 1) mean response of the actuators to ``lost``; ``lost`` itself for ideal actuators.
     """
     h, x_r, n = flight.history, flight.reference[:-1], len(flight.history.state) - 1
     S = scheduled(polytope, h.state[:-1, :2])
-    # State and input less the reference: the vector that [A(p), B(p)] multiplies.
+    # State and input minus the reference: the vector that [A(p), B(p)] multiplies.
     moved = np.hstack((h.state[:-1] - x_r, (command - flight.reference_input)[:-1]))
-    # Begun with x - x_r, the sum would keep the millionth of the residuals that it loses; one design would change.
+    # Rounding costs a millionth of the residuals. Adding x - x_r first would avoid this, but change one design.
     predicted = flight.reference[1:] + flight.defect[:-1]
     for j in range(N_STATES + N_INPUTS):
         predicted += S[:, :, j] * moved[:, j, None]
@@ -206,7 +214,7 @@ def scheduled(polytope: Polytope, points: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Membership:
-    """Worst ratio of a disturbance to its bound (at most 1: inside), its channel and step."""
+    """Largest ratio of a disturbance in a flight to its bound, with channel and step; at most 1: all are in the set."""
 
     ratio: float
     channel: str
@@ -222,7 +230,8 @@ class Membership:
 class DisturbanceSet:
     """The structured set: each of :data:`CHANNELS` between ``lower`` and ``upper`` (7), SI (paper eq. 19).
 
-    It bounds the flights that it was computed from. Check :meth:`membership` in every other flight.
+    It bounds the flights from which it was computed. Check :meth:`membership` in every other flight. Models of hardware
+    append further channels.
     """
 
     lower: np.ndarray
@@ -230,22 +239,23 @@ class DisturbanceSet:
 
     @property
     def centre(self) -> np.ndarray:
-        """Mid-points (7): where the one-sided fault moves the tube's centre to."""
+        """Mid-points (7) of the bounds; that of the one-sided fault is not zero and shifts the centre of the tube."""
         return 0.5 * (self.lower + self.upper)
 
     @property
     def half_width(self) -> np.ndarray:
-        """Half-widths (7)."""
+        """Half-widths (7) of the bounds."""
         return 0.5 * (self.upper - self.lower)
 
     def scaled(self, share: float) -> DisturbanceSet:
-        """Return ``share`` times the set, about zero."""
+        """Return the set with both bounds multiplied by ``share``."""
         return DisturbanceSet(share * self.lower, share * self.upper)
 
     def membership(self, channels: np.ndarray) -> Membership:
-        """Return how far the disturbances (n, 7) of a flight reach in the set, and where.
+        """Return the largest ratio of the disturbances (n, 7) of a flight to their bounds, with channel and step.
 
-        The ratio is that to the bound on the disturbance's own side of zero; beyond a bound of zero it is infinite.
+        A positive disturbance is divided by the upper bound, a negative one by the lower. The ratio to a bound of zero
+        is infinite.
         """
         bounds = np.where(channels > 0.0, self.upper, self.lower)
         ratios = np.full(channels.shape, np.inf)
@@ -268,13 +278,13 @@ class DisturbanceSet:
 
 
 def widened(lower: np.ndarray, upper: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the bounds, moved apart to hold zero, times ``factor``, rounded outwards."""
+    """Return both bounds, extended to include zero, multiplied by ``factor`` and rounded away from zero."""
     return outward(factor * np.minimum(lower, 0.0)), outward(factor * np.maximum(upper, 0.0))
 
 
 @dataclass(frozen=True)
 class Extremes:
-    """Smallest and largest values (c) over flights, and the indices (c) of these flights among the corners."""
+    """Smallest and largest values of c quantities over flights, and the indices (c) of the flights that have them."""
 
     lower: np.ndarray
     upper: np.ndarray
@@ -283,9 +293,9 @@ class Extremes:
 
     @classmethod
     def over(cls, lower: np.ndarray, upper: np.ndarray) -> Extremes:
-        """Return the extremes of per-flight ones (flights, c)."""
+        """Return the extremes over all flights, given the smallest and largest values (flights, c) of each flight."""
         return cls(lower.min(axis=0), upper.max(axis=0), lower.argmin(axis=0), upper.argmax(axis=0))
 
     def structured(self, inflation: float) -> DisturbanceSet:
-        """Return the structured set that these extremes of its channels give."""
+        """Return the structured set with these extremes of the channels, extended to zero and times ``inflation``."""
         return DisturbanceSet(*widened(self.lower, self.upper, inflation))

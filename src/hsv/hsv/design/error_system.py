@@ -1,19 +1,19 @@
 """The error system of the tube: how e = x - x_r - x_n and the error of the notch filter evolve (paper eq. 22, eq. 23).
 
-(18) less (20) gives, with the feedback F e closed,
+Subtracting (20) from (18) gives, with the feedback F e closed,
 
     e(k+1) = (A_i + B_i F) e(k) + Delta(k)                                                                    (22), (23)
 
-at every vertex i. The paper's error system leaves the notch filter out. Here its states belong to it: e_s = s - s_n,
-where s_n is the state of the same filter fed with the pitch rate of reference + nominal from the same start. Then
-e_s(k+1) = A_s e_s + B_s e_q exactly, and the feedback sees F_q (C_s e_s + D_s e_q) plus F_q (notch(q_n) - q_n), a
-signal of the plan alone. The pitch rate in e is the true one.
+at every vertex i. The paper's error system leaves the notch filter out; here it includes the error of the filter state,
+e_s = s - s_n. The state s_n is that of the same filter with the same start, driven by the pitch rate q_n of x_r + x_n.
+The filter is linear, so e_s(k+1) = A_s e_s + B_s e_q exactly, with e_q the error of the true pitch rate. With the gain
+F_q, the pitch-rate feedback is F_q (C_s e_s + D_s e_q) plus F_q (notch(q_n) - q_n), which depends on the plan only.
 
-Actuators that a design knows belong to it, too: e_a = a - a_n, where a_n are the same actuators driven by the plan
-u_n + u_r from the same start. Then e_a(k+1) = A_a e_a + B_a (F e + lost elevator), and their position acts on e. The
-nominal model takes the plan itself, so what the plan and a_n differ by, its lag, moves e as well. That is a signal of
-the plan alone, and so is its effect in the closed loop, :func:`hsv.flight.responses.lag_response`:
-e less that is the error in the tube.
+The error system also includes the actuators of the design, with e_a = a - a_n. The state a_n is that of the same
+actuators driven by the plan u_n + u_r. Then e_a(k+1) = A_a e_a + B_a (F e + lost elevator), and the positions act on e.
+The input of the nominal model is the plan itself, without actuators. The lag, the difference between the response to
+the plan and the plan, therefore drives e as well. It depends on the plan only, and its effect in the closed loop is
+computed separately, by :func:`hsv.flight.responses.lag_response`. The tube error is e minus this effect.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from hsv.model.signals import N_RIGID, PITCH_RATE, STATE_NAMES
 
 @dataclass(frozen=True)
 class ErrorSystem:
-    """e(k+1) = A_i e(k) + G_i d(k), the feedback closed; n states, d disturbance channels, r vertices.
+    """The error system e(k+1) = A_i e(k) + G_i d(k) with closed feedback: n states, d disturbance channels, r vertices.
 
-    ``A`` (r, n, n) closed loop; ``G`` (r, n, d) columns of the channels; ``F`` (2, n) the feedback on e, and ``F_d``
-    (2, d) on d; ``names`` (n); ``B`` (r, n, 2) columns of commands. SI per period.
+    ``A`` (r, n, n): closed loop; ``B`` (r, n, 2): columns of the commands; ``G`` (r, n, d): columns of the channels;
+    ``F`` (2, n): feedback on e; ``F_d`` (2, d): feedback on d; ``names`` (n): names of the states. SI per period.
     """
 
     A: np.ndarray
@@ -46,11 +46,11 @@ class ErrorSystem:
     F_d: np.ndarray
     names: tuple[str, ...]
     unseen: int = 0
-    """Number of states at the end that a controller does not see: those of actuators."""
+    """Number of states that the controller does not know, at the end: those of actuators, and delayed samples."""
 
     @property
     def seen(self) -> int:
-        """Number of states at the beginning that a controller sees."""
+        """Number of states that the controller knows, at the beginning: rigid states and those of the notch filter."""
         return len(self.names) - self.unseen
 
 
@@ -63,18 +63,18 @@ def error_system(
     actuators: Sequence[ActuatorSet] = (),
     period: float = 0.0,
 ) -> ErrorSystem:
-    """Return the error system of rigid states, notch filter and actuators (paper eq. 23, with the latter two in it).
+    """Return the error system of rigid states, notch filter and actuators (paper eq. 23, extended by the latter two).
 
-    The flexible states of the decoupled model follow the rigid ones and are not fed back, so they stay outside.
+    It omits the flexible states: in the decoupled model they do not act on the rigid ones, and they are not fed back.
 
     Args:
-        A: (r, 9, 9) or (r, 5, 5) vertices, discrete time.
-        B: (r, 9, 2) or (r, 5, 2) vertices.
+        A: (r, 9, 9) or (r, 5, 5) state matrices of the vertices, discrete time.
+        B: (r, 9, 2) or (r, 5, 2) input matrices of the vertices.
         F: (2, 9) or (2, 5) feedback gain.
-        notch: The discrete filter.
-        channels: (5, 3) effect of the acceleration channels over a period.
-        actuators: Actuators of the design; F does not act on their states, which come last.
-        period: s, that of the actuators.
+        notch: The notch filter in discrete time.
+        channels: (5, 3) from :func:`hsv.design.disturbance.acceleration_channels`.
+        actuators: Actuators of the design; their states come last, and F does not act on them.
+        period: Sampling period (s); used for actuators only.
     """
     r = len(A)
     A_x, B_x, F_x = A[:, :N_RIGID, :N_RIGID], B[:, :N_RIGID], F[:, :N_RIGID]
@@ -101,7 +101,7 @@ def error_system(
 def _with_actuators(
     A: np.ndarray, B: np.ndarray, F: np.ndarray, actuators: Struct
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return vertices A (r, n + a, n + a) and B (r, n + a, 2), and F (2, n + a), the actuators' states last."""
+    """Return A (r, n + a, n + a), B (r, n + a, 2) and F (2, n + a) with the a states of ``actuators`` appended."""
     (r, n, _), a = A.shape, len(actuators.A)
     whole, inputs = np.zeros((r, n + a, n + a)), np.empty((r, n + a, B.shape[2]))
     whole[:, :n, :n], whole[:, :n, n:], whole[:, n:, n:] = A, B @ actuators.C, actuators.A
@@ -110,7 +110,7 @@ def _with_actuators(
 
 
 def union(first: ErrorSystem, *others: ErrorSystem) -> ErrorSystem:
-    """Return the system that may switch between the vertices of all systems, with the feedback F of the ``first``."""
+    """Return the error system that switches between the vertices of all systems, with F of the ``first``."""
     systems = (first, *others)
     A, B, G = (np.concatenate([getattr(s, name) for s in systems]) for name in ("A", "B", "G"))
     return replace(first, A=A, B=B, G=G)
@@ -124,15 +124,17 @@ def tube_errors(
     actuators: Struct | None = None,
     beyond_plan: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return e (k, n) of a flight: rigid states, then the filter's, then those of actuators that the design knows.
+    """Return the error e (k, n) of a flight: rigid states, then states of the filter and of the design's actuators.
+
+    Filter and actuators are linear, so their errors are their responses to the errors of their inputs.
 
     Args:
         state: (k, 9) x at every step, from the first.
         deviation: (k, 9) x_n.
         reference: (k, 9) x_r.
-        notch: The discrete filter; it is linear, so its error is the filter's answer to the error of the pitch rate.
-        actuators: Likewise, without their limits.
-        beyond_plan: (k, 2) what they are commanded beyond the plan, u - u_n - u_r, a loss of it included.
+        notch: The notch filter in discrete time.
+        actuators: Sampled actuators, without their limits; None: ideal ones, without states.
+        beyond_plan: (k, 2) input of the actuators minus the plan u_n + u_r, with the lost elevator in it.
     """
     rigid = (state - deviation - reference)[:, :N_RIGID]
     errors = [rigid, along_filter(notch, rigid[:, PITCH_RATE])[1]]

@@ -1,16 +1,16 @@
 """The tube's feedback gain F by linear matrix inequalities over all vertices (paper eq. 22 to eq. 24).
 
-Without disturbances the error e(k+1) = (A_i + B_i F) e(k) of (22) decreases in e' N^-1 e at every vertex if, for
+For the error (22) without disturbances, e(k+1) = (A_i + B_i F) e(k), e' N^-1 e decreases at every vertex i if, with
 F = M N^-1,
 
     [N, (A_i N + B_i M)'; A_i N + B_i M, N] > 0.                                                                   (24)
 
-This alone does not determine F. The design takes the F with the least common bound of the quadratic cost of the
-responses to the columns D of typical disturbances: it minimises the trace of Z with
+This alone does not determine F. The design minimises a bound, common to all vertices, of the quadratic cost of the
+responses to typical disturbances, the columns of D. The bound is the trace of Z, subject to
 
-    [Z, D'; D, N] >= 0,   [N, (A_i N + B_i M)', (R N)', M'; ., N, 0, 0; ., ., I, 0; ., ., ., I] >= 0,
+    [Z, D'; D, N] >= 0,   [N, (A_i N + B_i M)', (R N)', M'; ., N, 0, 0; ., ., I, 0; ., ., ., I] >= 0.
 
-where R and the unit matrix weigh the states and the inputs by their scales.
+R divides the states by their scales; the inputs are in units of theirs.
 """
 
 from __future__ import annotations
@@ -39,23 +39,23 @@ from hsv.control.optimisation import (
 _NAME = "feedback gain F, LMI (24)"
 
 _LITERAL_CONDITION = 1e4
-"""Bound on the condition number of N, whitened, in the literal problem: without one it has no bounded answer."""
+"""Bound on the condition number of N, in whitened coordinates, if (24) is solved as printed; else N is unbounded."""
 
 _STRICT = 1e-6
-"""Margin, whitened, that stands for the strict inequality of (24)."""
+"""Margin, in whitened coordinates, that replaces the strict inequality of (24)."""
 
 
 _CONDITION = 1e3
-"""Bound on the condition number of N, whitened, without which the largest margin is not attained."""
+"""Bound on the condition number of N of a common Lyapunov function, in whitened coordinates: the margin needs one."""
 
 
 def lyapunov_residuals(closed_loop: np.ndarray, N: np.ndarray, name: str) -> np.ndarray:
-    """Return the smallest eigenvalue (r) of [N, (A_c N)'; A_c N, N] at each vertex, where N is scaled to the identity.
+    """Return the smallest eigenvalue (r) of [N, (A_c N)'; A_c N, N] for each closed loop A_c, with N scaled to I.
 
     Args:
         closed_loop: (r, n, n) A_i + B_i F.
-        N: (n, n) the matrix of (24).
-        name: Name of what is verified, for the error message.
+        N: (n, n) matrix of (24).
+        name: Name of the verified result, for the error message.
 
     Raises:
         DesignError: N is not positive definite, or an eigenvalue is not positive.
@@ -71,11 +71,11 @@ def lyapunov_residuals(closed_loop: np.ndarray, N: np.ndarray, name: str) -> np.
 
 @dataclass(frozen=True)
 class FeedbackGain:
-    """F = M N^-1 with its evidence.
+    """The feedback gain F = M N^-1 with its evidence.
 
-    ``F`` (m, n) and ``N`` (n, n) in SI, rounded, ``M`` (m, n) = F N; ``residuals`` (r) the smallest eigenvalue of (24)
-    at each vertex, recomputed in coordinates where N is the identity, so that 1 - residual is the contraction of the
-    root of e' N^-1 e; ``radii`` (r) the closed-loop spectral radii.
+    ``F`` (m, n) and ``N`` (n, n) in SI, rounded; ``M`` (m, n) = F N. ``residuals`` (r): smallest eigenvalue of (24) at
+    each vertex, recomputed with N scaled to the identity. The root of e' N^-1 e shrinks in each step at least by the
+    factor 1 - residual. ``radii`` (r): closed-loop spectral radii.
     """
 
     F: np.ndarray
@@ -87,7 +87,7 @@ class FeedbackGain:
     solver: SolverReport
 
     def report(self) -> dict[str, Any]:
-        """Return everything a stranger needs to check the gain, for JSON."""
+        """Return the numbers with which the gain can be checked independently, for JSON."""
         return {
             "method": self.method,
             "solver": self.solver.as_dict(),
@@ -106,17 +106,17 @@ def feedback_gain(
     input_scale: np.ndarray,
     method: str = "guaranteed_cost",
 ) -> FeedbackGain:
-    """Return F such that A_i + B_i F share one Lyapunov function (paper eq. 24), verified after solving.
+    """Return F such that all A_i + B_i F share one Lyapunov function (paper eq. 24), verified after solving.
 
     ``"guaranteed_cost"`` minimises a bound, common to all vertices, of the quadratic cost of the responses to the
     disturbance columns. ``"feasibility"`` is (24) as printed, which does not determine F; it is for studies only.
 
     Args:
-        A: (r, n, n) vertices.
-        B: (r, n, m) vertices.
-        disturbance: (n, d) columns whose response is to be cheap, SI per period.
-        state_scale: (n) deviations that weigh equally in the cost, SI.
-        input_scale: (m) inputs that weigh as much, SI.
+        A: (r, n, n) state matrices of the vertices.
+        B: (r, n, m) input matrices of the vertices.
+        disturbance: (n, d) disturbance columns whose responses cost, SI per period.
+        state_scale: (n) deviations that cost equally, SI.
+        input_scale: (m) inputs that cost as much, SI.
         method: ``"guaranteed_cost"`` or ``"feasibility"``.
 
     Raises:
@@ -180,7 +180,10 @@ _SEARCHES: dict[str, Callable[..., Found]] = {"guaranteed_cost": _guaranteed_cos
 
 @dataclass(frozen=True)
 class CommonLyapunov:
-    """e' N^-1 e decreases in every loop: ``N`` (n, n) SI, ``residuals`` (r) as in :func:`lyapunov_residuals`."""
+    """A Lyapunov function e' N^-1 e of r closed loops: ``N`` (n, n), SI, and its ``residuals`` (r).
+
+    The residuals are those of :func:`lyapunov_residuals`.
+    """
 
     N: np.ndarray
     residuals: np.ndarray
@@ -196,14 +199,14 @@ class CommonLyapunov:
 
 
 def common_lyapunov(closed_loop: np.ndarray, scale: np.ndarray, name: str) -> CommonLyapunov:
-    """Return the Lyapunov function e' N^-1 e common to all closed loops whose inequality (24) has the largest margin.
+    """Return a Lyapunov function e' N^-1 e common to all closed loops, with the largest margin in (24).
 
     The margin is recomputed after solving.
 
     Args:
         closed_loop: (r, n, n) discrete-time state matrices.
-        scale: (n) sizes of the states that count as equal, SI.
-        name: Name of what is certified, for the error message.
+        scale: (n) deviations of the states that weigh equally, SI.
+        name: Name of the certified result, for the error message.
 
     Raises:
         DesignError: No solution, or one that fails (24) when recomputed.

@@ -1,9 +1,9 @@
-"""The full-state feedback F' of the paper's section 4.3, and why it does not fly: it cancels the notch filter.
+"""The full-state feedback F' of the paper's section 4.3, and why it is not used: it cancels the notch filter.
 
-In the decoupled ECM the pitch rate is a combination of q' and the filter's states, q = (q' - C s) / D, and nothing in
-the model speaks against feeding it back. So the best full-state gain rebuilds it: its action on (q, s) is that of the
-gain on q, with next to nothing left on s, and the flexible modes, which the filter was there for, are excited again.
-With the filter's columns of F' at zero the feedback sees q' alone.
+The decoupled ECM, the model with the notch filter, contains the filtered pitch rate q' and the filter states s. The
+true pitch rate is q = (q' - C s) / D, and nothing in the model penalises its feedback. The best full-state gain
+therefore reconstructs q and feeds it back, almost without other use of s. This excites the flexible modes, which the
+filter is meant to remove. The structured gain of a design has zeros for the filter states: it feeds back q' only.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from hsv.model.trim import trim
 def full_state_report(
     inputs: DesignInputs, design: ControlDesign, whole: Polytope, columns: np.ndarray
 ) -> dict[str, Any]:
-    """Return the full-state and the structured gain, and the effect of each on the coupled vehicle, for JSON.
+    """Return the full-state gain, compared with the structured gain on the coupled vehicle, for JSON.
 
-    ``largest_real_part``: the rightmost pole (1/s) of the sampled loop around the coupled ECM in the target's trim, by
-    gain and set of inertial coupling; the tube factor is 1.
+    ``largest_real_part`` in it is the real part (1/s) of the rightmost closed-loop pole, for each gain and each set of
+    inertial coupling. The loop is sampled, with the coupled ECM at the target's trim, at the tube factor 1.
 
     Args:
         inputs: Scales and target of the design.
         design: Design with the structured gain.
-        whole: The co-designed polytopic model, filter states after the nine.
-        columns: (5, d) disturbances that the feedback is to reject, as for the structured gain.
+        whole: The co-designed polytopic model, with the filter states after the nine states of the vehicle.
+        columns: (5, d) disturbance columns for which the structured gain was computed.
 
     Raises:
         DesignError: No full-state gain.
