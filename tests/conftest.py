@@ -1,4 +1,4 @@
-"""For all tests."""
+"""Options, settings and fixtures of all tests."""
 
 from __future__ import annotations
 
@@ -14,40 +14,40 @@ from hypothesis import HealthCheck, settings
 if TYPE_CHECKING:
     from browser import Browser
 
-# Started in the background, a shell's child ignores SIGINT, and so would every process that a test interrupts.
+# Child processes inherit an ignored SIGINT from a shell that starts pytest in the background. Undo that for the tests.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# Neither an example nor the search for one has a time limit: other work on the machine must not fail a test.
+# No time limit on examples or on the search for them: other load on the machine must not fail a test.
 settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("busy")
 
-# Its assertions say what they found, as those of test modules do.
+# Assertions in this helper explain their failures like those of test modules.
 pytest.register_assert_rewrite("page_checks")
 
 PICTURES = Path(__file__).parents[1] / "docs" / "images"
-"""The pictures of the documentation."""
+"""Folder of the documentation's pictures."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options to make the documentation's pictures anew, and to say how much is fuzzed."""
+    """Add the options that renew the documentation's pictures and set the number of fuzzed files."""
     parser.addoption("--pictures", action="store_true", help="write what the browser shows to docs/images")
     parser.addoption("--fuzz-inputs", type=int, default=10_000, help="mutated files a reader, with -m fuzz")
 
 
 @pytest.fixture
 def pictures(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
-    """Return the folder for pictures of the documentation: its own if they are asked for."""
+    """Return the folder for pictures: that of the documentation with ``--pictures``, otherwise a temporary one."""
     return PICTURES if request.config.getoption("--pictures") else tmp_path
 
 
 MOST_WORKERS = 8
-"""Each may have a graph of six processes, of a tenth of a gigabyte each."""
+"""Limit on test processes: each may run a graph of six processes of 0.1 GB each."""
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Return how many processes test (``-n auto``): one for every core, and half as many again for graphs.
+    """Return the number of test processes (``-n auto``): one per core, and 1.5 per core for graph tests.
 
-    The nodes of a graph start one after the other and wait for one another.
+    The nodes of a graph spend much of their time waiting for one another.
     """
     cores = min(len(os.sched_getaffinity(0)), MOST_WORKERS)
     return cores + cores // 2 if config.getoption("markexpr").startswith("graph") else cores
@@ -55,7 +55,7 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 @pytest.fixture(scope="session")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """Return a browser that shows pages."""
+    """Return a browser for HTML pages, one for the whole session."""
     from browser import Browser
 
     browser = Browser(tmp_path_factory.mktemp("profile"))
@@ -65,7 +65,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 @pytest.fixture
 def screen(browser: Browser) -> Iterator[Callable[..., None]]:
-    """Emulate a screen for one test."""
+    """Return the function that emulates a screen; the emulation ends with the test."""
     yield browser.screen
     browser.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})

@@ -1,4 +1,4 @@
-"""Readers of bags that other people wrote: each gives topic, time in nanoseconds and message as plain data."""
+"""Independent readers of bags: each returns topic, time (ns) and message as plain data."""
 
 import json
 import math
@@ -47,11 +47,11 @@ READERS = [
     pytest.param(by_mcap_ros2, id="mcap-ros2-support"),
     pytest.param(by_foxglove, id="foxglove", marks=pytest.mark.viewer),
 ]
-"""For parametrized tests."""
+"""The readers, for parametrised tests."""
 
 
 def assert_equal(expected, actual):
-    """Assert that both read the same, whatever the order of topics; return the number of messages."""
+    """Assert that two readers return the same, except for the order of topics; return the number of messages."""
     first, second = (sorted(messages, key=lambda message: message[0]) for messages in (expected, actual))
     for message, other in zip(first, second, strict=True):
         assert _alike(list(message), list(other)), (message, other)
@@ -64,7 +64,7 @@ def _alike(a, b):
     if isinstance(a, list):
         return len(a) == len(b) and all(_alike(x, y) for x, y in zip(a, b, strict=True))
     if isinstance(b, str) and not isinstance(a, str):
-        # JSON lacks what is not finite, and integers of 64 bits.
+        # JSON has no NaN, no infinity and no 64-bit integers.
         b = float(b) if isinstance(a, float) else int(b)
     return bool(a == b) or (isinstance(a, float) and math.isnan(a) and math.isnan(b))
 

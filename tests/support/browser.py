@@ -1,4 +1,4 @@
-"""Headless Chromium, driven through chromedriver, as far as both are installed."""
+"""Headless Chromium, driven through chromedriver; a test is skipped if either is not installed."""
 
 import json
 import shutil
@@ -9,14 +9,14 @@ from bag_readers import NPM
 from waiting import wait_until
 
 AXE = NPM / "node_modules" / "axe-core" / "axe.min.js"
-"""What checks pages for barriers."""
+"""The axe-core script, which checks pages for accessibility barriers."""
 
 SETTLED = """
     if (!document.getElementById("library")) return true;
     window.report?.drawAll();
     return Boolean(window.own);
 """
-"""Whether everything is drawn, on a page that draws plots; what is out of sight is drawn now."""
+"""JavaScript: draw all plots, also those out of sight, and return whether all are drawn. True without plots."""
 
 HINT = "make test-viewers installs it"
 FLAGS = (
@@ -33,7 +33,7 @@ FLAGS = (
 
 
 class Browser:
-    """A browser with a profile of its own; pages are opened from files."""
+    """A browser with its own profile; it opens pages from files."""
 
     def __init__(self, profile):
         webdriver = pytest.importorskip("selenium.webdriver", reason=f"no selenium; {HINT}")
@@ -51,7 +51,7 @@ class Browser:
         self.driver.set_script_timeout(600)
 
     def open(self, page):
-        """Open a report; return the seconds until every plot was drawn."""
+        """Open a page from a file and return the seconds until every plot is drawn."""
         self.console()
         start = time.monotonic()
         self.driver.get(page.as_uri())
@@ -59,11 +59,11 @@ class Browser:
         return time.monotonic() - start
 
     def settle(self):
-        """Wait until nothing is left to draw."""
+        """Wait until all plots are drawn."""
         self.wait(SETTLED)
 
     def wait(self, script):
-        """Wait until JavaScript returns something true, as long as the browser works on it."""
+        """Wait until JavaScript returns a true value, as long as the browser makes progress."""
         wait_until(lambda: self.run(script), [self.driver.service.process.pid], pause=lambda _: time.sleep(0.05))
 
     def run(self, script, *arguments):
@@ -71,31 +71,31 @@ class Browser:
         return self.driver.execute_script(script, *arguments)
 
     def click(self, selector):
-        """Click on the first element and wait until the plots have followed."""
+        """Click on the first matching element and wait until the plots have been redrawn."""
         self.driver.find_element("css selector", selector).click()
         self.settle()
 
     def press(self, key):
-        """Press a key on the page itself, whatever has had the focus."""
+        """Press a key on the page, wherever the focus is."""
         self.run("document.activeElement.blur()")
         self.driver.find_element("css selector", "body").send_keys(key)
 
     def screen(self, width, scheme="light"):
-        """Emulate a screen of a width, in pixels, of someone who prefers a colour scheme."""
+        """Emulate a screen of this width (pixels) and a preference for a colour scheme."""
         size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
         features = [{"name": "prefers-color-scheme", "value": scheme}]
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": features})
 
     def picture(self, path):
-        """Save what the screen shows, without scroll bars."""
+        """Save a picture of the screen without scroll bars."""
         self.driver.execute_cdp_cmd("Emulation.setScrollbarsHidden", {"hidden": True})
         self.settle()
         self.driver.save_screenshot(str(path))
         self.driver.execute_cdp_cmd("Emulation.setScrollbarsHidden", {"hidden": False})
 
     def barriers(self):
-        """Return what axe-core finds wrong with the page, everything on it unfolded: rule and place."""
+        """Return rule and place of every barrier that axe-core finds, with all collapsed parts of the page expanded."""
         if not AXE.is_file():
             pytest.skip(f"no axe-core; {HINT}")
         self.run("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
@@ -106,15 +106,15 @@ class Browser:
         return [f"{rule['id']}: {node['target']}" for rule in found for node in rule["nodes"]]
 
     def console(self):
-        """Return what the console received since the last call."""
+        """Return the messages of the console since the last call."""
         return [entry["message"] for entry in self.driver.get_log("browser")]
 
     def requests(self):
-        """Return the addresses that were asked for since the last call."""
+        """Return the addresses that the page has requested since the last call."""
         events = [json.loads(entry["message"])["message"] for entry in self.driver.get_log("performance")]
         return [event["params"]["request"]["url"] for event in events if event["method"] == "Network.requestWillBeSent"]
 
     def media(self, **settings):
-        """Emulate a medium ("print") or features of one ("prefers-color-scheme")."""
+        """Emulate a medium ("print") or media features ("prefers-color-scheme")."""
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", settings)
         self.settle()

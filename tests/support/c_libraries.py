@@ -1,4 +1,4 @@
-"""Controllers in C, built for the tests with the header that is installed: shared libraries, and bare functions."""
+"""Controllers in C, compiled for the tests with the installed header: shared libraries, and single functions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FLAGS = ("-std=c99", "-D_POSIX_C_SOURCE=199309L", *WARNINGS, "-O2", "-ffp-contra
 
 
 def build_probe(folder: Path, *flags: str, name: str = "probe") -> Path:
-    """Build ``probe.c`` with more flags into a folder; return the library."""
+    """Compile ``probe.c`` with additional flags into a folder and return the library."""
     library = folder / f"{name}.so"
     command = ["cc", *FLAGS, *flags, f"-I{include_folder()}", "-shared", "-fPIC", "-o", library, PROBE]
     subprocess.run(command, check=True)
@@ -34,7 +34,7 @@ def _step_functions() -> ctypes.CDLL:
 
 
 def step_function(name: str) -> int:
-    """Return the address of a function of ``step_functions.c`` in this process."""
+    """Return the address, in this process, of a function of ``step_functions.c``."""
     address = ctypes.cast(getattr(_step_functions(), name), ctypes.c_void_p).value
     assert address is not None
     return address

@@ -1,4 +1,4 @@
-"""Copies of bags in which something is changed."""
+"""Changed copies of bags."""
 
 from types import MappingProxyType
 
@@ -6,7 +6,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.writer import BagWriter
 
 Messages = list[tuple[int, bytes]]
-"""Times in nanoseconds, and CDR."""
+"""Messages of a topic: time (ns) and CDR bytes."""
 
 
 def changed_bag(
@@ -17,7 +17,7 @@ def changed_bag(
     attachments=MappingProxyType({}),
     custom_data=MappingProxyType({}),
 ):
-    """Write ``source`` again to ``target`` with other topics, messages, attachments (None: without any) or data."""
+    """Copy ``source`` to ``target`` with changed topics, messages, attachments (None: no attachments) or data."""
     bag = Bag(source)
     changed = [(name, topics(topic)) for name, topic in bag.topics.items()]
     kept = {name: topic for name, topic in changed if topic}

@@ -1,4 +1,4 @@
-"""Steps of the core that have no public Python function, on arrays and on the data that the library makes."""
+"""Functions of the core that have no public Python function, called with arrays and the library's structs."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from hsv.core import Struct, doubles, ffi, lib, records, vector
 
 
 def written(function: Any, count: int, *arguments: Any) -> np.ndarray:
-    """Return the numbers that a ``function`` of the core writes to its last argument."""
+    """Return the ``count`` numbers that a ``function`` of the core writes to its last argument."""
     out = np.empty(count)
     function(*(doubles(vector(each)) if isinstance(each, np.ndarray) else each for each in arguments), doubles(out))
     return out
 
 
 def begin_faults(rows: Struct, step: int, seed: int) -> int:
-    """Note in the memory of ``rows`` which of them act in a step; return how many do."""
+    """Mark in ``rows`` which faults act in a step, and return their number."""
     return int(lib.hsv_begin_faults(rows.pointer, step, seed))
 
 
 def command_faults(rows: Struct, step: int, seed: int, command: Sequence[float]) -> np.ndarray:
-    """Return what reaches the actuators (2) of a ``command`` (2)."""
+    """Return the command (2) after the command-side faults ``rows``."""
     actuator = np.array(command, float)
     lib.hsv_apply_command_faults(rows.pointer, step, seed, doubles(actuator))
     return actuator
 
 
 def engine_faults(rows: Struct, step: int, seed: int, alpha: float, mach: float, fuel: float) -> np.ndarray:
-    """Return the factors of thrust, lift and drag and the increment of the moment coefficient (4)."""
+    """Return the factors on thrust, lift and drag and the increment of the moment coefficient (4) due to faults."""
     return written(lib.hsv_apply_engine_faults, 4, rows.pointer, step, seed, alpha, mach, fuel)
 
 
@@ -46,7 +46,7 @@ def move_effectors(
     alpha: float,
     length: float = 1.0,
 ) -> None:
-    """Move actuators (2, 2) and effectors (2) over ``length`` substeps, in place."""
+    """Move actuators (2, 2) and effectors (2), ``moved``, in place over ``length`` substeps."""
     state, effector = moved
     lib.hsv_move_effectors(
         data.pointer,
@@ -64,7 +64,7 @@ def move_effectors(
 def actuator_step(
     order: int, map: Sequence[float], state: Sequence[float], command: float, limits: Sequence[float], h: float
 ) -> np.ndarray:
-    """Return position, rate and mean position (3) ``h`` (s) after a ``state`` (position, rate).
+    """Return position, rate and mean position (3) of an actuator, ``h`` (s) after a ``state`` (position, rate).
 
     ``limits``: smallest and largest position, rate limit, acceleration limit.
     """
@@ -72,13 +72,13 @@ def actuator_step(
 
 
 def measure(sensors: Struct, memory: np.ndarray, rows: Struct, step: int, seed: int, x: np.ndarray) -> np.ndarray:
-    """Return the measurement (9) of the state ``x`` (9); ``memory`` is that of the sensors."""
+    """Return the measurement (9) of the state ``x`` (9); ``memory`` holds the state of the sensors."""
     known = records("hsv_sensor_memory", memory)
     return written(lib.hsv_measure, 9, sensors.pointer, known, rows.pointer, step, seed, x)
 
 
 def receive(link: Struct, memory: np.ndarray, step: int, seed: int, payload: np.ndarray) -> np.ndarray:
-    """Return the payload that the receiver has in a step in which ``payload`` is sent."""
+    """Return the payload that a link delivers in a step in which ``payload`` is sent."""
     taken = np.array(payload, float)
     sizes = len(memory), step, seed
     lib.hsv_receive(link.pointer, doubles(memory), *sizes, doubles(taken), len(taken))
@@ -88,18 +88,18 @@ def receive(link: Struct, memory: np.ndarray, step: int, seed: int, payload: np.
 def atmosphere_step(
     atmosphere: Struct, memory: np.ndarray, step: int, seed: int, altitude: float, speed: float
 ) -> np.ndarray:
-    """Return wind forward and up (m/s) and the relative density (3) of a period; ``memory`` is that of the air."""
+    """Return forward and upward wind (m/s) and relative density (3) of a period; ``memory`` holds the air's state."""
     given = doubles(memory), step, seed, altitude, speed
     return written(lib.hsv_atmosphere_step, 3, atmosphere.pointer, *given)
 
 
 def dryden_cross_map(r: float) -> np.ndarray:
-    """Return F (2, 2) and the factor l11, l21, l22 (7) of the turbulence across the path over r = V T / L."""
+    """Return F (2, 2) and the Cholesky factor l11, l21, l22 (7 numbers) of the vertical turbulence over r = V T / L."""
     return written(lib.hsv_dryden_cross_map, 7, r)
 
 
 def effectiveness_along(data: Struct, states: np.ndarray, inputs: np.ndarray) -> list[Effectiveness]:
-    """Return the effectiveness after each step of a flight with ``states`` (n, 9) and commanded ``inputs`` (n, 2)."""
+    """Return the effectiveness estimates after all steps of a flight: ``states`` (n, 9), commands ``inputs`` (n, 2)."""
     memory, known = tube_memory(), []
     for step, (x, u) in enumerate(zip(states, inputs, strict=True)):
         lib.hsv_effectiveness_step(data.pointer, records("hsv_tube_memory", memory), step, doubles(vector(x)))
@@ -109,19 +109,19 @@ def effectiveness_along(data: Struct, states: np.ndarray, inputs: np.ndarray) ->
 
 
 def sine_cosine(x: float) -> tuple[float, float]:
-    """Return the sine and the cosine of ``x`` (rad)."""
+    """Return the core's sine and cosine of ``x`` (rad)."""
     pair = ffi.new("double[2]")
     lib.hsv_sine_cosine(x, pair, pair + 1)
     return pair[0], pair[1]
 
 
 def philox(counter: Sequence[int], key: Sequence[int]) -> tuple[int, ...]:
-    """Return the four words of the ``counter`` (4) under the ``key`` (2)."""
+    """Return the four Philox words of the ``counter`` (4) under the ``key`` (2)."""
     words = ffi.new("uint64_t[4]")
     lib.hsv_philox(counter, key, words)
     return tuple(words)
 
 
 def actuator_map(order: int, frequency: float, damping: float, h: float) -> np.ndarray:
-    """Return the transition F11, F12, F21, F22 of position minus command, and rate, over ``h`` (s)."""
+    """Return F11, F12, F21, F22, the transition of position minus command and of the rate over ``h`` (s)."""
     return written(lib.hsv_actuator_map, 4, int(order), frequency, damping, h)

@@ -1,4 +1,4 @@
-"""Bags damaged at random: bits flipped, blocks zeroed, cut, doubled; and what must be found in them all the same."""
+"""Bags with random damage (flipped bits, zeroed, cut or doubled blocks), and the messages that must survive it."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk
 
 Messages = Counter[tuple[str, bytes]]
-"""Topic and data of every message."""
+"""How often each pair of topic and data occurs."""
 
 _FRAME = 9
-"""Bytes of opcode and length before the content of a record."""
+"""Bytes of opcode and length before the content of an MCAP record."""
 
 
 @dataclass(frozen=True)
 class Original:
-    """A whole bag: its bytes, those of every chunk, and the messages in each."""
+    """An undamaged bag: its bytes, the bytes of every chunk, and the messages of each chunk."""
 
     folder: Path
     data: bytes
@@ -37,11 +37,11 @@ class Original:
         return _together(self.chunks.values())
 
     def whole(self, damaged):
-        """Return the messages of all chunks that stand in ``damaged`` as they were written."""
+        """Return the messages of all chunks that ``damaged`` still contains unchanged."""
         return _together(messages for chunk, messages in self.chunks.items() if chunk in damaged)
 
     def defines(self, damaged):
-        """Return whether the definitions are whole somewhere: in the first chunk, or after the last."""
+        """Return whether ``damaged`` has a complete set of definitions: in the first chunk, or after the last one."""
         chunks = list(self.chunks)
         end = self.data.index(chunks[-1]) + len(chunks[-1])
         return chunks[0] in damaged or self.data[end:] in damaged
@@ -52,7 +52,7 @@ def _together(parts):
 
 
 def original(folder):
-    """Read a whole bag with the package's own readers."""
+    """Read an undamaged bag with the MCAP package's own readers."""
     data = next(folder.glob("*.mcap")).read_bytes()
     with next(folder.glob("*.mcap")).open("rb") as stream:
         reader = make_reader(stream)
@@ -73,7 +73,7 @@ def original(folder):
 
 
 def damaged(source, target, seed):
-    """Write the bag, damaged, to the directory ``target``; return what was done and the bytes that are left."""
+    """Write a damaged copy of the bag to the directory ``target``; return the kind of damage and the damaged bytes."""
     random = np.random.default_rng(seed)
     data = bytearray(source.data)
     kind = ("bits flipped", "block zeroed", "cut", "block doubled", "two damages")[seed % 5]
@@ -98,5 +98,5 @@ def damaged(source, target, seed):
 
 
 def found_in(bag):
-    """Return the messages that ``bag``, a :class:`hsv.bags.reader.Bag`, has found."""
+    """Return the messages that a :class:`hsv.bags.reader.Bag` finds."""
     return Counter((topic, data) for topic in bag.topics for _, data in bag.messages(topic))

@@ -1,7 +1,7 @@
-"""A program: fly scenarios and print, as JSON, what the flights come to and what they were flown on.
+"""A program that flies scenarios and prints, as JSON, their fingerprints and the software and processor used.
 
-Interpreters of every kind run it, emulated ones too, and all of them as ``python -S``: packages of the project's
-environment start Python again, and what an emulator has started would come back as a process of the machine itself.
+All kinds of interpreters, emulated ones too, run it as ``python -S``: packages of the project's environment start
+Python again, and under an emulator this second Python would be native.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ except ModuleNotFoundError:  # numpy 1.26
 
 
 def flown_on() -> dict[str, Any]:
-    """Return what the flights must not depend on: versions, processor, and the bits of libm and of BLAS."""
+    """Return versions, processor, and bits computed by libm and BLAS: flights must not depend on any of them."""
     points = np.linspace(0.1, 3.0, 2000)
     libm = [function(x) for function in (math.sin, math.cos, math.tan, math.exp, math.log) for x in points]
     matrix = np.sin(np.arange(64.0 * 64.0)).reshape(64, 64)
@@ -45,12 +45,12 @@ def flown_on() -> dict[str, Any]:
 
 
 def main(scenarios: list[str]) -> None:
-    """Fly ``scenarios`` and print them."""
+    """Fly ``scenarios`` and print the results."""
     fingerprints, seconds = {}, {}
     for name in scenarios:
         start = time.process_time()
         flight = fly(assemble_flight(load_scenario(name)))
-        flight_metrics(flight.data())  # what is said of a flight must be computable there, too
+        flight_metrics(flight.data())  # the metrics of a flight must be computable there, too
         fingerprints[name] = flight.fingerprint
         seconds[name] = round(time.process_time() - start, 2)
     json.dump({"flown on": flown_on(), "fingerprints": fingerprints, "seconds": seconds}, sys.stdout, indent=1)

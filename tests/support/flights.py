@@ -1,4 +1,4 @@
-"""The loop flown by its component objects, one step at a time: what the nodes do, without their messages."""
+"""The loop, flown step by step through its component objects, as the nodes do but without messages."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from hsv.flight.scenario import load_scenario
 
 
 def components(scenario: str = "case1", **changes: Any) -> Components:
-    """Return the parts of a shipped scenario's loop; changed parameters are written with __ for the dot."""
+    """Return the components of a shipped scenario; in names of changed parameters, __ stands for the dot."""
     changed = {name.replace("__", "."): value for name, value in changes.items()}
     return assemble(flight_parameters(load_scenario(scenario)) | changed)
 
 
 def step_by_step(parts: Components) -> dict[str, np.ndarray]:
-    """Fly ``parts`` to the end; return the histories (n + 1, ...) by the names of ``History``, and the statuses."""
+    """Fly ``parts`` to the end; return the statuses and the histories (n + 1, ...) by the names of ``History``."""
     rows = [
         {
             "state": signals.state,

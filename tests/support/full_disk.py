@@ -1,4 +1,4 @@
-"""A disk that is full, for this process alone."""
+"""A full disk, emulated for this process alone."""
 
 import resource
 import sys
@@ -7,9 +7,9 @@ from contextlib import contextmanager
 
 @contextmanager
 def files_no_larger_than(size):
-    """Let no file of this process grow beyond ``size`` bytes."""
+    """Limit the size of every file that this process writes to ``size`` bytes."""
     limits, written = resource.getrlimit(resource.RLIMIT_FSIZE), sys.dont_write_bytecode
-    # Python would cut the bytecode of what it imports meanwhile to that size, and later processes trip over it.
+    # Bytecode of modules imported meanwhile would be cut at this size, too, and break later processes.
     sys.dont_write_bytecode = True
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
     try:

@@ -1,4 +1,4 @@
-"""The tools of a full ROS 2 installation, where one is sourced: ros2 launch, bag, service, param, doctor."""
+"""Tools of a sourced full ROS 2 installation: ros2 launch, bag, service, param and doctor."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from waiting import wait_until
 from ros2 import real_command
 
 COMMANDS = ("launch", "bag", "service", "param", "doctor")
-"""What the tests need, in words of the ros2 command."""
+"""The subcommands of ros2 that the tests need."""
 
 
 @cache
 def missing() -> str:
-    """Return why the tests of these tools cannot run here, in words; empty where they can."""
+    """Return why the tests of these tools cannot run here; empty if they can."""
     command = real_command()
     if command is None:
         return "no full ROS 2 installation is sourced: there is no ros2 but that of .venv"
@@ -34,13 +34,13 @@ def missing() -> str:
 
 
 def needs_full_installation() -> None:
-    """Skip the test where there is none."""
+    """Skip the test if a tool is missing."""
     if reason := missing():
         pytest.skip(reason)
 
 
 class Terminal:
-    """A command in a terminal of its own, where Ctrl-C reaches all its processes at once, as a person's does."""
+    """A command in its own terminal, where Ctrl-C reaches all its processes at once, as for a user."""
 
     def __init__(self, command: list[str], environment: dict[str, str], folder: Path) -> None:
         self.pid, self._terminal = pty.fork()
@@ -51,7 +51,7 @@ class Terminal:
         self.code: int | None = None
 
     def wait(self, done: Callable[[], object]) -> None:
-        """Wait until ``done`` returns something true, or the command has ended."""
+        """Wait until ``done`` returns a true value or the command has ended."""
         wait_until(lambda: done() or self.code is not None, [self.pid], pause=self._read)
 
     def interrupt(self) -> None:
@@ -65,7 +65,7 @@ class Terminal:
         return self.code
 
     def stop(self) -> None:
-        """End what still runs."""
+        """Kill the processes that still run."""
         if self.code is None:
             os.killpg(self.pid, signal.SIGKILL)
             self.exit_code()
@@ -75,5 +75,5 @@ class Terminal:
         if select.select([self._terminal], [], [], seconds)[0]:
             try:
                 self.output += os.read(self._terminal, 65536).decode(errors="replace")
-            except OSError:  # nobody has the other end any more
+            except OSError:  # no process has the other end open any more
                 self.code = os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])

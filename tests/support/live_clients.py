@@ -1,4 +1,4 @@
-"""Clients of the live view, on another WebSocket library than the servers': one for each of the two protocols."""
+"""Clients of the live view for both of its protocols, with another WebSocket library than the server's."""
 
 import json
 import re
@@ -12,21 +12,21 @@ from websocket import WebSocketException, create_connection
 from hsv.bags.description import TOPICS, resolved
 
 _MESSAGE = struct.Struct("<BIQ")
-"""Of foxglove.sdk.v1: 1 for message data, number of the subscription, log time (ns); the message follows."""
+"""Head of a foxglove.sdk.v1 message: 1 for message data, number of the subscription, log time (ns)."""
 
 LATER = 60.0
-"""Seconds without anything at all after which a client gives up."""
+"""Seconds without data after which a client gives up."""
 
 
 class FoxgloveClient:
-    """Subscribes every topic of a server that speaks ``foxglove.sdk.v1``, and keeps what comes until it is left."""
+    """A client that subscribes to every topic of a ``foxglove.sdk.v1`` server and keeps all messages."""
 
     def __init__(self, port, *, reads=True):
         self._socket = create_connection(f"ws://127.0.0.1:{port}", LATER, subprotocols=["foxglove.sdk.v1"])
         self.protocol = self._socket.getsubprotocol()
         self.channels = {}
         self.messages = defaultdict(list)
-        """Log time (ns) and bytes, by topic."""
+        """Log times (ns) and bytes of the messages by topic."""
         self._thread = threading.Thread(target=self._read, daemon=True)
         while not self.channels:
             self._take(self._socket.recv())
@@ -34,11 +34,11 @@ class FoxgloveClient:
             self._thread.start()
 
     def wait(self):
-        """Wait until the server has left."""
+        """Wait until the server has closed the connection."""
         self._thread.join()
 
     def leave(self):
-        """Leave without a word."""
+        """Close the socket without a closing handshake."""
         self._socket.sock.close()
 
     def _read(self):
@@ -46,7 +46,7 @@ class FoxgloveClient:
             while data := self._socket.recv():
                 self._take(data)
         except (WebSocketException, OSError):
-            pass  # the server has left
+            pass  # the server has closed the connection
 
     def _take(self, data):
         if isinstance(data, bytes):
@@ -62,10 +62,10 @@ class FoxgloveClient:
 
 
 class PageClient:
-    """Does what the page does: gathers rows and status, asks, and waits for the answers."""
+    """A client that acts as the live page does: it collects rows and status, sends commands and waits for answers."""
 
     def __init__(self, url, *, origin="", token=None):
-        """Connect to the page of an address as the start prints it; without an ``origin``, as that page itself."""
+        """Connect to the page at the printed address; an empty ``origin`` means that of the page itself."""
         found = re.fullmatch(r"(http://([^/]+))/#token=(.+)", url)
         assert found, url
         self.token = found[3] if token is None else token
@@ -81,15 +81,15 @@ class PageClient:
 
     @property
     def data(self):
-        """All rows, one after the other."""
+        """The bytes of all rows received so far."""
         return b"".join(self._blocks)
 
     def times(self, columns):
-        """Return the times (s) of the rows, of so many columns beside the time."""
+        """Return the times (s) of all rows; a row has the time and ``columns`` more numbers."""
         return np.frombuffer(self.data, "<f4").reshape(-1, 1 + columns)[:, 0]
 
     def read(self):
-        """Take the next message; return whether there was one."""
+        """Receive the next message; return False if the connection is closed."""
         try:
             data = self._socket.recv()
         except (WebSocketException, OSError):
@@ -110,11 +110,11 @@ class PageClient:
         return True
 
     def ask(self, command, **fields):
-        """Return the answer to a command."""
+        """Send a command and return the answer to it."""
         return self.send(json.dumps({"id": 1, "token": self.token, "command": command, **fields}))
 
     def send(self, text):
-        """Return the answer to a request, whatever it is."""
+        """Send any text and return the answer to it."""
         self._socket.send(text)
         before = len(self.answers)
         while len(self.answers) == before:
@@ -122,19 +122,19 @@ class PageClient:
         return self.answers[-1]
 
     def leave(self):
-        """Leave without a word."""
+        """Close the socket without a closing handshake."""
         self._socket.sock.close()
 
 
 def addresses(text):
-    """Return the address of the page and the port for Foxglove, of what the start has printed."""
+    """Return the page's address and the Foxglove port from the printed text."""
     page, data = re.search(r"live page: (\S+)", text), re.search(r"live data: ws://127\.0\.0\.1:(\d+)", text)
     assert page and data, text
     return page[1], int(data[1])
 
 
 def assert_as_recorded(client, bag):
-    """Every step topic has messages of the bag, byte by byte and in its order; a client that is slow may miss some."""
+    """Assert that the messages of every step topic are in the bag, byte for byte and in order; some may be missing."""
     for topic in TOPICS:
         received = client.messages[resolved(topic)]
         recorded = dict(bag.messages(topic))
@@ -144,10 +144,10 @@ def assert_as_recorded(client, bag):
 
 
 def assert_without_gap(client, bag):
-    """Every step topic has what the bag has, byte by byte, from the time on at which the client was there."""
+    """Assert that every step topic has all messages of the bag, byte for byte, from the client's first one on."""
     for topic in TOPICS:
         recorded = list(bag.messages(topic))
         received = client.messages[resolved(topic)]
-        # Nobody waits for a client: on a busy machine the flight may have begun before it.
+        # The flight does not wait for a client, so on a busy machine it may have begun earlier.
         assert len(received) > len(recorded) // 2, topic
         assert received == recorded[-len(received) :], topic

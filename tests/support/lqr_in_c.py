@@ -1,4 +1,4 @@
-"""The regulator of examples/lqr with its step as a function in C, given to the bench by its address."""
+"""The regulator of examples/lqr, whose step is a C function that the bench calls by its address."""
 
 import numpy as np
 from c_libraries import step_function

@@ -1,4 +1,4 @@
-"""Mutations of files: bits flipped, blocks cut and doubled, lines moved, keys and values replaced, deep nesting."""
+"""Mutated files: flipped bits, cut and doubled blocks, moved lines, replaced keys and values, deep nesting."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _VALUES = (
 
 
 _SHOWN = 60
-"""Bytes shown of a mutated file where it first differs."""
+"""Number of bytes shown of a mutated file, from the first difference on."""
 
 
 @dataclass(frozen=True)
 class Mutated:
-    """A mutated file, and what was done to it."""
+    """A mutated file and the description of its mutations."""
 
     data: bytes
     source: bytes
@@ -43,7 +43,7 @@ class Mutated:
 
 
 def mutated(*sources: bytes) -> st.SearchStrategy[Mutated]:
-    """Return what draws one of the files ``sources`` after one to four mutations."""
+    """Return a strategy that draws one of the files ``sources`` with one to four mutations."""
 
     @st.composite
     def draw_one(draw: st.DrawFn) -> Mutated:

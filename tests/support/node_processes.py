@@ -1,4 +1,4 @@
-"""Real node processes for the graph tests: starting, finding and ending them."""
+"""Real node processes for the graph tests: starting, finding and stopping them."""
 
 import signal
 import subprocess
@@ -45,7 +45,7 @@ def short_scenario(folder, duration=5, fault=3, coupling="paper_like", notch=Tru
 
 
 class Processes:
-    """Starts processes and leaves none behind."""
+    """A starter of processes, which can also stop all that it has started."""
 
     def __init__(self, environment, folder):
         self.environment = environment
@@ -72,7 +72,7 @@ class Processes:
         return subprocess.CompletedProcess(popen.args, popen.returncode, output)
 
     def stop(self):
-        """End what still runs."""
+        """Stop the processes that still run."""
         for number in (signal.SIGINT, signal.SIGKILL):
             running = [popen for popen in self._started if popen.poll() is None]
             for popen in running:
@@ -82,15 +82,15 @@ class Processes:
 
 
 def recorded_steps(bag):
-    """Return how many steps are on the disk."""
+    """Return the number of steps that a bag has on disk."""
     try:
         return len(Bag(bag).times("hsv/state"))
     except RecordingError:
-        return 0  # not begun yet
+        return 0  # the bag does not exist yet
 
 
 def fly_until(flight, bag, steps):
-    """Wait until so many steps of a flight are on the disk.
+    """Wait until ``steps`` steps of a flight are on disk.
 
     Raises:
         AssertionError: The flight has ended before.
@@ -115,10 +115,10 @@ def children(pid):
 
 
 def last_line(done):
-    """Return the last line that a command has printed; those before tell for whom it waited.
+    """Return the last printed line of a command.
 
-    Or that Fast DDS takes another port of its shared memory: the names of these are the same in all domains of a
-    machine, and another process may hold one just then.
+    Earlier lines may report waiting, or that Fast DDS takes another port of its shared memory. The names of these ports
+    are the same in all domains of a machine, and another process may hold one.
     """
     *before, last = done.stdout.splitlines()
     others = [line for line in before if "Failed init_port fastrtps_port" not in line]

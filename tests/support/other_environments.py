@@ -1,4 +1,4 @@
-"""Flying in another process: another Python or packages, another processor, or other choices that libraries make."""
+"""Flights in another process: with another Python, other packages, another processor, or other library settings."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = Path(__file__).with_name("flight_fingerprints.py")
 VARIANTS = "case1_derived", "case1_rmpc", "case1_tube_dm", "case1_integral_heavy", "case2_derived"
 SCENARIOS = ("case1", "case2", "winged_cone", *VARIANTS)
-"""Structures, models and couplings of the vehicle, every law that solves no problem in flight, commands and faults."""
+"""Together: every vehicle structure, model and coupling, commands, faults, and every law without a solver in flight."""
 
 
 def fly(environment: Environment | None = None, **variables: str) -> dict[str, Any]:
-    """Fly all of :data:`SCENARIOS`; return what :mod:`flight_fingerprints` prints.
+    """Fly all of :data:`SCENARIOS` in a new process; return what :mod:`flight_fingerprints` prints.
 
     Args:
-        environment: The Python to fly on; the project's own where none is given.
-        variables: Environment variables over the plain ones: nothing of this process' environment is handed on.
+        environment: The Python to fly with; by default the project's own.
+        variables: Environment variables in addition to a minimal set; those of this process are not inherited.
 
     Raises:
-        AssertionError: The program failed; with what it said.
+        AssertionError: The program failed; the message has its output.
     """
     chosen = environment or own()
     plain = {
@@ -47,7 +47,7 @@ def fly(environment: Environment | None = None, **variables: str) -> dict[str, A
 
 
 def changed_flights(report: dict[str, Any]) -> dict[str, str]:
-    """Return, of what :func:`fly` returns, the fingerprints that are not those published for these designs."""
+    """Return the fingerprints in a report of :func:`fly` that differ from those published for these designs."""
     changed = {}
     for name in SCENARIOS:
         found, scenario = report["fingerprints"][name], load_scenario(name)

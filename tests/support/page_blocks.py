@@ -1,4 +1,4 @@
-"""Blocks of code on pages of the documentation: fenced ones, and indented ones as most pages have them."""
+"""Code blocks on pages of the documentation: fenced blocks, and indented blocks, which most pages have."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PAGES = sorted(
         check=True,
     ).stdout.split()
 )
-"""All pages of the repository, from its root."""
+"""The paths of all pages, relative to the root of the repository."""
 
 _FENCED = re.compile(r"^```(\S*)[^\n]*\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _INDENTED = re.compile(r"(?:^    .*\n)(?:^    .*\n|^\n(?=    ))*", re.MULTILINE)
@@ -25,29 +25,29 @@ _FILE = re.compile(r"# (\S+\.(?:toml|py))\n")
 
 
 class Block(NamedTuple):
-    """A block: its language, empty if none is named, and what it holds."""
+    """A code block: its language, empty if not named, and its text."""
 
     language: str
     text: str
 
     @property
     def first_line(self):
-        """Its first line, without a remark behind ``#``."""
+        """The first line, without a comment that begins with ``#``."""
         return re.sub(r"\s+#\s.*$", "", self.text.partition("\n")[0])
 
     @property
     def file(self):
-        """Name of the file that the page tells to save it as: that in its first line."""
+        """The file name in the first line, under which the page tells the reader to save the block."""
         return match[1] if (match := _FILE.match(self.text)) else None
 
 
 def blocks(page, language=""):
-    """Return the fenced blocks of a page, in order, all or those of one language."""
+    """Return the fenced blocks of a page in order, all of them or only those of a language."""
     text = (ROOT / page).read_text(encoding="utf-8")
     return [found for found in map(Block._make, _FENCED.findall(text)) if language in ("", found.language)]
 
 
 def indented(page):
-    """Return the indented blocks of a page, in order, without their indentation."""
+    """Return the indented blocks of a page in order, without their indentation."""
     text = _FENCED.sub("", (ROOT / page).read_text(encoding="utf-8"))
     return [Block("", re.sub("^    ", "", match[0], flags=re.MULTILINE)) for match in _INDENTED.finditer(text)]

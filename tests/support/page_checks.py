@@ -1,4 +1,4 @@
-"""What holds of every page in the browser, whatever it shows."""
+"""Browser tests that every HTML page must pass."""
 
 import base64
 from collections.abc import Callable
@@ -8,9 +8,9 @@ import pytest
 Show = Callable[[], None]
 
 WIDTHS = (1280, 400)
-"""Of a laptop and of a telephone, pixels."""
+"""Widths of a laptop's and a phone's screen (pixels)."""
 
-# On a wide screen no table goes on beyond its edge either, but for matrices, which open in a place of their own.
+# JavaScript: the tables that need scrolling, which a wide screen must not have. Wide matrices are exempt.
 BEYOND = """
     const all = [...document.querySelectorAll(".scroll:not(:has(.matrix))")];
     return all.filter((each) => each.scrollWidth > each.clientWidth).map((each) => each.ariaLabel);
@@ -24,7 +24,7 @@ WIDE_PLOTS = """
 
 
 class PageChecks:
-    """Of the page that a module's fixture ``show`` opens, which shows it on whatever screen there is."""
+    """Tests of the page that a module's fixture ``show`` opens on the emulated screen."""
 
     @pytest.mark.parametrize("scheme", ["light", "dark"])
     @pytest.mark.parametrize("width", WIDTHS)

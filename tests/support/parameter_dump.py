@@ -1,4 +1,4 @@
-"""Script of a process of its own, DIRECTORY NODE [NODE...]: writes parameters as ``ros2 param dump`` does."""
+"""A script, called with DIRECTORY NODE [NODE...], that writes parameters as ``ros2 param dump`` does."""
 
 import sys
 from pathlib import Path
@@ -10,7 +10,7 @@ from rclpy.parameter import parameter_value_to_python
 
 
 def dump(node, name):
-    """Return the parameters of node ``name`` (its full name) in the form of the genuine command."""
+    """Return the parameters of node ``name`` (full name) in the format of ``ros2 param dump``."""
 
     def call(kind, service, request):
         client = node.create_client(kind, f"{name}/{service}")

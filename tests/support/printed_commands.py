@@ -1,4 +1,4 @@
-"""The commands that the documentation prints: lines of indented blocks, and spans of code that are whole commands."""
+"""The commands printed in the documentation: lines of indented blocks, and inline code that is a complete command."""
 
 import re
 import shlex
@@ -9,14 +9,14 @@ PROGRAMS = ("cd", "fastdds", "hsv", "hsv-paper", "make", "mkdir", "plotjuggler",
 _BLOCK = re.compile(r"^    (\S.*)$", re.MULTILINE)
 _SPAN = re.compile(r"`([^`\n]+)`")
 _PLACEHOLDER = re.compile(r"\b(?!UTC)[A-Z]{3,}\b|\.\.\.$")
-"""Of a form, not of a command."""
+"""A placeholder, which makes a line a syntax description instead of a command."""
 
 
 def printed(page):
-    """Return the commands of a page, in order, each once, without what is said about them behind ``#``."""
+    """Return the distinct commands of a page in order, without comments that begin with ``#``."""
     text = re.sub(r"^```.*?^```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
     found = [(match.start(), _without_remark(match.group(1))) for match in _BLOCK.finditer(text)]
-    # A name of a command, such as `hsv run`, is none with nothing to run it on.
+    # The mere name of a command, such as `hsv run`, does not count.
     spans = [match for match in _SPAN.finditer(text) if not _PLACEHOLDER.search(match.group(1))]
     found += [(match.start(), match.group(1)) for match in spans if _whole(match.group(1).split())]
     commands = [command for _, command in sorted(found) if _program(command) in PROGRAMS]
@@ -24,7 +24,7 @@ def printed(page):
 
 
 def the_printed(page, beginning):
-    """Return the one command of ``page`` that begins so."""
+    """Return the one command of ``page`` with this ``beginning``."""
     [command] = [command for command in printed(page) if command.startswith(beginning)]
     return command
 
@@ -38,7 +38,7 @@ def _without_remark(line):
 
 
 def _program(command):
-    whole = command.count("'") % 2 == 0 and not command.endswith("\\")  # else it goes on in the next line
+    whole = command.count("'") % 2 == 0 and not command.endswith("\\")  # else it continues in the next line
     words = shlex.split(command, comments=False) if whole else command.split()
     while words and re.fullmatch(r"[A-Z_]+=\S*", words[0]):
         words.pop(0)

@@ -1,8 +1,8 @@
-"""The published model once more, written from the papers in their own units: a second opinion on ``hsv.model``.
+"""An independent implementation of the published model, in the papers' units, to check ``hsv.model``.
 
-Parker et al., J. Guid. Control Dyn. 30(3), 2007 (numbers); equations (1)-(3) of the paper. ft, slug, lbf, s, rad, in
-extended precision. The pitch acceleration is found first here, the elastic ones from it: another order than in the
-library.
+Parker et al., J. Guid. Control Dyn. 30(3), 2007 (numbers); equations (1)-(3) of the paper. Units: ft, slug, lbf, s,
+rad; extended precision. Here the pitch acceleration is solved for first and the elastic accelerations follow; the
+library does not use this order.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 FOOT = 0.3048
 SLUG = 4.4482216152605 / FOOT
-"""kg"""
+"""One slug in kg."""
 
 DERIVED = (-401.9, 297.4)
 PAPER_LIKE = (-100.475, 74.35)
@@ -50,7 +50,7 @@ def elastic_forces(x: np.ndarray, u: np.ndarray) -> tuple[float, float]:
 
 
 def derivative(x: np.ndarray, u: np.ndarray, psi: tuple[float, float]) -> np.ndarray:
-    """Return dx/dt, equation (1), published units; x (9), u (2) may be of extended precision."""
+    """Return dx/dt of equation (1) in the papers' units; x (9) and u (2) may have extended precision."""
     _, v, a, theta, q, e1, r1, e2, r2 = x
     lift, drag, thrust, moment = forces(x, u)
     n1, n2 = elastic_forces(x, u)
@@ -74,7 +74,7 @@ def derivative(x: np.ndarray, u: np.ndarray, psi: tuple[float, float]) -> np.nda
 
 
 def jacobian(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray:
-    """Return df/dx by central differences of extended precision, extrapolated twice (Richardson)."""
+    """Return df/dx by central differences in extended precision, extrapolated twice (Richardson)."""
     columns = []
     for j, value in enumerate(x):
         table = []

@@ -1,4 +1,4 @@
-"""The outcome of a command that a test has run in this process."""
+"""The outcome of a command that a test runs in this process."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass
 class Ran:
-    """A command that has ended: what it printed and its exit code."""
+    """A finished command: its output and its exit code."""
 
     out: str
     err: str
@@ -20,7 +20,7 @@ class Ran:
 
     @property
     def error(self):
-        """The one line of an error; nothing else may have been printed."""
+        """The one line of an error message; the command must have printed nothing else."""
         assert self.err.startswith("hsv: error: "), self.err
         assert self.err.endswith("\n")
         lines = self.err.splitlines()

@@ -1,4 +1,4 @@
-"""Changes of Case 1 that give it, for a few seconds, actuators, sensors, air, links and faults that are not ideal."""
+"""Changes to Case 1 that shorten it and add imperfect actuators, sensors, air, links and faults."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ AIR = {
 
 
 def faults(*rows: dict[str, Any]) -> dict[str, Any]:
-    """Return the table of these faults, which begin after one second unless they say otherwise."""
+    """Return a table of these faults, which begin after one second unless a row says otherwise."""
     return {"fault": [{"start": "1 s", **row} for row in rows]}
 
 
@@ -70,11 +70,11 @@ RANDOM = (
 _FAULTS = {"fault": [row for hardware in HARDWARE.values() for row in hardware.get("fault", ())]}
 HARDWARE["everything"] = ACTUATORS | SENSORS | AIR | LINKS | _FAULTS
 HARDWARE["everything estimated"] = ACTUATORS | ESTIMATOR | AIR | LINKS | _FAULTS
-"""By name."""
+"""Changes to Case 1, by name."""
 
 
 def scenario_file(folder: Path, name: str, **changes: Any) -> Path:
-    """Write Case 1 with this hardware to a scenario, and return its path."""
+    """Write a scenario file, Case 1 with this hardware, and return its path."""
     path = folder / f"{name.replace(' ', '_')}.toml"
     path.write_text(tomli_w.dumps({"extends": "case1"} | SHORT | HARDWARE[name] | changes))
     return path

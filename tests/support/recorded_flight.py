@@ -1,4 +1,4 @@
-"""A bag as `hsv run` leaves it, flown in this process: the graph's own processes, messages and parameters."""
+"""A bag as `hsv run` leaves it, but flown in this process, with the graph's processes, messages and parameters."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ NOTHING = {}
 
 
 def message_types():
-    """Return the message types of ROS 2 and ours."""
+    """Return the message types of ROS 2 and of this project."""
     store = get_typestore(Stores.ROS2_JAZZY)
     types = {}
     for path in sorted(MESSAGES.glob("*.msg")):
@@ -34,15 +34,15 @@ def message_types():
 
 
 def record_flight(directory, scenario="case1", duration=20.0, fault=8.0, log=(), in_flight=NOTHING, **changes):
-    """Fly a shipped scenario, shortened, and record it to a new bag.
+    """Fly a shortened shipped scenario and record it to a new bag.
 
     Args:
         directory: The bag.
         scenario: A scenario of 200 s whose fault begins at 100 s.
         duration: Its new duration (s).
         fault: The new start of its fault (s).
-        log: Time, level and text of lines that tube_mpc says in flight, on /rosout and /diagnostics.
-        in_flight: By step: what is done to the fault injector before it.
+        log: Time, level and text of lines that tube_mpc logs, on /rosout and /diagnostics.
+        in_flight: Changes of the fault injector in flight, by the step before which they act.
         changes: Changed parameters of the design, written with __ for the dot.
     """
     text = scenario_text(scenario).replace('"200 s"', f'"{duration} s"').replace('"100 s"', f'"{fault} s"')
@@ -70,7 +70,7 @@ def record_flight(directory, scenario="case1", duration=20.0, fault=8.0, log=(),
 
 
 def _injected(values, in_flight):
-    """Return the fault parameters of a flight in which something was done to the fault injector."""
+    """Return the fault parameters of a flight after changes of the fault injector in flight."""
     injector = FaultInjector.from_parameters(values)
     for step in range(max(in_flight, default=0) + 1):
         if step in in_flight:

@@ -1,11 +1,11 @@
-"""A ROS domain that nobody else on this machine has: not other tests, not a user, not a process left over.
+"""A ROS domain that no other process on this machine uses: no other test, no user, no process left over.
 
 Domain d has the UDP ports from 7400 + 250 d on: two for discovery by multicast, then two for every participant
-(DDSI-RTPS 2.5, section 9.6.2.3). A test takes the domain by binding the TCP port of the first number, which DDS does
-not use: one process at a time can, and it is free again however that process ends. Besides, the UDP ports of the domain
-must all be free, and the name that ``hsv run`` binds: a domain in which somebody flies is passed over. Domain 100 is
-the last whose ports lie below those that Linux hands out by itself, from 32768 on; the low domains are left to people,
-who choose them by hand.
+(DDSI-RTPS 2.5, section 9.6.2.3). A test claims a domain by binding the TCP port with the first of these numbers, which
+DDS does not use. Only one process at a time can, and the port is free again however the process ends. In addition, all
+UDP ports of the domain and the name that ``hsv run`` binds must be free, so that a domain with a flight is skipped.
+Domain 100 is the last whose ports lie below 32768, where the ports begin that Linux assigns by itself. The low domains
+are left to users, who choose them by hand.
 """
 
 import os
@@ -14,20 +14,20 @@ from contextlib import ExitStack, contextmanager
 
 DOMAINS = range(100, 40, -1)
 PARTICIPANTS = 32
-"""More than two graphs with all that listen to them."""
+"""Maximum number of participants: more than two graphs and their listeners need."""
 
 
 def first_port(domain):
-    """Return the first of the ports of a ROS domain."""
+    """Return the number of the first port of a ROS domain."""
     return 7400 + 250 * domain
 
 
 @contextmanager
 def own_domain():
-    """Yield the number of a domain that is nobody else's while the block runs.
+    """Yield the number of a domain that no other process uses while the block runs.
 
     Raises:
-        RuntimeError: All are taken.
+        RuntimeError: All domains are taken.
     """
     for domain in DOMAINS:
         with ExitStack() as held:
@@ -43,13 +43,13 @@ def own_domain():
 
 @contextmanager
 def own_environment():
-    """Yield the environment of processes on such a domain, on this machine only."""
+    """Yield an environment for processes on such a domain, limited to this machine."""
     with own_domain() as domain:
         yield os.environ | {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
 
 def look_for_others(domain):
-    """Raise an OSError if a participant or ``hsv run`` is on the domain."""
+    """Raise an OSError if a participant or ``hsv run`` uses the domain."""
     with ExitStack() as tried:
         tried.enter_context(_bound(socket.AF_UNIX, socket.SOCK_DGRAM, f"\0hsv_domain_{domain}"))
         for port in range(first_port(domain) + 10, first_port(domain) + 10 + 2 * PARTICIPANTS):

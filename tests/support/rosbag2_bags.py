@@ -1,4 +1,4 @@
-"""Copies of bags as the tools of rosbag2 write them: recorded at wall time, split, compressed, converted."""
+"""Copies of bags in the form that rosbag2's tools write: recorded at wall time, split, compressed, converted."""
 
 from collections.abc import Callable, Sequence
 
@@ -11,12 +11,12 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StorageP
 from rosbags.rosbag2 import Writer as RosbagsWriter
 
 WALL_TIME = 1_795_000_000 * 10**9
-"""Nanoseconds since 1970 at which a recording begins."""
+"""Wall time at which a recording begins, nanoseconds since 1970."""
 
 COMPRESS = {"": bytes, "zstd": zstandard.ZstdCompressor().compress, "lz4": lz4.frame.compress}
 
 Stored = Callable[[list[tuple[str, int]]], Sequence[int]]
-"""From topics and log times of the source to the rows that are recorded, in the order in which they are stored."""
+"""Maps (topic, log time) of all source messages to the indices of those that are stored, in their order."""
 
 
 def everything(messages):
@@ -28,34 +28,34 @@ def out_of_order(messages):
 
 
 def wall_times(count, begin):
-    """Return when so many messages of a flight are received from ``begin`` on: in their order, and unevenly."""
+    """Return ``count`` times (ns) at which messages are received from ``begin`` on: increasing and uneven."""
     passed = np.cumsum(np.random.default_rng(5).integers(1_000, 4_000_000, count))
     return np.uint64(begin) + passed.astype(np.uint64)
 
 
 NUMBERS = {"keep_last": 1, "reliable": 1, "transient_local": 1, "volatile": 2, "automatic": 1}
-"""Numbers that rosbag2 of Humble and Iron writes for the words of a quality of service."""
+"""The numbers that rosbag2 of Humble and Iron writes for the words of a QoS profile."""
 
 
 def numbered(profiles):
-    """Return the profiles of a topic as Humble and Iron write them."""
+    """Return the QoS profiles of a topic as Humble and Iron write them."""
     return [{key: NUMBERS.get(str(value), value) for key, value in profile.items()} for profile in profiles]
 
 
 def recorded(
     source, target, *, files=1, compressed="", chunks=CompressionType.NONE, stored=everything, begin=WALL_TIME, qos=list
 ):
-    """Write ``source`` as ``ros2 bag record`` does: no attachments, no checksums, log time is the wall's.
+    """Write ``source`` as ``ros2 bag record`` does: no attachments, no checksums, wall time as log time.
 
     Args:
         source: A bag of one file.
         target: Bag directory to write.
-        files: Number of files into which it is split.
-        compressed: What is compressed and how, such as ``file zstd`` or ``message lz4``.
-        chunks: How MCAP itself compresses.
-        stored: Which messages are stored, and in which order.
-        begin: Log time of the wall at which the recording begins; None for the log times of the source.
-        qos: Changes the profiles of a topic.
+        files: Number of files into which the copy is split.
+        compressed: Mode and format of rosbag2's compression, such as ``file zstd`` or ``message lz4``.
+        chunks: Compression of MCAP chunks.
+        stored: Selects the stored messages and their order.
+        begin: Wall time (ns) at which the recording begins; None keeps the log times of the source.
+        qos: Function that changes the QoS profiles of a topic.
     """
     mode, _, compression = compressed.partition(" ")
     with Reader(source) as reader:
@@ -101,7 +101,7 @@ def recorded(
 
 
 def converted(source, target, mode=CompressionMode.NONE):
-    """Convert a bag with the ``rosbags`` package, which keeps messages and nothing else."""
+    """Convert a bag with the ``rosbags`` package, which keeps only the messages."""
     writer = RosbagsWriter(target, version=9, storage_plugin=StoragePlugin.MCAP)
     writer.set_compression(mode, CompressionFormat.ZSTD)
     with Reader(source) as reader, writer:

@@ -1,4 +1,4 @@
-"""Campaigns of short flights."""
+"""Fixtures with campaigns of short flights."""
 
 import pytest
 from node_processes import short_scenario
@@ -18,7 +18,7 @@ def short(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def planned(short):
-    """Plan a campaign of short flights."""
+    """Return a planned campaign of short flights."""
 
     def make(**settings):
         return plan(
@@ -31,7 +31,7 @@ def planned(short):
 
 @pytest.fixture(scope="session")
 def results(planned, tmp_path_factory):
-    """Return the results of a campaign that nothing disturbed."""
+    """Return the results of an undisturbed campaign."""
     out = tmp_path_factory.mktemp("campaign") / "short.parquet"
     run_campaign(planned(), ResultStore(out, planned()), Executor())
     return Results(out)
@@ -39,5 +39,5 @@ def results(planned, tmp_path_factory):
 
 @pytest.fixture
 def out(tmp_path):
-    """Return where results may go."""
+    """Return the path for new results."""
     return tmp_path / "result.parquet"

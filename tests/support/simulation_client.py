@@ -1,4 +1,4 @@
-"""A client of simulation_interfaces that knows nothing else of the bench: pauses, steps, resets; prints what it saw."""
+"""A client of simulation_interfaces without knowledge of the bench: it pauses, steps, resets and prints the states."""
 
 import json
 import time
@@ -38,7 +38,7 @@ def go(state):
 
 
 def paused_at():
-    """Return the last state once the flight is paused and no further state arrives."""
+    """Return the last state, once the flight is paused and no more states arrive."""
     while call(srv.GetSimulationState).state.state != SimulationState.STATE_PAUSED or last_is_new():
         time.sleep(0.05)
     return seen[-1]

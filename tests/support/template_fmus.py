@@ -1,4 +1,4 @@
-"""FMUs made of FMPy's own templates, whose outputs keep their start values, and faulty ones."""
+"""FMUs from FMPy's templates, whose outputs keep their start values, and faulty FMUs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Edit = Callable[[str], str]
 def template_fmu(
     path: Path, inputs: list[str], outputs: dict[str, float], description: Edit = str, model: Edit = str
 ) -> None:
-    """Write an FMI 3.0 FMU of FMPy's template; the edits change its description and its source."""
+    """Write an FMI 3.0 FMU from FMPy's template; the edits change its description and its source."""
     made = ModelDescription()
     made.fmiVersion, made.modelName, made.description, made.generationTool = "3.0", "model", "", "FMPy"
     made.generationDateAndTime, made.instantiationToken = "2026-01-01T00:00:00Z", "template"
@@ -48,13 +48,13 @@ def template_fmu(
     include = Path(fmpy.__file__).parent / "c-code"
     subprocess.run(["cc", "-O0", "-shared", "-fPIC", f"-I{include}", "-o", library, code], check=True)
     with zipfile.ZipFile(path, "w") as archive:
-        exact = xml.replace('causality="output"', 'causality="output" initial="exact"')  # the template forgets it
+        exact = xml.replace('causality="output"', 'causality="output" initial="exact"')  # the template lacks it
         archive.writestr("modelDescription.xml", description(exact))
         archive.write(library, "binaries/x86_64-linux/model.so")
 
 
 def container_fmu(path: Path, inner: Path) -> None:
-    """Write an FMI 2.0 FMU of FMPy's own binary that contains ``inner``, with the same inputs and outputs."""
+    """Write an FMI 2.0 FMU that contains ``inner``, with the same inputs and outputs; its binary is FMPy's own."""
     described = read_model_description(str(inner))
     component = Component(inner.stem, inner, described)
     made = ModelDescription()

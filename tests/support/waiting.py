@@ -1,4 +1,4 @@
-"""Waiting as long as there is progress: on a busy machine everything may take any time, and still it goes on."""
+"""Waiting for as long as there is progress, because on a busy machine everything may take any time."""
 
 import subprocess
 import time
@@ -13,17 +13,17 @@ QUIET = 60.0
 
 _PAUSE = 0.1
 _LOOK = 1.0
-"""Seconds between two looks at the progress."""
+"""Seconds between two checks of the progress."""
 
 
 def wait_until(done, pids=(), progress=lambda: None, pause=time.sleep):
-    """Return when ``done`` returns something true.
+    """Return when ``done`` returns a true value.
 
     Args:
-        done: What is waited for.
-        pids: Processes that are watched with all that they start: a second of processor time is progress.
-        progress: Returns what else must not stand still, e.g. steps on the disk.
-        pause: Waits a little between two looks, e.g. by spinning a node.
+        done: The condition to wait for.
+        pids: Processes to watch with all their children: a second of processor time is progress.
+        progress: Returns a value whose change is progress as well, e.g. the number of steps on disk.
+        pause: Waits briefly between two checks, e.g. by spinning a node.
 
     Raises:
         AssertionError: No progress for :data:`QUIET` seconds.
@@ -39,7 +39,7 @@ def wait_until(done, pids=(), progress=lambda: None, pause=time.sleep):
 
 
 def output_of(popen):
-    """Return what a process writes until it ends; while there is progress it may take its time."""
+    """Return the output of a process when it ends, however long that takes while there is progress."""
     said = ""
 
     def ended():
@@ -58,18 +58,18 @@ def output_of(popen):
 
 
 def exit_code_of(popen):
-    """Return the exit code of a process once it has ended."""
+    """Return the exit code of a process when it has ended."""
     wait_until(lambda: popen.poll() is not None, [popen.pid])
     return int(popen.returncode)
 
 
 def used(pids):
-    """Return the processor time (s) that these processes and all that they have started have used so far."""
+    """Return the processor time (s) that these processes and all their children have used so far."""
     seconds = 0.0
     for pid in pids:
         with suppress(psutil.Error):
             process = psutil.Process(pid)
             for each in (process, *process.children(recursive=True)):
-                with suppress(psutil.Error):  # it has just ended
+                with suppress(psutil.Error):  # the process has just ended
                     seconds += each.cpu_times().user + each.cpu_times().system
     return seconds

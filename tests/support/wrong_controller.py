@@ -1,4 +1,4 @@
-"""The examples' regulators, which go wrong: ``python3 wrong_controller.py killed|hung|wrong_step|nan STEP``."""
+"""The examples' regulators with a failure: ``python3 wrong_controller.py killed|hung|wrong_step|nan STEP``."""
 
 import math
 import os
@@ -12,7 +12,7 @@ from hsv_lqr import Lqr
 
 
 class SlowLqr(Lqr):
-    """Takes some seconds for its hundredth step."""
+    """A regulator that takes some seconds for its hundredth step."""
 
     SECONDS = 4.0
 
@@ -27,7 +27,7 @@ class SlowLqr(Lqr):
 
 
 def main(how, step):
-    """Fly, and go wrong."""
+    """Fly, and fail in the way ``how`` at a step."""
     rclpy.init()
     node = Regulator()
     publish = node.command.publish

@@ -1,4 +1,4 @@
-"""A node that disturbs a flight: ``python3 wrong_message.py HOW STEP``, with one of :data:`WRONG` from that step on."""
+"""A node that sends wrong messages in flight: ``python3 wrong_message.py HOW STEP``, HOW a key of :data:`WRONG`."""
 
 import sys
 
@@ -17,11 +17,11 @@ WRONG = {
     "command": ("hsv/command", ControlInput()),
     "measurement": ("hsv/measurement", Measurement()),
 }
-"""Topic and message; of the last two, as of no other, the end is missing."""
+"""Topic and wrong message; the last two messages lack their end."""
 
 
 def main(how, step):
-    """Send the message for every step from ``step`` on, as soon as that begins."""
+    """Send the wrong message in every step from ``step`` on, as soon as the step begins."""
     rclpy.init()
     node = rclpy.create_node("disturber")
     deep = QoSProfile(depth=256)
@@ -29,10 +29,10 @@ def main(how, step):
     publishers = []
 
     def disturb(measured):
-        if not publishers:  # in flight: before it, two that publish the command are refused
+        if not publishers:  # not earlier: two publishers of the command are refused before the flight
             publishers.append(node.create_publisher(type(message), topic, deep))
         if measured.step >= step:
-            # Of another time than the step: that of a flight is not to become it.
+            # Only the step is set. The time stays different from that of the flight's own message.
             message.step = measured.step
             publishers[0].publish(serialize_message(message)[:-8] if topic.endswith(how) else message)
 
