@@ -73,7 +73,7 @@ class ParameterError(HsvError, ValueError):
 
 
 def one_of(known: Iterable[str], name: str, also: str = "") -> str:
-    """Return the end of a message about an unknown ``name``: ``one of`` the known ones, ``also``, and the nearest one."""
+    """Return the end of a message about an unknown ``name``: all the known ones, ``also``, and the nearest one."""
     return f"one of {', '.join(known := [*known])}{also}{did_you_mean(name, known)}"
 
 

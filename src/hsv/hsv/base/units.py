@@ -190,7 +190,7 @@ def has_unit(text: object) -> bool:
 
 
 def in_unit_of(values: Sequence[float], unit: str, text: object) -> tuple[list[float], str]:
-    """Return ``values``, given in the SI ``unit``, in the unit of the quantity ``text``, and this unit with a space."""
+    """Return ``values``, given in the SI ``unit``, in the unit of the quantity ``text``, and a space with that unit."""
     found = _QUANTITY.fullmatch(text.strip()) if isinstance(text, str) else None
     own = (found["unit"] or "") if found else ""
     if not own:

@@ -1,8 +1,8 @@
 """Actuators of the vehicle: published sets, their parameters, and the data that ``core/actuators.h`` steps.
 
-Actuators and vehicle move on substeps of a quarter of the control period; the effector is held over each substep at the
-mean of the positions at its two ends. An ideal actuator follows its command at once. If all actuators are ideal and
-none has a fault, the vehicle receives the command itself.
+Actuators and vehicle are advanced by substeps of a quarter of the control period. Over a substep, the effector is held
+at the mean of its positions at the two ends. An ideal actuator reaches its command at once. If all actuators are ideal
+and have no fault, the vehicle receives the command itself, limited by the stops.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS
 
 SUBSTEPS = 4
-"""Substeps of a control period, if an actuator is not ideal."""
+"""Number of substeps of a control period if an actuator is not ideal."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class ActuatorSet:
 
     channel: str
     order: int
-    """0 ideal, 1 or 2"""
+    """Order of the dynamics, 1 or 2; 0 for an ideal actuator"""
     natural_frequency: float
     """rad/s; the inverse of the time constant if the order is 1"""
     damping_ratio: float
@@ -54,7 +54,7 @@ ACTUATOR_SETS = {
         ("fuel_10", FUEL, 1, 10.0, 1.0, inf, inf, "Wiese, generic hypersonic vehicle, MIT thesis 2013: fuel delivery"),
     )
 }
-"""Actuator sets that a scenario can name; in this table with stops in degrees and rates in degrees per second."""
+"""Actuators that a scenario can name; the rows above have stops in deg and rate limits in deg/s."""
 
 
 def _parameters() -> tuple[Parameter, ...]:
@@ -78,11 +78,11 @@ def _parameters() -> tuple[Parameter, ...]:
 
 
 ACTUATOR_PARAMETERS = _parameters()
-"""Parameters of the actuators; an empty array means the value of the set."""
+"""Parameters of the actuators; an empty array stands for the value in the chosen set."""
 
 
 def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> Struct:
-    """Return the actuators that :data:`ACTUATOR_PARAMETERS` describe, of ``vehicle``, on substeps of ``period`` (s)."""
+    """Return a ``vehicle``'s actuators from values of :data:`ACTUATOR_PARAMETERS`, for a control ``period`` (s)."""
     v = validate(ACTUATOR_PARAMETERS, values)
     h = period / SUBSTEPS
     order, map = np.zeros(N_INPUTS, np.int64), np.zeros((N_INPUTS, 4))
@@ -136,7 +136,7 @@ def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, peri
 
 
 def actuators_at_rest(position: np.ndarray) -> np.ndarray:
-    """Return positions and rates (2, 2) of actuators at rest at ``position`` (2)."""
+    """Return the state (2, 2) of actuators at rest at ``position`` (2): per channel the position and a zero rate."""
     state = np.zeros((N_INPUTS, 2))
     state[:, 0] = position
     return state

@@ -1,6 +1,6 @@
-"""Wind, shear, gusts, turbulence and density that differs from the model's, see ``core/atmosphere.h``.
+"""Wind, shear, gusts, turbulence and variation of the density, see ``core/atmosphere.h``.
 
-The air is held over a control period. Turbulence is Dryden's (MIL-F-8785C, MIL-HDBK-1797).
+Wind and density are held over a control period. Turbulence follows Dryden's model (MIL-F-8785C, MIL-HDBK-1797).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from hsv.core import Struct
 from hsv.model.signals import first_step
 
 _LENGTH = 1750.0 * FOOT
-"""Scale of turbulence above 2000 ft (MIL-F-8785C)."""
+"""Scale length of the turbulence (m) above 2000 ft (MIL-F-8785C)."""
 
 ATMOSPHERE_PARAMETERS = (
     Parameter("wind.forward", 0.0, "steady wind from behind", "m/s", -200.0, 200.0),
@@ -45,11 +45,11 @@ ATMOSPHERE_PARAMETERS = (
 )
 
 _MEMORY = 4
-"""Size of the memory of the air without the distance flown into each gust"""
+"""Numbers in the memory of the air before the distances flown into the gusts."""
 
 
 def atmosphere_data(values: Mapping[str, object], period: float) -> Struct:
-    """Return the atmosphere that :data:`ATMOSPHERE_PARAMETERS` describe, stepped every ``period`` (s)."""
+    """Return the atmosphere that values of :data:`ATMOSPHERE_PARAMETERS` describe, for a control ``period`` (s)."""
     v = validate(ATMOSPHERE_PARAMETERS, values)
     starts = v["gust.starts"]
     for name in ("gust.forward", "gust.up", "gust.stays"):
@@ -78,5 +78,5 @@ def atmosphere_data(values: Mapping[str, object], period: float) -> Struct:
 
 
 def atmosphere_state(data: Struct) -> np.ndarray:
-    """Return the memory (4 + g) of the air, which the first step fills."""
+    """Return the memory (4 + g) of the air with g gusts, which step 0 fills."""
     return np.zeros(_MEMORY + len(data.gust_start))

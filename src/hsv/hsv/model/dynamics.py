@@ -22,14 +22,14 @@ MODELS = ("CM", "DM")
 
 
 _COMPLEX_STEP = 1e-40
-"""The complex step of hsv_transitions."""
+"""The complex step by which hsv_transitions multiplies its derivatives."""
 
 
 class VehicleParameters(NamedTuple):
     """All constants of the equations of motion and the limits of inputs and angles, SI (kg, m, s, N, rad).
 
-    Coefficients are annotated with their table in a vehicle file, :mod:`hsv.model.vehicle`, and their unit. Those that
-    the structure of a vehicle does not have are zero. Parker's vehicle is a slice 0.3048 m deep.
+    Coefficients are annotated with their table in a vehicle file (:mod:`hsv.model.vehicle`) and their unit. They are
+    zero if the equations of a vehicle do not contain them. Parker's parameters describe a slice 0.3048 m deep.
     """
 
     mass: Annotated[float, "rigid_body", "kg"] = 0.0
@@ -100,7 +100,7 @@ class VehicleParameters(NamedTuple):
     damping_alpha: Annotated[float, "pitch_damping", "1"] = 0.0
     damping_zero: Annotated[float, "pitch_damping", "1"] = 0.0
     structure: float = 0.0
-    """The code of the structure in the core, which is its place in :data:`STRUCTURES`."""
+    """Number of the structure in the core, which is its position in :data:`STRUCTURES`."""
 
     @property
     def input_minimum(self) -> np.ndarray:
@@ -114,7 +114,7 @@ class VehicleParameters(NamedTuple):
 
     @property
     def form(self) -> Structure:
-        """The structure of the vehicle."""
+        """The structure of the vehicle, which is the form of its equations of motion."""
         return [*STRUCTURES.values()][int(self.structure)]
 
     def decoupled(self) -> VehicleParameters:
@@ -125,7 +125,7 @@ class VehicleParameters(NamedTuple):
         """Return the vehicle with relative changes applied, e.g. ``{"mass": 0.1}`` for +10 %.
 
         Raises:
-            QuantityError: An unknown parameter, or a change that is not finite or not above -100 %.
+            QuantityError: A parameter is unknown, or a change is not finite or not above -100 %.
         """
         changes, names = {}, self.form.names
         for name, change in perturbation.items():
@@ -145,7 +145,7 @@ _PLACES: dict[str, tuple[str, str]] = {
     for name, hint in get_type_hints(VehicleParameters, include_extras=True).items()
     if hint is not float
 }
-"""Table in a vehicle file, and SI unit, of every coefficient."""
+"""For each coefficient, its table in a vehicle file and its SI unit."""
 
 COEFFICIENT_UNITS = {name: unit for name, (_, unit) in _PLACES.items()}
 """SI units of all coefficients, in the order of :class:`VehicleParameters`."""
@@ -155,7 +155,7 @@ COEFFICIENT_UNITS = {name: unit for name, (_, unit) in _PLACES.items()}
 class Structure:
     """The form of the equations of motion: its coefficients, and whether the body bends.
 
-    The nine states are those of an elastic vehicle. A rigid one keeps the elastic states in their places, at rest.
+    The state always has nine entries; in a rigid vehicle the four elastic ones stay at rest.
     """
 
     names: tuple[str, ...]
@@ -163,7 +163,7 @@ class Structure:
 
     @cached_property
     def tables(self) -> dict[str, dict[str, str]]:
-        """SI units of the coefficients by the tables of a vehicle file."""
+        """SI units of the coefficients by their names, within each table of a vehicle file."""
         found: dict[str, dict[str, str]] = {}
         for name in self.names:
             table, unit = _PLACES[name]
@@ -194,7 +194,7 @@ STRUCTURES = {
 """All structures by name, in the order of their codes in ``core/vehicle.h``; the first is the default."""
 
 AT_REST = {"damping_ratio_1": 1.0, "damping_ratio_2": 1.0, "natural_frequency_1": 20.0, "natural_frequency_2": 20.0}
-"""Modes (1, rad/s) in the places of the elastic states of a rigid vehicle: damped, and excited by nothing."""
+"""Damping ratios and natural frequencies (rad/s) that keep the elastic states of a rigid vehicle at rest."""
 
 POSITIVE = frozenset(
     {
@@ -203,28 +203,28 @@ POSITIVE = frozenset(
         *("gravitational_parameter", "planet_radius", "sound_speed_zero", "moment_mach_decay"),
     }
 )
-"""Coefficients that are above zero in any vehicle."""
+"""Coefficients that must be above zero."""
 
 
 @lru_cache(maxsize=64)
 def vehicle_struct(vehicle: VehicleParameters) -> Struct:
-    """Return the parameters as the struct of the core."""
+    """Return the parameters as the struct ``hsv_vehicle`` of the core."""
     return Struct("hsv_vehicle", **vehicle._asdict())
 
 
 def forces(
     x: np.ndarray, u: np.ndarray, p: VehicleParameters, conditions: np.ndarray | None = None
 ) -> tuple[float, float, float, float, float]:
-    """Return lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa.
+    """Return lift (N), drag (N), thrust (N), pitching moment (N m) and dynamic pressure (Pa) (paper eq. 2, eq. 3).
 
-    Paper eq. 2, eq. 3. Lift is across the inertial path, drag along it.
+    Lift is perpendicular to the inertial velocity, drag opposite to it.
 
     Args:
         x: State (9).
         u: Input (2).
         p: Parameters.
-        conditions: Of air and engine (7): wind forward and up (m/s), density relative to the model's, factors of
-            thrust, lift and drag, increment of the pitching moment coefficient; None: still air, a working engine.
+        conditions: Air and engine (7): wind forward and up (m/s), density relative to the model's, factors of thrust,
+            lift and drag, and increment of the pitching moment coefficient. None: still air and a working engine.
     """
     found = ffi.new("double[6]")
     lib.hsv_forces(
@@ -239,9 +239,9 @@ def forces(
 
 
 def derivative(x: Any, u: Any, p: VehicleParameters, conditions: np.ndarray | None = None) -> np.ndarray:
-    """Return dx/dt (9): the coupled model (paper eq. 1), decoupled (eq. 4) where both couplings are zero.
+    """Return dx/dt (9) of the coupled model (paper eq. 1), or decoupled model (eq. 4) if both couplings are zero.
 
-    A complex state or input gives a complex derivative, as the complex step needs; only in still air.
+    A complex state or input gives a complex derivative, for the complex step; ``conditions`` are then ignored.
     """
     struct = vehicle_struct(p).pointer
     if np.iscomplexobj(x) or np.iscomplexobj(u):
@@ -263,7 +263,7 @@ def derivative(x: Any, u: Any, p: VehicleParameters, conditions: np.ndarray | No
 def jacobian(x: np.ndarray, u: np.ndarray, p: VehicleParameters) -> tuple[np.ndarray, np.ndarray]:
     """Return A = df/dx (9, 9) and B = df/du (9, 2), by the complex step (paper eq. 6, eq. 7, eq. 8, eq. 9).
 
-    Exact to rounding: the step is so small that its square vanishes; nothing is subtracted, truncated or cancelled.
+    They are exact to rounding: the square of the step vanishes, and no numbers of similar size are subtracted.
     """
     A, B = np.empty((N_STATES, N_STATES)), np.empty((N_STATES, N_INPUTS))
     lib.hsv_jacobian(
@@ -280,9 +280,9 @@ def advance(
     substeps: int,
     conditions: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return the state (9) one ``period`` (s) after ``x`` (9), input ``u`` (2) held, by ``substeps`` steps of RK4.
+    """Return the state (9) one ``period`` (s) after ``x`` (9), by ``substeps`` classical Runge-Kutta steps.
 
-    So are the ``conditions`` (7) of :func:`forces`, if given.
+    The input ``u`` (2) and the ``conditions`` (7), see :func:`forces`, are held.
     """
     new = np.array(x, float)
     lib.hsv_advance(
@@ -299,9 +299,10 @@ def advance(
 def transitions(
     state: np.ndarray, inputs: np.ndarray, period: np.ndarray, substeps: np.ndarray, p: VehicleParameters
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the states (N, 9) after N periods from ``state`` (N, 9), and their derivatives (N, 9, 12).
+    """Return the final states (N, 9) of N separate transitions, and their derivatives (N, 9, 12).
 
-    The derivatives are by state, input and length of the period (s), by the complex step: exact.
+    A transition starts from its row of ``state`` (N, 9) and holds its row of ``inputs`` (N, 2) over its ``period`` (s).
+    The last axis of the derivatives is state (9), input (2) and period; the complex step makes them exact to rounding.
     """
     end, changes = np.empty((len(period), N_STATES)), np.empty((len(period), N_STATES, N_STATES + N_INPUTS + 1))
     lib.hsv_transitions(
@@ -319,5 +320,5 @@ def _conditions(conditions: np.ndarray | None) -> Any:
 
 
 def in_model_range(x: np.ndarray, angle_limit: float) -> bool:
-    """Return whether the state ``x`` (9) is finite and its angles (rad) are within the range of the curve fits."""
+    """Return whether ``x`` (9) is finite, its velocity positive, and its angles at most ``angle_limit`` (rad)."""
     return bool(lib.hsv_in_model_range(doubles(vector(x), 9), angle_limit))

@@ -1,15 +1,15 @@
-"""Links of the loop that are not ideal: payloads arrive late, are lost or corrupted; see ``core/links.h``.
+"""Communication links in the loop, whose payloads may arrive late, be lost or be corrupted; see ``core/links.h``.
 
-One link leads from the sensors to the filter, the trajectory and the controller, another one from the controller to the
-fault injector. Every step sends and receives one message, for which the loop waits; only its payload may be withheld.
-The receiver keeps the last payload that arrived. Before the flight the sensors sent payloads equal to the first one,
-and the controller sent the input of the trim.
+One link leads from the sensors to filter, nominal trajectory and controller, the other from the controller to the fault
+injector. In every step each link transmits one message, for which the loop waits; only its payload can be late or lost.
+The receiver uses the last payload that arrived. Payloads sent before the flight equal the first one (sensors) or the
+input of the trim (controller).
 
-In a corrupted payload one of the 64 bits of one number is flipped. With a checksum, or if the number is then not finite
-or beyond :data:`LARGEST`, the receiver detects this, and the payload is lost.
+In a corrupted payload one of the 64 bits of one number is flipped. The receiver detects this by a checksum, or if the
+number is not finite or beyond :data:`LARGEST`; the payload is then lost.
 
-The computing time of the controller is divided: its integer number of periods delays the link of the command; the rest
-is the time within a period at which the actuators receive the command, see :func:`computation`.
+The computing time of the controller is split: whole periods delay the command link; the rest is the time within a
+period at which the actuators receive the command, see :func:`computation`.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from hsv.base.parameters import Parameter, validate
 from hsv.core import Struct, doubles, lib, vector
 
 MAX_DELAY = 50
-"""Steps."""
+"""Largest delay and largest jitter, in control periods."""
 
 LARGEST = 1e6
-"""Magnitude (SI) above which a receiver takes a number for corrupted."""
+"""Magnitude (SI) above which a receiver regards a number as corrupted."""
 
 MEASUREMENT_LINK, COMMAND_LINK = "measurement", "command"
 
@@ -69,24 +69,24 @@ MEASUREMENT_LINK_PARAMETERS = _parameters(MEASUREMENT_LINK)
 COMMAND_LINK_PARAMETERS = _parameters(COMMAND_LINK)
 
 _ACCEPTED = 3
-"""Size of the memory of a link without its payloads."""
+"""Numbers in the memory of a link before its payloads."""
 
 
 def computation(values: Mapping[str, object], period: float) -> tuple[int, float]:
-    """Return the computing time of the controller: an integer number of periods, and the remaining share of one."""
+    """Return the computing time of the controller as whole periods and the remaining fraction of a period."""
     time = validate((COMPUTATION_PARAMETER,), values)[COMPUTATION_PARAMETER.name]
-    periods = round(time / period, 9)  # the rounding of the division allowed for
+    periods = round(time / period, 9)  # without the rounding error of the division
     whole = math.floor(periods)
     return whole, periods - whole
 
 
 def measurement_link(values: Mapping[str, object]) -> Struct:
-    """Return the link that :data:`MEASUREMENT_LINK_PARAMETERS` describe."""
+    """Return the sensors' link that values of :data:`MEASUREMENT_LINK_PARAMETERS` describe."""
     return _link(MEASUREMENT_LINK, values, 0)
 
 
 def command_link(values: Mapping[str, object], period: float) -> Struct:
-    """Return the link that :data:`COMMAND_LINK_PARAMETERS` describe, delayed by the periods of the computation."""
+    """Return the controller's link from :data:`COMMAND_LINK_PARAMETERS`; whole periods of computing time delay it."""
     return _link(COMMAND_LINK, values, computation(values, period)[0])
 
 
@@ -113,12 +113,12 @@ def _link(name: str, values: Mapping[str, object], computing: int) -> Struct:
 
 
 def link_state(link: Struct, size: int, before: np.ndarray | None = None) -> np.ndarray:
-    """Return the memory of a link.
+    """Return the initial memory of a ``link``.
 
     Args:
         link: The link.
-        size: Numbers of a payload.
-        before: The payload (size) sent before the flight; None: the first payload of the flight.
+        size: Number of values in a payload.
+        before: Payload (size) sent before the flight; None: equal to the first payload of the flight.
     """
     memory = np.zeros(_ACCEPTED + size * (link.delay + link.jitter + 2))
     if before is not None:

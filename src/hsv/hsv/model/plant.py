@@ -1,4 +1,4 @@
-"""The simulated vehicle, stepped by control periods."""
+"""The simulated vehicle with its equipment, advanced by one control period at a time."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from hsv.model.vehicle import VEHICLE_PARAMETERS
 
 
 class FlightStatus(IntEnum):
-    """Whether more states follow; values of VehicleState.status."""
+    """Status of a flight, with the values of the message field ``VehicleState.status``."""
 
     RUNNING = 0
     FINISHED = 1
@@ -49,7 +49,7 @@ PLANT_PARAMETERS = (
         for name in COEFFICIENT_UNITS
     ),
 )
-"""Parameters of the plant besides those of the vehicle, its actuators, sensors and links, and the air."""
+"""Parameters of the plant, without those of the vehicle and of :data:`EQUIPMENT_PARAMETERS`."""
 
 EQUIPMENT_PARAMETERS = (
     *ACTUATOR_PARAMETERS,
@@ -58,11 +58,11 @@ EQUIPMENT_PARAMETERS = (
     *MEASUREMENT_LINK_PARAMETERS,
     COMPUTATION_PARAMETER,
 )
-"""Parameters of the equipment, which is ideal by default; a scenario has tables of the same names."""
+"""Parameters of actuators, air, sensors and links, which are ideal by default; also tables of a scenario."""
 
 
 def check_equipment(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> None:
-    """Check :data:`EQUIPMENT_PARAMETERS` and the parameters of the command's link."""
+    """Raise a ParameterError for a wrong value of :data:`EQUIPMENT_PARAMETERS` or of the link to the actuators."""
     actuator_data(values, vehicle, period)
     atmosphere_data(values, period)
     sensor_data(values, period)
@@ -71,23 +71,23 @@ def check_equipment(values: Mapping[str, object], vehicle: VehicleParameters, pe
 
 
 CALM = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-"""Conditions of still air and a working engine"""
+"""The conditions of :func:`hsv.model.dynamics.forces` in still air with a working engine."""
 
 _CALM = CALM.tolist()
 
 
 def plant_faults(scheduled: Sequence[ScheduledFault], period: float, before: Struct | None = None) -> Struct:
-    """Return the ``scheduled`` faults of the plant by side; the faults in ``before`` keep their memory."""
+    """Return those of the ``scheduled`` faults that act in the plant; faults also in ``before`` keep their memory."""
     sides = {"effector": (DYNAMICS, EFFECTOR), "engine": (ENGINE_SIDE,), "sensor": (SENSOR,)}
     rows = {name: fault_rows(side, scheduled, period, before and getattr(before, name)) for name, side in sides.items()}
     return Struct("hsv_plant_faults", **rows)
 
 
 class PlantResult(NamedTuple):
-    """The state x (9) of a step, its measurement (9), and forces, effectors and air that led to it.
+    """The state x (9) of a step, its measurement (9), and the forces, effectors and air in that state.
 
-    ``forces``: lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa. ``effector`` (2): last positions.
-    ``air`` (3): wind forward and up (m/s), and density relative to the model's, over the period before.
+    ``forces``: lift (N), drag (N), thrust (N), pitching moment (N m), dynamic pressure (Pa). ``effector`` (2): last
+    positions. ``air`` (3): wind forward and up (m/s) and density relative to the model's, as held over the last period.
     """
 
     step: int
@@ -100,9 +100,9 @@ class PlantResult(NamedTuple):
 
 
 class Plant:
-    """The vehicle under held inputs, with its actuators, its sensors, their link, and the air.
+    """The vehicle with its actuators, sensors, the link from the sensors, and the air; inputs are held over a period.
 
-    It starts in the trim of the *nominal* vehicle in still air, even if it is perturbed.
+    It starts in the trim of the *nominal* vehicle in still air, even if the simulated vehicle is perturbed.
     """
 
     PARAMETERS = (*PLANT_PARAMETERS, *VEHICLE_PARAMETERS, *EQUIPMENT_PARAMETERS, SEED_PARAMETER)
@@ -116,15 +116,15 @@ class Plant:
         substeps: int = 2,
         equipment: Mapping[str, object] | None = None,
     ) -> None:
-        """Prepare a flight from the ``initial`` trim over ``steps`` periods (s).
+        """Prepare a flight from the ``initial`` trim.
 
         Args:
-            vehicle: Parameters.
-            initial: Initial state.
-            period: T (s).
-            steps: Number of steps of the flight.
-            substeps: Runge-Kutta steps a period, while actuators are ideal.
-            equipment: Values of :data:`EQUIPMENT_PARAMETERS`, and the seed; the default is ideal equipment.
+            vehicle: Parameters of the simulated vehicle.
+            initial: Trim that gives the initial state and input.
+            period: Control period T (s).
+            steps: Number of control periods of the flight.
+            substeps: Runge-Kutta steps per control period while the actuators are ideal.
+            equipment: Values of :data:`EQUIPMENT_PARAMETERS`, and the seed; by default the equipment is ideal.
         """
         self.vehicle = vehicle
         self.initial = initial
@@ -140,7 +140,7 @@ class Plant:
             atmosphere=atmosphere_data(values, period),
             sensors=sensor_data(values, period),
             link=measurement_link(values),
-            # The actuators receive the command of a period so many substeps after its beginning.
+            # Time from the beginning of a period until the actuators receive its command, in substeps.
             late=SUBSTEPS * computation(values, period)[1],
             seed=validate((SEED_PARAMETER,), values)[SEED_PARAMETER.name],
         )
@@ -148,7 +148,7 @@ class Plant:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
-        """Build from :data:`PLANT_PARAMETERS` and those of the vehicle."""
+        """Return the plant that the values of :attr:`PARAMETERS` describe; missing ones have their defaults."""
         v = validate(PLANT_PARAMETERS, values)
         nominal, initial = initial_trim(values)
         vehicle = nominal.perturbed({n: v[f"vehicle.perturbation.{n}"] for n in COEFFICIENT_UNITS})
@@ -156,11 +156,11 @@ class Plant:
         return cls(vehicle, initial, v["period"], round(v["duration"] / v["period"]), v["substeps"], equipment)
 
     def perturbed(self, perturbation: Mapping[str, float]) -> Plant:
-        """Return a plant with relative changes of the vehicle, by parameter name; it starts in the same trim."""
+        """Return a plant whose vehicle has relative changes by parameter name; it starts in the same trim."""
         return self.varied(self.vehicle.perturbed(perturbation), self.data.seed)
 
     def varied(self, vehicle: VehicleParameters, seed: int) -> Plant:
-        """Return a plant with another ``vehicle`` of the same limits and another ``seed``; other data are shared."""
+        """Return a plant with another ``seed`` and another ``vehicle``, which must have the same limits."""
         other = copy(self)
         other.vehicle = vehicle
         other.data = self.data.replaced(vehicle=vehicle_struct(vehicle), seed=seed)
@@ -168,13 +168,13 @@ class Plant:
         return other
 
     def is_ideal(self, scheduled: Sequence[ScheduledFault]) -> bool:
-        """Return whether equipment and air are ideal and stay so under the ``scheduled`` faults."""
+        """Return whether equipment and air are ideal and none of the ``scheduled`` faults changes that."""
         data = self.data
         ideal = data.actuators.ideal and data.sensors.ideal and data.link.ideal and data.atmosphere.still
         return ideal and data.late == 0.0 and all(row.fault.kind.side == COMMAND for row in scheduled)
 
     def reset(self) -> PlantResult:
-        """Return to the initial trim; return that state."""
+        """Reset the flight to its initial trim and return the result of step 0."""
         self._begin()
         return self._result()
 
@@ -186,7 +186,7 @@ class Plant:
         self._faults = plant_faults((), self.period)
 
     def memory(self) -> Struct:
-        """Return the memory with which a flight begins: actuators at rest in trim, still air."""
+        """Return the initial memory of the equipment: actuators at rest in the trim, still air."""
         held = self.initial.input
         return Struct(
             "hsv_plant_memory",
@@ -200,14 +200,14 @@ class Plant:
         )
 
     def place(self, step: int, state: np.ndarray) -> None:
-        """Continue from ``state`` (9) at ``step``, as a replay does with recorded states."""
+        """Set the current step and ``state`` (9), as a replay does with each recorded state."""
         self._state[:] = state
         self._step = step
 
     def step(self, actuator: np.ndarray, active: tuple[ActiveFault, ...] = ()) -> PlantResult:
-        """Hold the input of the actuators (2) over one period and return the state at its end.
+        """Hold ``actuator`` (2), the input of the actuators, over one period and return the result at its end.
 
-        ``active``: the active faults; those of the command have been applied already.
+        ``active``: the active faults; those of the command have already been applied to ``actuator``.
         """
         if active != self._active:
             known = [ScheduledFault(fault, since) for fault, since in active]

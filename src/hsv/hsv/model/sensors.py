@@ -1,8 +1,8 @@
-"""Sensors: from the state to its measurement, channel by channel; see ``core/sensors.h``.
+"""Sensors, which measure the state x channel by channel; see ``core/sensors.h``.
 
-A measurement is y = fault(clip(quantise(hold(delay(lag((1 + s) x) + b + n))))): scale factor and lag of the sensor,
-bias and noise, latency in samples, hold of lost samples, quantisation, range and faults, in this order. An ideal
-channel without a fault passes the state unchanged. In step 0 lags are at rest and delays hold the first sample.
+A measurement is y = fault(clip(quantise(hold(delay(lag((1 + s) x) + b + n))))) with scale error s, bias b and noise n:
+lag of the sensor, latency in samples, hold of lost samples, quantisation, range and faults act in this order. An ideal
+channel without a fault passes the state unchanged. In step 0 lags are in equilibrium and delays hold the first sample.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from hsv.core.arithmetic import exponential
 from hsv.model.signals import N_STATES, STATE_NAMES, STATE_UNITS
 
 MAX_LATENCY = 50
-"""Steps."""
+"""Largest latency, in control periods."""
 
 ALPHA, PITCH = STATE_NAMES.index("angle_of_attack"), STATE_NAMES.index("pitch_angle")
 
 
 class Field(NamedTuple):
-    """A property of a sensor; ``{}`` in its unit is the unit of the channel, ``standard`` the ideal value."""
+    """A property of a sensor; ``{}`` in its unit stands for the channel's unit, ``standard`` is the ideal value."""
 
     name: str
     description: str
@@ -59,12 +59,12 @@ FIELDS = (
 
 @dataclass(frozen=True)
 class SensorSet:
-    """Published sensors: properties of the channels that are not ideal, SI and radians, and their source."""
+    """Published sensors: for each channel the properties that are not ideal, in SI units, and the source."""
 
     channels: Mapping[str, Mapping[str, float]]
     source: str
     inertial_angle_of_attack: bool = False
-    """Whether the angle of attack is the pitch angle minus an inertial path angle, with the error of the former"""
+    """Whether alpha is measured as pitch angle minus inertial path angle, with the error of the pitch angle as well"""
 
 
 _FINE_ANGLE = math.radians(0.005)
@@ -120,11 +120,11 @@ SENSOR_PARAMETERS = (
         for f in FIELDS
     ),
 )
-"""Parameters of the sensors; an empty array means the value of the set."""
+"""Parameters of the sensors; an empty array stands for the value in the chosen set."""
 
 
 def sensor_data(values: Mapping[str, object], period: float) -> Struct:
-    """Return the sensors that :data:`SENSOR_PARAMETERS` describe, read every ``period`` (s)."""
+    """Return the sensors that values of :data:`SENSOR_PARAMETERS` describe, sampled every ``period`` (s)."""
     v = validate(SENSOR_PARAMETERS, values)
     chosen = SENSOR_SETS[v["sensors.set"]]
     table: dict[str, np.ndarray] = {field.name: np.full(N_STATES, field.standard) for field in FIELDS}
@@ -154,7 +154,7 @@ def sensor_data(values: Mapping[str, object], period: float) -> Struct:
             on |= table[field.name] != field.standard
     if inertial:
         on[ALPHA] |= on[PITCH]
-    # Lag and drift as shares that remain over a period, the random walk per root of a period.
+    # Lag and drift become the shares that remain after a period, the random walk its standard deviation per period.
     drift_time, walk, lag = (table.pop(name) for name in ("drift_time", "random_walk", "lag"))
     table["latency"] = table["latency"].astype(np.int64)
     return Struct(
@@ -170,5 +170,5 @@ def sensor_data(values: Mapping[str, object], period: float) -> Struct:
 
 
 def sensor_state() -> np.ndarray:
-    """Return the memory (9) of the sensors, which step 0 fills."""
+    """Return the memory of the nine sensors, which step 0 fills."""
     return np.zeros(N_STATES, dtype("hsv_sensor_memory"))

@@ -1,4 +1,4 @@
-"""The signals of the loop: what each is called, its unit and how many numbers it has; and the steps of the loop."""
+"""The signals of the loop with their names, units and sizes, and the conversion of times to steps."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ N_RIGID = 5
 PITCH_RATE = STATE_NAMES.index("pitch_rate")
 
 PUBLISHED_ALTITUDE, PUBLISHED_VELOCITY = "85000 ft", "7702.0808 ft/s"
-"""Flight condition at which the literature publishes a trim: the default of trim and linearise."""
+"""Flight condition of the trim published in the literature, the default of ``hsv trim`` and ``hsv linearise``."""
 
 NEVER = 2**62
-"""A step that is not reached."""
+"""The number of a step that no flight reaches."""
 
 VARYING = -1
-"""Size of a signal that depends on the flight."""
+"""Marks a signal whose size depends on the flight."""
 
 
 class SignalType(NamedTuple):
@@ -41,7 +41,7 @@ class SignalType(NamedTuple):
 
     name: str
     unit: str
-    """SI, "1" without one; several, separated by commas, are repeated number by number; empty: no plain numbers"""
+    """SI unit, or ``"1"``; several, separated by commas, apply to the numbers in turn; empty if it is not numeric"""
     size: int
 
 
@@ -87,7 +87,7 @@ _COMPONENTS = {
 
 
 def numbers_of(signal: SignalType) -> list[tuple[str, str]]:
-    """Return name and unit of every number of a signal: ``measurement.altitude`` in m, ``filter_state[1]`` in rad."""
+    """Return name and unit of every number in a signal: ``measurement.altitude`` in m, ``filter_state[1]`` in rad."""
     units = signal.unit.split(", ")
     if signal.size == 1 and signal.name not in _COMPONENTS:
         return [(signal.name, units[0])]
@@ -96,5 +96,5 @@ def numbers_of(signal: SignalType) -> list[tuple[str, str]]:
 
 
 def first_step(time: float, period: float) -> int:
-    """Return the first step k with k * ``period`` >= ``time`` (s), rounding of the division allowed for."""
+    """Return the first step k with k * ``period`` >= ``time`` (s), with a tolerance of 1e-9 steps for rounding."""
     return math.ceil(time / period - 1e-9)

@@ -1,4 +1,4 @@
-"""Equilibrium of flight at a given altitude and velocity (paper eq. 5): level, or climbing and accelerating."""
+"""Equilibrium of flight at a given altitude and velocity (paper eq. 5): level, or with climb and acceleration."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_RIGID, N_STA
 from hsv.model.vehicle import COUPLING_PARAMETER, Vehicle
 
 CONVERGED = 1e-9
-"""Largest imbalance of an equilibrium, SI per second; Newton's method converges far below."""
+"""Largest imbalance (SI per second) accepted as an equilibrium; Newton's method converges far below."""
 
 INITIAL_GUESS = np.array([0.03, 0.3, 0.2])
 """Angle of attack (rad), fuel equivalence ratio and elevator deflection (rad); Newton's method converges from it."""
@@ -25,9 +25,9 @@ INITIAL_GUESS = np.array([0.03, 0.3, 0.2])
 
 @dataclass(frozen=True)
 class Trim:
-    """An equilibrium: ``state`` (9) and ``input`` (2), SI, and the largest remaining imbalance in SI units per second.
+    """An equilibrium: ``state`` (9) and ``input`` (2), in SI units, and the largest remaining imbalance, ``residual``.
 
-    The imbalance is |dx/dt|, less the commanded climb rate and acceleration.
+    The imbalance of a state is |dx/dt| (SI per second) without the commanded climb rate and acceleration.
     """
 
     state: np.ndarray
@@ -36,7 +36,7 @@ class Trim:
 
     @property
     def quantities(self) -> dict[str, tuple[float, str]]:
-        """State and input by name, each with its SI unit; without the elastic states of a rigid vehicle, which rest."""
+        """Value and SI unit of each state and input by name; the elastic states of a rigid vehicle are left out."""
         n = N_STATES if self.state[N_RIGID:].any() else N_RIGID
         values = (*self.state[:n].tolist(), *self.input.tolist())
         units = (*STATE_UNITS[:n], *INPUT_UNITS)
@@ -53,13 +53,13 @@ def trim(
 ) -> Trim:
     """Return the equilibrium at ``altitude`` (m) and ``velocity`` (m/s) (paper eq. 5), to machine precision.
 
-    Level and unaccelerated, or with V sin(theta - alpha) = ``climb_rate`` (m/s) and dV/dt = ``acceleration`` (m/s^2);
-    angle of attack and pitch rate do not change, the vehicle does not pitch, and its elastic modes rest.
+    V sin(theta - alpha) = ``climb_rate`` (m/s) and dV/dt = ``acceleration`` (m/s^2), both zero by default. The angle of
+    attack is constant, the pitch rate is zero, and the elastic modes are at rest.
 
-    Errors name the condition in SI, or in the words of ``where``.
+    ``where`` describes the condition in error messages; by default they state it in SI units.
 
     Raises:
-        TrimError: No equilibrium there, or only one outside the input limits.
+        TrimError: There is no equilibrium, or only one outside the input limits.
     """
     if not where:
         where = f"altitude = {altitude:.6g} m, velocity = {velocity:.6g} m/s"
@@ -87,11 +87,11 @@ def trim_at(
     climb_rate: float | str = 0.0,
     acceleration: float | str = 0.0,
 ) -> Trim:
-    """Return the equilibrium at a condition of numbers (SI) or of texts with units, as :func:`trim`.
+    """Return the equilibrium at a condition given by numbers (SI) or texts with units, see :func:`trim`.
 
     Raises:
         QuantityError: A text cannot be read.
-        TrimError: As :func:`trim`; it repeats the condition as it was given.
+        TrimError: See :func:`trim`; the message repeats the condition as it was given.
     """
     units = {"altitude": "m", "velocity": "m/s", "climb_rate": "m/s", "acceleration": "m/s^2"}
     given = dict(zip(units, (altitude, velocity, climb_rate, acceleration), strict=True))
@@ -107,7 +107,7 @@ def check_equilibrium(where: str, size: float, u: np.ndarray, vehicle: VehiclePa
     """Check the imbalance ``size`` of an equilibrium, and that the input ``u`` (2) is within the limits of ``vehicle``.
 
     Raises:
-        TrimError: Names ``where`` and the reason.
+        TrimError: One of them is not; the message names ``where`` and the reason.
     """
     if not size < CONVERGED:
         raise TrimError(f"{where}: no equilibrium there, expected a condition inside the trimmable envelope")
@@ -126,7 +126,7 @@ INITIAL_PARAMETERS = (
 
 
 def initial_trim(values: Mapping[str, object]) -> tuple[VehicleParameters, Trim]:
-    """Return the nominal vehicle of a flight and its trim, from :data:`INITIAL_PARAMETERS` and the vehicle's."""
+    """Return the nominal vehicle and the initial trim of a flight, from the parameters of its plant."""
     v = validate(INITIAL_PARAMETERS, values)
     vehicle = Vehicle.from_parameters(values)
     vehicle.check_envelope(INITIAL_PARAMETERS, v)

@@ -1,14 +1,14 @@
-"""Vehicles as files: structure, coefficients, elastic modes, inertial coupling, envelope, uncertainty and limits.
+"""Vehicles and their TOML files: equations, coefficients, inertial coupling, envelope, uncertainty and limits.
 
-Every quantity carries its unit. A package registers its files as entry points of the group ``hsv.vehicles``; in
-``pyproject.toml``::
+Every quantity in a file carries its unit. A package registers its files as entry points of the group ``hsv.vehicles``
+in its ``pyproject.toml``::
 
     [project.entry-points."hsv.vehicles"]
     glider = "my_vehicles:glider.toml"
 
-Scenarios and design inputs then have ``vehicle = "glider"``, or ``vehicle = "glider.toml"`` for a file that is not
-registered, a path relative to the folder of the scenario. A file may extend another one (:mod:`hsv.base.files`). The
-package of a registered vehicle is located, not imported: reading data runs no code.
+Scenarios and design inputs then select it by ``vehicle = "glider"``. A file that is not registered is selected by its
+path relative to the folder of the scenario, ``vehicle = "glider.toml"``. A file may extend another one
+(:mod:`hsv.base.files`). The package of a registered vehicle is located, not imported: reading data runs no code.
 """
 
 from __future__ import annotations
@@ -33,28 +33,28 @@ from hsv.model.dynamics import AT_REST, COEFFICIENT_UNITS, POSITIVE, STRUCTURES,
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, PUBLISHED_ALTITUDE, PUBLISHED_VELOCITY
 
 GROUP = "hsv.vehicles"
-"""The entry points of vehicles, ``package:file.toml`` each."""
+"""Group of the entry points of vehicles; each is ``package:file.toml``."""
 
 SHIPPED_VEHICLES = {name: f"hsv.model:vehicles/{name}.toml" for name in ("parker", "winged_cone")}
-"""Files of this library by name; others are entry points."""
+"""Vehicle files of this library by name; those of other packages are entry points."""
 
 DEFAULT_VEHICLE = "parker"
-"""The paper's vehicle, the default."""
+"""The default vehicle, which is the paper's."""
 
 DEFAULT_STRUCTURE = next(iter(STRUCTURES))
-"""Structure of the vehicles whose file names none."""
+"""Structure of a vehicle whose file does not name one."""
 
 DERIVED = "derived"
-"""The set of inertial coupling of which a number is a multiple."""
+"""Name of the set of inertial coupling that is scaled if a number is given as the coupling."""
 
 MAX_COUPLING = 2.0
-"""Largest multiple: more exceeds what a vehicle of this structure can have."""
+"""Largest multiple of the derived coupling; more exceeds what a vehicle of this structure can have."""
 
 MAX_UNCERTAIN = 12
 """Maximum number of uncertain parameters: a design flies every corner of their bounds."""
 
 MAX_UNCERTAINTY = 0.9
-"""Largest relative bound."""
+"""Largest relative bound of an uncertain parameter."""
 
 _DAMPING = ("damping_ratio_1", "damping_ratio_2")
 _PSI = dict.fromkeys(("inertial_coupling_1", "inertial_coupling_2"), "kg^0.5 m")
@@ -85,25 +85,25 @@ VEHICLE_PARAMETERS = (
     Parameter("vehicle.uncertainty.names", [""], "names of the uncertain coefficients"),
     Parameter("vehicle.uncertainty.bounds", [], "relative bound of each", "", 0.0, MAX_UNCERTAINTY),
 )
-"""Parameters of a vehicle for the nodes; missing ones are taken from the vehicle of that name."""
+"""Parameters of a vehicle for the nodes; missing ones are taken from the vehicle that ``vehicle.name`` names."""
 
 
 @dataclass(frozen=True, eq=False)
 class Vehicle:
-    """A vehicle, SI."""
+    """A vehicle: its coefficients and limits, inertial coupling, envelope and uncertainty, in SI units."""
 
     name: str
     title: str
     decoupled: VehicleParameters
     """Coefficients and limits, without inertial coupling (paper eq. 4)"""
     couplings: Mapping[str, tuple[float, float]]
-    """psi_1 and psi_2 (kg^0.5 m) of each set of inertial coupling; the first is the default"""
+    """psi_1 and psi_2 (kg^0.5 m) of each set of inertial coupling by name; the first set is the default"""
     altitude_range: tuple[float, float]
-    """m, range of commands"""
+    """Smallest and largest altitude (m) of commands"""
     velocity_range: tuple[float, float]
-    """m/s, range of commands"""
+    """Smallest and largest velocity (m/s) of commands"""
     uncertainty: Mapping[str, float]
-    """Relative bounds of the uncertain coefficients (paper section 5.1)"""
+    """Relative bounds of the uncertain coefficients by name (paper section 5.1)"""
 
     def __post_init__(self) -> None:
         """Check the values; a QuantityError names the wrong one."""
@@ -151,7 +151,7 @@ class Vehicle:
         return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
 
     def condition(self, altitude: float | str, velocity: float | str) -> tuple[float | str, float | str]:
-        """Return a flight condition; empty texts become the published one, or the centre if that is outside."""
+        """Return altitude and velocity; empty texts become the published ones, or the centre if these are outside."""
         published_altitude = parse_quantity(PUBLISHED_ALTITUDE, "m", "altitude")
         published_velocity = parse_quantity(PUBLISHED_VELOCITY, "m/s", "velocity")
         (h_low, h_high), (v_low, v_high) = self.altitude_range, self.velocity_range
@@ -166,7 +166,7 @@ class Vehicle:
             coupling: A name, a number or its text; empty: the first set.
 
         Raises:
-            QuantityError: No such set, or no number from 0 to :data:`MAX_COUPLING`.
+            QuantityError: There is no such set, or the number is not between 0 and :data:`MAX_COUPLING`.
         """
         if coupling == "" or (coupling == COUPLING_PARAMETER.default and not self.decoupled.form.elastic):
             return next(iter(self.couplings))
@@ -182,7 +182,7 @@ class Vehicle:
         return repr(scale)
 
     def coupled(self, coupling: str | float = "") -> VehicleParameters:
-        """Return the coupled model (paper eq. 1) with a set of inertial coupling, or a multiple of the derived."""
+        """Return the coupled model (paper eq. 1) with the inertial coupling named as in :meth:`coupling_name`."""
         name = self.coupling_name(coupling)
         if name in self.couplings:
             psi_1, psi_2 = self.couplings[name]
@@ -191,14 +191,14 @@ class Vehicle:
         return self.decoupled._replace(inertial_coupling_1=psi_1, inertial_coupling_2=psi_2)
 
     def coupling_scale(self, coupling: str) -> float:
-        """Return kappa of a set of inertial coupling: its first coefficient as a share of the derived one's."""
+        """Return kappa of a set of inertial coupling: the ratio of its psi_1 to that of the derived set."""
         return self.couplings[coupling][0] / self.couplings[DERIVED][0]
 
     def check_envelope(self, table: Iterable[Parameter], values: Mapping[str, Any]) -> None:
         """Check that altitudes and velocities, the parameters of a ``table`` in m and m/s, lie in the flight envelope.
 
         Raises:
-            ParameterError: Names the parameter.
+            ParameterError: A value is outside; the message names its parameter.
         """
         ranges = {"m": self.altitude_range, "m/s": self.velocity_range}
         for parameter in table:
@@ -207,7 +207,7 @@ class Vehicle:
                 replace(parameter, minimum=low, maximum=high).check(values[parameter.name])
 
     def to_parameters(self) -> dict[str, Any]:
-        """Return the flat parameters, :data:`VEHICLE_PARAMETERS`."""
+        """Return the values of :data:`VEHICLE_PARAMETERS` that describe this vehicle, by name."""
         p = self.decoupled
         return {
             "vehicle.name": self.name,
@@ -226,11 +226,13 @@ class Vehicle:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any]) -> Self:
-        """Return the vehicle in flat parameters; missing ones are taken from the vehicle of its name.
+        """Return the vehicle that the values of :data:`VEHICLE_PARAMETERS` describe.
+
+        Missing values are taken from the registered vehicle called ``vehicle.name``.
 
         Raises:
-            ParameterError: A wrong value, named.
-            VehicleError: Some are missing, and there is no vehicle of that name.
+            ParameterError: A value is wrong; the message names its parameter.
+            VehicleError: Values are missing, and no vehicle of that name is registered.
         """
         if lacking := missing_parameters(values):
             # Parameters may come from an untrusted bag or certificate: a path in them is not opened.
@@ -266,7 +268,7 @@ class Vehicle:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of all data except the name; empty for the default vehicle, as in old designs."""
+        """SHA-256 of all parameters except the name; empty for the default vehicle, as in old designs."""
         own, default = (_digest(vehicle) for vehicle in (self, load_vehicle()))
         return "" if own == default else own
 
@@ -280,7 +282,7 @@ def _digest(vehicle: Vehicle) -> str:
 
 
 def missing_parameters(values: Mapping[str, Any]) -> list[str]:
-    """Return the names of the flat parameters that ``values`` lacks to describe a whole vehicle of its structure."""
+    """Return the names of the parameters that ``values`` lacks for a complete vehicle of its structure."""
     form = STRUCTURES.get(str(values.get("vehicle.structure", DEFAULT_STRUCTURE)), STRUCTURES[DEFAULT_STRUCTURE])
     optional = {"vehicle.structure", *(f"vehicle.{name}" for name in COEFFICIENT_UNITS if name not in form.names)}
     names = (parameter.name for parameter in VEHICLE_PARAMETERS)
@@ -288,10 +290,10 @@ def missing_parameters(values: Mapping[str, Any]) -> list[str]:
 
 
 def named_parameters(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the flat parameters of the vehicle that ``vehicle.name`` in ``values`` names, the default one without.
+    """Return the parameters of the vehicle called ``vehicle.name`` in ``values``, by default those of the paper's.
 
     Raises:
-        VehicleError: There is none of that name.
+        VehicleError: There is no vehicle of that name.
     """
     return load_vehicle(str(values.get("vehicle.name", DEFAULT_VEHICLE))).to_parameters()
 
@@ -302,7 +304,7 @@ def vehicle_names() -> list[str]:
 
 
 def _places_elsewhere() -> dict[str, str]:
-    """Return the places of vehicles of other packages, by name."""
+    """Return the entry points, ``package:file.toml``, of vehicles in other packages by name."""
     from importlib.metadata import entry_points  # slow
 
     return {entry.name: entry.value for entry in reversed([*entry_points(group=GROUP)])}
@@ -312,7 +314,7 @@ def load_vehicle(name: str = DEFAULT_VEHICLE) -> Vehicle:
     """Return a registered vehicle by name, or one from a file by path.
 
     Raises:
-        VehicleError: There is none, or a field is wrong; the message names it and what was expected.
+        VehicleError: There is no such vehicle, or a field is wrong; the message names it and what was expected.
     """
     return parse_vehicle(vehicle_tables(name), vehicle_label(name)) if is_path(name) else _registered(name)
 
@@ -331,13 +333,13 @@ def vehicle_tables(name: str) -> Tables:
     """Return the contents of a vehicle file, by name or path, merged over the files that it extends.
 
     Raises:
-        VehicleError: No such file, or it or a file that it extends is not TOML.
+        VehicleError: The file, or a file that it extends, is missing or is not TOML.
     """
     return follow_extends(name, _read, lambda file, why: VehicleError(f"vehicle {vehicle_label(file)!r}: {why}"))
 
 
 def vehicle_text(name: str) -> str:
-    """Return the text of a vehicle file, by name or path, with the files that it extends merged in."""
+    """Return the text of a valid vehicle file, by name or path, with the files that it extends merged in."""
     load_vehicle(name)
     return tomli_w.dumps(vehicle_tables(name)) if EXTENDS in _read(name) else read_text(_path(name))
 
@@ -366,7 +368,7 @@ def _path(name: str) -> Path:
 
 
 def parse_vehicle(tables: Mapping[str, Any], name: str) -> Vehicle:
-    """Return the vehicle in the ``tables`` of a file, by the ``name`` it is to have.
+    """Return the vehicle that the ``tables`` of a file describe, with the given ``name``.
 
     Raises:
         VehicleError: A field is missing, unknown or wrong; the message names it and what was expected.
@@ -379,7 +381,7 @@ def parse_vehicle(tables: Mapping[str, Any], name: str) -> Vehicle:
 
 def _parsed(tables: Mapping[str, Any], name: str) -> Vehicle:
     structure = tables.get("structure", DEFAULT_STRUCTURE)
-    if structure not in [*STRUCTURES]:  # a list: a table is no key
+    if structure not in [*STRUCTURES]:  # a list, because a TOML table cannot be looked up in a dict
         raise QuantityError(f"structure = {structure!r}: expected {one_of(STRUCTURES, str(structure))}")
     form = STRUCTURES[structure]
     sets = tables.get("inertial_coupling", {}) if form.elastic else {}
