@@ -1,1 +1,1 @@
-"""Notch filter, nominal trajectory and tube law; what the nodes step in flight."""
+"""Designs and their verification, notch filter, nominal trajectory, control laws, and custom controllers."""

@@ -1,6 +1,6 @@
 """Interface of a controller: its inputs and outputs in a step.
 
-A custom controller is a class with four attributes; this one flies::
+A custom controller is a class with four attributes, for example::
 
     class Open:
         PARAMETERS = (Parameter("open.trim_share", 1.0, "times the input of the trim", "", 0.0, 2.0),)
@@ -49,22 +49,22 @@ STEP_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, *[ctypes.c_void
 
 
 class ControllerInput(NamedTuple):
-    """Inputs of a controller in a step, SI units and radians: k, and the signals of :data:`CONTROLLER_INPUTS`."""
+    """Inputs of a controller in a step, in SI units: k, and the signals of :data:`CONTROLLER_INPUTS`."""
 
     step: int
-    """k, from 0 on; t = k T"""
+    """Number k of the step, from 0; time t = k T"""
     estimate: np.ndarray
-    """x (9) with the unfiltered pitch rate: the estimate if an estimator flies, else the measurement"""
+    """State x (9) with the unfiltered pitch rate: the estimate if there is an estimator, else the measurement"""
     filtered_pitch_rate: float
-    """q_f, rad/s"""
+    """Pitch rate q_f behind the notch filter, rad/s"""
     reference: np.ndarray
-    """x_r (9)"""
+    """Reference state x_r (9)"""
     reference_input: np.ndarray
-    """u_r (2)"""
+    """Reference input u_r (2)"""
     deviation: np.ndarray
-    """x_n (9)"""
+    """Nominal state x_n (9), a deviation from the reference"""
     nominal_input: np.ndarray
-    """u_n (2)"""
+    """Nominal input u_n (2), a deviation from the reference input"""
     filter_state: np.ndarray
     """States (2 per section) of the notch filter before its update; empty without a notch filter"""
 
@@ -89,27 +89,27 @@ class ControllerResult:
     """Result of a controller's step; :class:`hsv.control.tube_law.TubeResult` adds diagnostics."""
 
     input: np.ndarray
-    """u (2), within the limits"""
+    """Input u (2), within the limits"""
     u_unsaturated: np.ndarray
-    """(2) before the limits"""
+    """Input (2) before the limits"""
 
     @property
     def saturated(self) -> np.ndarray:
-        """Which of the two inputs (2) are limited."""
+        """Whether each of the inputs (2) is limited."""
         return np.asarray(self.input != self.u_unsaturated)
 
 
 class StepKernel(NamedTuple):
-    """A compiled step function, by its address, with its arrays.
+    """The address of a compiled step function, and its arrays.
 
     The signature is ``int32 step(int64 k, const double *in, double *out, double *state, const double *par)``; a result
     other than 0 ends the flight. ``in`` holds :data:`CONTROLLER_INPUTS` one after the other, ``out`` receives the
-    unsaturated input (2), and ``state`` holds everything that is kept from step to step.
+    unsaturated input (2), ``state`` holds everything that is kept from step to step, and ``par`` is ``parameters``.
     """
 
     address: int
     state: np.ndarray
-    """State at the start of a run; every flight has its own copy."""
+    """State before step 0; every flight uses a copy."""
     parameters: np.ndarray
 
 
@@ -119,22 +119,22 @@ class Controller(ABC):
     name = ""
     """Name in error messages."""
     in_core = False
-    """Whether the core contains this law; ``kernel`` is then its data"""
+    """Whether the C core contains this control law; ``kernel`` is then its data"""
     kernel: Any = None
     """The :class:`StepKernel` of a controller outside the core; None: call :meth:`unsaturated_input`"""
     library: Any = None
-    """The process of the shared library that holds the function, or None, see :mod:`hsv.control.library_process`"""
+    """The process that steps a controller in a shared library, see :mod:`hsv.control.library_process`, or None"""
 
     @abstractmethod
     def reset(self) -> None:
-        """Start a new run."""
+        """Clear the state of the controller before a new run."""
 
     @abstractmethod
     def step(self, inputs: ControllerInput) -> ControllerResult:
-        """Return the input of this step; called once per step, in order."""
+        """Return the input of this step, limited and unlimited; called once per step, in order."""
 
     def unsaturated_input(self, inputs: ControllerInput) -> tuple[float, float]:
-        """Return the input of this step before the limits; called in place of :meth:`step`."""
+        """Return fuel equivalence ratio and elevator (rad) before the limits; called instead of :meth:`step`."""
         fuel, elevator = self.step(inputs).u_unsaturated
         return float(fuel), float(elevator)
 
@@ -151,15 +151,15 @@ class Controller(ABC):
 class ControllerClass(Protocol):
     """The class of a controller: its parameters and its constructor.
 
-    An instance has a ``reset`` and a ``step`` that returns the unsaturated input, fuel equivalence ratio and elevator
-    deflection (rad), or, in place of a ``step``, a :class:`StepKernel` ``kernel``. The bench limits the input.
+    An instance has either a ``kernel``, a :class:`StepKernel`, or the methods ``reset`` and ``step``. A step returns
+    the unsaturated input, fuel equivalence ratio and elevator deflection (rad); the bench limits it.
     """
 
     PARAMETERS: tuple[Parameter, ...]
-    """Parameters of the controller, named ``table.parameter``; a scenario sets them in that table."""
+    """Parameters of the controller, named ``table.parameter``; a scenario sets them in the table of that name."""
 
     def from_parameters(self, values: Mapping[str, Any], design: ControlDesign | None) -> Any:
-        """Return a controller from all flat parameters of a flight and its design, or ``None`` without a design."""
+        """Return a controller from all flat parameters of a flight and its design, ``None`` if it has no design."""
 
 
 class NodeController(Controller):
@@ -171,18 +171,18 @@ class NodeController(Controller):
 
     @property
     def kernel(self) -> Any:
-        """Raise :meth:`refusal`."""
+        """Raise the error that :meth:`refusal` returns."""
         raise self.refusal()
 
     def reset(self) -> None:
         """Do nothing."""
 
     def step(self, inputs: ControllerInput) -> ControllerResult:
-        """Raise :meth:`refusal`."""
+        """Raise the error that :meth:`refusal` returns."""
         raise self.refusal()
 
     def refusal(self) -> ParameterError:
-        """Return the error for flying it in this process."""
+        """Return the error for an attempt to step this controller outside its node."""
         return ParameterError(f"controller = {self.name!r}: a node of its own, expected hsv run to fly it")
 
 
@@ -200,7 +200,7 @@ class ExternalController(Controller):
             self.reset()
 
     def reset(self) -> None:
-        """Start a new run.
+        """Clear the state of the controller before a new run.
 
         Raises:
             ControllerError: The controller failed.
@@ -222,7 +222,7 @@ class ExternalController(Controller):
         return made
 
     def unsaturated_input(self, inputs: ControllerInput) -> tuple[float, float]:
-        """Return the unsaturated input of this step, finite or not.
+        """Return fuel equivalence ratio and elevator (rad) before the limits; they may be infinite or NaN.
 
         Raises:
             ControllerError: The controller failed, or did not return two numbers.
@@ -247,7 +247,7 @@ class ExternalController(Controller):
             raise self.failure(inputs.step, f"answered {' '.join(repr(given).split())[:80]}") from None
 
     def step(self, inputs: ControllerInput) -> ControllerResult:
-        """Return the limited input of this step.
+        """Return the input of this step, limited and unlimited.
 
         Raises:
             ControllerError: The controller failed, or did not return two finite numbers.
@@ -266,24 +266,26 @@ class ExternalController(Controller):
 
 
 def failure_words(error: BaseException) -> str:
-    """Return the exception of external code on one line."""
+    """Return type and message of an exception of external code, on one line."""
     return " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
 
 
 def flat_input(inputs: ControllerInput) -> np.ndarray:
-    """Return the inputs of a compiled controller in one array."""
+    """Return the inputs of a compiled controller as one array, in the order of :data:`CONTROLLER_INPUTS`."""
     return np.concatenate([np.ravel(given) for given in inputs[1:]])
 
 
 def call_step_function(
     address: int, step: int, given: np.ndarray, state: np.ndarray, parameters: np.ndarray
 ) -> np.ndarray:
-    """Call the function of a compiled controller and return the unsaturated input (2); ``state`` changes in place.
+    """Call the step function at an ``address`` and return the unsaturated input (2); ``state`` changes in place.
+
+    ``given`` are the inputs of the controller as :func:`flat_input` arranges them.
 
     Raises:
-        RunError: It returned anything but 0.
+        RunError: The function returned a value other than 0.
     """
-    out = np.full(N_INPUTS, np.nan)  # an output that the controller does not set is noticed
+    out = np.full(N_INPUTS, np.nan)  # so that an output that the controller does not set is noticed
     if code := STEP_FUNCTION(address)(step, *(a.ctypes.data for a in (given, out, state, parameters))):
         raise RunError(f"returned {code}")
     return out

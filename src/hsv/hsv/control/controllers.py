@@ -1,13 +1,14 @@
-"""Look up and build controllers: registered by packages under a name, or named by their class.
+"""Look up and build controllers, given by a registered name or by the place of their class or file.
 
 A package registers its controllers as entry points of the group ``hsv.controllers``; in ``pyproject.toml``::
 
     [project.entry-points."hsv.controllers"]
     lqr = "hsv_lqr:Lqr"
 
-A scenario then says ``controller = "lqr"``; where nothing is registered, ``controller = "package.module:Class"``.
-The class is described in :mod:`hsv.control.controller`. A controller in C is ``controller = "path/lib.so:symbol"``, see
-:mod:`hsv.control.library`, and one in an FMU ``controller = "path/controller.fmu"``, see :mod:`hsv.control.fmu`.
+A scenario then contains ``controller = "lqr"``, or ``controller = "package.module:Class"`` for a class without a
+registered name; :mod:`hsv.control.controller` describes the class. A controller in C is
+``controller = "path/lib.so:symbol"``, see :mod:`hsv.control.library`, and one in an FMU
+``controller = "path/controller.fmu"``, see :mod:`hsv.control.fmu`.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from hsv.control.design import ControlDesign
 
 GROUP = "hsv.controllers"
-"""The entry points of controllers."""
+"""Group of the entry points that register controllers."""
 
 SHIPPED_CONTROLLERS = {"tube_mpc": "hsv.control.tube_law:TubeLaw", "robust_mpc": "hsv.control.robust_mpc:RobustMpc"}
 """Classes of this library by name; others are entry points."""
@@ -63,22 +64,22 @@ CONTROLLER_PARAMETERS = (
 
 
 def controller_names() -> list[str]:
-    """Return the names of all registered controllers."""
+    """Return the names of all registered controllers, in alphabetical order."""
     from importlib.metadata import entry_points  # slow
 
     return sorted({*SHIPPED_CONTROLLERS, *(entry.name for entry in entry_points(group=GROUP))})
 
 
 def names_code(controller: str) -> bool:
-    """Return whether a controller is named by its class or library: neither registered nor a node."""
+    """Return whether ``controller`` is the place of a class, a library or an FMU: no registered name and no node."""
     return library_place(controller) is not None or (":" in controller and not controller.startswith(NODE))
 
 
 def controller_class(name: str) -> ControllerClass:
-    """Return the class of a controller, a registered one, ``package.module:Class`` or ``path/lib.so:symbol``.
+    """Return the class of the controller ``name``, or an object with its interface if it is in a library or an FMU.
 
     Raises:
-        ParameterError: There is none of that name, or it cannot be loaded.
+        ParameterError: There is no such controller, or it cannot be loaded.
     """
     if library := library_place(name):
         path, symbol = library
@@ -103,10 +104,10 @@ def controller_class(name: str) -> ControllerClass:
 
 
 def class_place(name: str) -> str:
-    """Return the place of the class of a controller, ``package.module:Class``, without loading it.
+    """Return the place ``package.module:Class`` of the controller ``name`` without loading it; libraries as named.
 
     Raises:
-        ParameterError: There is none of that name.
+        ParameterError: There is no such controller.
     """
     place = SHIPPED_CONTROLLERS.get(name, name)
     if library_place(place):
@@ -133,8 +134,11 @@ def build_controller(values: Mapping[str, Any], design: ControlDesign | None = N
     """Return the controller that the flat parameters ``values`` describe.
 
     Args:
-        values: Parameters of the flight; the controller uses its own.
-        design: The design in ``values`` if already built.
+        values: Flat parameters of the flight, of which the controller uses its own.
+        design: The design in ``values``, if it is already built.
+
+    Raises:
+        ParameterError: There is no such controller, or it cannot be built.
     """
     name = str(validate(CONTROLLER_PARAMETERS, values)["controller"])
     if name.startswith(NODE):

@@ -1,4 +1,4 @@
-"""Laws for the nominal input u_n given the nominal state x_n: nested gains (eq. 32 to eq. 35), also found in flight."""
+"""Laws for the nominal input u_n at the nominal state x_n: nested gains (eq. 32 to eq. 35) or gains found in flight."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from hsv.core import Struct, doubles, ffi, lib, vector
 from hsv.model.signals import N_RIGID, N_STATES
 
 MEMBERSHIP_TOLERANCE = 1e-6
-"""Relative slack of x' P x <= 1, as in ``core/nominal.h``: the first deviation lies on the outermost boundary."""
+"""Relative tolerance of x' P x <= 1, as in ``core/nominal.h``; x_n(0) lies on the outermost boundary."""
 
 NOT_IN_FAMILY = 255
-"""Index of a gain that was found in flight."""
+"""Index that stands for a gain that is not in the family, but found in flight."""
 
 
 class NominalStatus(IntFlag):
-    """Reasons for which a step of the nominal trajectory deviates from the plan; values of NominalState.status."""
+    """Flags for irregular steps of the nominal trajectory; values of ``status`` in the message NominalState."""
 
     OK = 0
     OUTSIDE_FAMILY = 1
@@ -32,9 +32,10 @@ class NominalStatus(IntFlag):
 
 @dataclass(frozen=True)
 class LawResult:
-    """u_n (2); the gain K (2, 9) in it and its index in the family, ``NOT_IN_FAMILY`` if found in flight; status.
+    """Result of a nominal law: u_n (2), the gain K (2, 9) used, its index in the family, and the status of the step.
 
-    Of an interpolated family, gain and index are those of the smallest ellipsoid that holds x_n.
+    The index is 0 for the outermost ellipsoid and ``NOT_IN_FAMILY`` for a gain found in flight. In an interpolated
+    family, gain and index are those of the smallest ellipsoid that contains x_n.
     """
 
     input: np.ndarray
@@ -44,29 +45,30 @@ class LawResult:
 
 
 def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
-    """Return x' P x for the first s states, with P (s, s)."""
+    """Return x' P x for the matrix P = ``ellipsoid`` (s, s) and the first s entries of ``x``; at most 1 inside."""
     n = len(ellipsoid)
     return float(lib.hsv_level(doubles(vector(ellipsoid), n, n), n, doubles(vector(x[:n]), n)))
 
 
 class FamilyLaw:
-    """The nested family: the gain of the smallest ellipsoid with x_n, or of the outermost if x_n lies in none.
+    """Nominal law with the nested family of gains: that of the smallest ellipsoid that contains x_n.
 
-    Or, interpolated, one between it and that of the next ellipsoid inside. Other laws derive from it, and fall back to
-    it; a law is deterministic and stepped once a control period.
+    If x_n lies in no ellipsoid, the gain of the outermost one is used. An interpolated family uses a gain between that
+    of the smallest ellipsoid with x_n and that of the next one inside. The other laws derive from this class and fall
+    back to it. A law is deterministic and stepped once per control period.
     """
 
     in_core = True
-    """Whether the core has the law in its loop"""
+    """Whether the C core contains the law"""
 
     def __init__(self, data: Struct) -> None:
         self.data = data
 
     def reset(self) -> None:
-        """Nothing to forget."""
+        """Do nothing: this law has no state."""
 
     def step(self, deviation: np.ndarray) -> LawResult:
-        """Return the nominal input for x_n (9)."""
+        """Return the nominal input for ``deviation``, the nominal state x_n (9)."""
         u_n, found = np.empty(self.data.gains.shape[1]), ffi.new("double *")
         inside = lib.hsv_nominal_input(self.data.pointer, doubles(vector(deviation), N_STATES), doubles(u_n), found)
         index = int(found[0])
@@ -76,27 +78,27 @@ class FamilyLaw:
 
 
 SOLVE_STEPS = 100
-"""Steps from the start of a solve to the step at which its gain takes effect."""
+"""Number of steps from the start of a solution to the step at which its gain takes effect."""
 
 _HEADROOM = 1.02
-"""Factor on the state that is solved for, so that the state of 100 steps later still lies in the ellipsoid."""
+"""Factor on the state for which the LMI is solved, so that the state 100 steps later still lies in the ellipsoid."""
 
 
 class KothareLaw(FamilyLaw):
-    """u_n = K x_n with K from the LMI for x_n(k), in effect from step k + ``SOLVE_STEPS`` exactly.
+    """Nominal law u_n = K x_n with K from the LMI (32)-(35) for x_n(k), used from step k + ``SOLVE_STEPS`` exactly.
 
-    A worker thread solves between the steps. A step whose solution is late waits for it, so that the flight depends on
-    the nominal state alone, never on timing. Until the first solution the family of gains is used. A new gain replaces
-    the last one only if x_n lies in its ellipsoid, in which (35) bounds the input; otherwise, and if the solver fails,
-    the last gain stays and the status reports it. It also stays inside the family's innermost ellipsoid, where a
-    new gain could not improve it.
+    A worker thread solves the LMI between the steps. A step whose solution is late waits for it, so that the flight
+    depends on the nominal state alone, never on timing. Until the first solution, the family of gains is used. A new
+    gain replaces the last one only if x_n lies in its ellipsoid, in which (35) bounds the input. Otherwise, and if the
+    solver fails, the last gain is kept and the status reports it. In the innermost ellipsoid of the family no new gain
+    is computed.
     """
 
     in_core = False
 
     def __init__(self, design: ControlDesign, data: Struct) -> None:
         super().__init__(data)
-        # Modelling and solver take a second to import: only this law pays for them.
+        # Imported here, as the modelling tool and the solver take a second to import.
         from hsv.control.nominal_gain import NominalProblem, nominal_gain
 
         self._nominal_gain = nominal_gain
@@ -114,7 +116,7 @@ class KothareLaw(FamilyLaw):
         self.reset()
 
     def reset(self) -> None:
-        """Return to the family; a solve under way is forgotten."""
+        """Return to the family of gains, and discard a solution that is being computed."""
         if self._pending:
             self._pending.cancel()
         self._pending = None
@@ -123,7 +125,7 @@ class KothareLaw(FamilyLaw):
         self._status = NominalStatus.OK
 
     def step(self, deviation: np.ndarray) -> LawResult:
-        """Return the nominal input for x_n (9)."""
+        """Return the nominal input for ``deviation``, the nominal state x_n (9)."""
         if self._step % SOLVE_STEPS == 0:
             if self._pending:
                 self._take(self._pending.result(), deviation)
@@ -137,7 +139,7 @@ class KothareLaw(FamilyLaw):
         return LawResult(self._gain @ deviation, self._gain, NOT_IN_FAMILY, self._status)
 
     def _solve(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return the gain (2, 9) for a rigid state (5), and the P of its ellipsoid, or None if the solver fails."""
+        """Return the gain (2, 9) for a rigid state (5), and P (5, 5) of its ellipsoid, or None if the solver fails."""
         try:
             found = self._nominal_gain(self._problem, _HEADROOM * state)
         except DesignError:
@@ -147,6 +149,7 @@ class KothareLaw(FamilyLaw):
         return gain, np.linalg.inv(found.Q)
 
     def _take(self, solution: tuple[np.ndarray, np.ndarray] | None, deviation: np.ndarray) -> None:
+        """Use the gain of ``solution`` if x_n lies in its ellipsoid; else keep the last gain and set the status."""
         if solution is not None and level(solution[1], deviation) <= 1.0:
             self._gain, self._status = solution[0], NominalStatus.OK
             return

@@ -1,4 +1,4 @@
-"""Reference equilibrium and nominal trajectory (paper eq. 20) under an exchangeable nominal law (eq. 32 to eq. 35)."""
+"""Reference and nominal trajectory (paper eq. 20) under an exchangeable nominal law (eq. 32 to eq. 35)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,10 @@ NOMINAL_PARAMETERS = (
 
 
 class NominalResult(NamedTuple):
-    """One step: x_r (9), u_r (2), x_n (9), u_n (2), the gain K (2, 9) used, its index (0 = outermost), status."""
+    """One step of the nominal trajectory: x_r (9), u_r (2), x_n (9), u_n (2), the gain K (2, 9), its index and status.
+
+    The index is that of the gain in the nested family, 0 for the outermost, see :class:`LawResult`.
+    """
 
     reference: np.ndarray
     reference_input: np.ndarray
@@ -39,20 +42,23 @@ class NominalResult(NamedTuple):
 
     @property
     def in_family(self) -> bool:
-        """Whether the gain is one of the design's nested family, which its index names."""
+        """Whether the gain belongs to the nested family of the design; otherwise it was found in flight."""
         return self.gain_index != NOT_IN_FAMILY
 
 
 class NominalTrajectory:
-    """Starts at x_n(0) = x(0) - x_r(0) and runs the nominal system, scheduled by the measured state, to rest."""
+    """The nominal trajectory of a flight: the nominal system from x_n(0) = x(0) - x_r(0), stepped under a nominal law.
+
+    Measured altitude and velocity schedule the model.
+    """
 
     PARAMETERS = (*NOMINAL_PARAMETERS, *VEHICLE_PARAMETERS, *ACTUATOR_PARAMETERS)
-    """The actuators limit what can be commanded in flight (:func:`hsv.control.governor.command_in_flight`)."""
+    """The actuators' limits apply to commands in flight only (:func:`hsv.control.governor.command_in_flight`)."""
 
     def __init__(
         self, design: ControlDesign | None, reference: ReferenceTrajectory, law: FamilyLaw | None = None
     ) -> None:
-        """Use ``law``, by default the nested family of the design; without a design there is only the reference."""
+        """Use ``law``, by default the nested family of the design; without a design, x_n and u_n stay zero."""
         self.reference = reference
         self.data = nominal_data(design) if design else NO_NOMINAL
         self.law = law or FamilyLaw(self.data)
@@ -63,11 +69,11 @@ class NominalTrajectory:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object], design: ControlDesign | None = None) -> Self:
-        """Build from the design's parameters and :data:`NOMINAL_PARAMETERS`; the design model is never perturbed.
+        """Build from the design's parameters and :data:`NOMINAL_PARAMETERS`; the model has no perturbed parameters.
 
         Args:
             values: Flat parameters.
-            design: The design in ``values``, where it is known already.
+            design: The design in ``values``, if it is already built.
         """
         v = validate(NOMINAL_PARAMETERS, values)
         design = design or design_of(values)
@@ -81,27 +87,27 @@ class NominalTrajectory:
 
     @property
     def next_step(self) -> int:
-        """The step that is flown next."""
+        """Number of the next step."""
         return self._step
 
     @property
     def deviation(self) -> np.ndarray:
-        """x_n (9) of the next step, 0 before the first."""
+        """Nominal state x_n (9) of the next step; zero before step 0."""
         return self._deviation.copy()
 
     def change_reference(self, reference: ReferenceTrajectory) -> None:
-        """Fly ``reference`` until :meth:`reset`; it equals the reference so far in every step flown."""
+        """Use ``reference`` until :meth:`reset`; it must equal the present reference in all steps up to now."""
         self.reference = reference
 
     def reset(self) -> None:
-        """Forget the past: the next step is the first of a new nominal trajectory."""
+        """Return to the original reference and to step 0, where the next nominal trajectory begins."""
         self.reference = self._planned
         self._deviation[:] = 0.0
         self._step = 0
         self.law.reset()
 
     def step(self, state: np.ndarray) -> NominalResult:
-        """Return reference and nominal state of this step from the measured ``state`` (9), then advance x_n."""
+        """Return reference, nominal state and input of this step, and advance x_n by the measured ``state`` (9)."""
         row = self.reference.row(self._step)
         data = self.reference.data
         reference = data.state[row]
@@ -145,11 +151,11 @@ NO_NOMINAL = Struct(
     ellipsoids=np.zeros((0, N_RIGID, N_RIGID)),
     interpolated=False,
 )
-"""Placeholder for a nominal system if there is no design: x_n and u_n stay zero."""
+"""The nominal system of a flight without a design: no gains, so that x_n and u_n stay zero."""
 
 
 def nominal_data(design: ControlDesign) -> Struct:
-    """Return the nominal system and the nested family of ``design`` as the core takes them."""
+    """Return the nominal system and the nested family of ``design`` as the struct ``hsv_nominal`` of the core."""
     return Struct(
         "hsv_nominal",
         polytope=design.polytope.data(),

@@ -1,8 +1,9 @@
-"""The nominal law u_n = K x_n + c, where c over the horizon solves a quadratic programme in every step.
+"""The nominal law u_n = K x_n + c, where c over a horizon is the solution of a quadratic programme in every step.
 
-The programme keeps the inputs in U minus F Z and in the range of the certified plans, and the nominal pitch
-acceleration in the range of those plans, because the disturbance set was measured along them. A plan bounded by
-U minus F Z alone causes disturbances several times as large as the set, mainly through the filtered pitch rate.
+The programme keeps the inputs within U minus F Z and within the range of the certified plans. It keeps the nominal
+pitch acceleration within the range of those plans, too, because the disturbance set was measured along them. A plan
+bounded by U minus F Z alone causes disturbances several times as large as the set, mainly through the filtered pitch
+rate.
 """
 
 from __future__ import annotations
@@ -22,32 +23,31 @@ BLOCKS = 30
 """Number of blocks of the horizon; c is constant in each block."""
 
 BLOCK_TIME = 0.5
-"""Length of a block, s."""
+"""Duration of a block, s."""
 
 CHECKED_NEAR, CHECKED_FAR = (0.0, 0.24, 0.48, 0.72, 0.96), (0.0, 0.48)
-"""Positions in a block at which bounds are imposed, as fractions of it; with bounds at its ends alone inputs overshoot.
-"""
+"""Times in near and far blocks at which bounds apply, as fractions of a block; bounds at its ends alone are too few."""
 
 NEAR_BLOCKS = 10
-"""Number of near blocks, in which the inputs move fast; the pitch acceleration is bounded in these blocks only."""
+"""Number of blocks at the beginning, where inputs move fast; only there is the pitch acceleration bounded."""
 
 _ITERATIONS = 60
 """Iteration limit of the solver; about 10 are needed."""
 
 
 class QpLaw(FamilyLaw):
-    """Nominal law by quadratic programming: horizon 15 s, model and Riccati gain K at the final reference.
+    """Nominal law by quadratic programming over a horizon of 15 s, with model and LQR gain K at the final reference.
 
-    With this K the infinite-horizon cost is x' P x plus the sum of c' (R + B' P B) c. The Hessian is therefore
-    constant, and c = 0 is optimal wherever it satisfies the bounds. The solver starts cold in every step, so that the
-    input depends on x_n alone. If the solver fails, the law continues the previous plan; if there is no plan or it has
-    run out, the family of nominal gains takes over.
+    With P the solution of the Riccati equation, the infinite-horizon cost is x' P x plus the sum of c' (R + B' P B) c.
+    The Hessian is therefore constant, and c = 0 is optimal wherever it satisfies the bounds. The solver starts cold in
+    every step, so that the input depends on x_n alone. If the solver fails, the law continues the previous plan; if
+    there is no plan or it has ended, the family of nominal gains is used.
     """
 
     in_core = False
 
     def __init__(self, design: ControlDesign, data: Struct, reference: ReferenceTrajectory) -> None:
-        """Prepare the programme: its bounds are the plan bounds of the design minus the reference inputs of the flight.
+        """Set up the programme; its bounds are the plan bounds of the design minus the reference inputs of the flight.
 
         Raises:
             DesignError: The design has no plan bounds, or the reference inputs lie outside them.
@@ -74,7 +74,7 @@ class QpLaw(FamilyLaw):
         K = -np.linalg.solve(weight, B.T @ P @ A)
         self.gain = np.zeros(data.gains.shape[1:])
         self.gain[:, :N_RIGID] = K
-        # Rows of inputs and c are scaled by the input scales, rows of the pitch acceleration by its range.
+        # Inputs and c are scaled by the input scales, the pitch acceleration by its range.
         low, high = bounds.pitch_acceleration
         size = np.append(self._scale, high - low)
         rate = np.append(A[PITCH_RATE] - np.eye(N_RIGID)[PITCH_RATE], B[PITCH_RATE]) / design.period
@@ -111,14 +111,14 @@ class QpLaw(FamilyLaw):
         return LawResult(np.clip(planned, self._lower, self._upper), self.gain, NOT_IN_FAMILY, status)
 
     def _solve(self, state: np.ndarray) -> np.ndarray | None:
-        """Return the optimal c (blocks, 2), or ``None`` if the solver fails."""
+        """Return the optimal c (blocks, 2) for the rigid nominal state x_n (5), or ``None`` if the solver fails."""
         inputs = self._state_map @ state
         lower, upper = self._bounds[0] - inputs, self._bounds[1] - inputs
         if np.all(lower <= 0.0) and np.all(upper >= 0.0):
             return np.zeros((BLOCKS, len(self._scale)))
         if not np.all(np.isfinite(inputs)):
             return None
-        # A new solver for each problem: an updated one would give results whose last bits depend on earlier problems.
+        # A new solver for each problem, as the last bits of a reused solver's result depend on earlier problems.
         solver = piqp.DenseSolver()
         solver.settings.max_iter = _ITERATIONS
         solver.setup(self._hessian, np.zeros(len(self._hessian)), None, None, self._input_map, lower, upper)
@@ -130,10 +130,13 @@ class QpLaw(FamilyLaw):
 def _predicted(
     closed: np.ndarray, B: np.ndarray, K: np.ndarray, rate: np.ndarray, block: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the maps from x_n (rows, n) and all c (rows, m blocks) to the quantities at each position with bounds.
+    """Return the predicted inputs and pitch acceleration at each checked time as linear functions of x_n and c.
 
-    The third result (rows) marks the bounded ones: both inputs, and in near blocks the pitch acceleration, which the
-    row ``rate`` (n + m) gives from [x; u]. ``closed`` is A + B K; a block has ``block`` steps.
+    ``closed`` is A + B K, ``rate`` (n + m) maps [x; u] to the pitch acceleration, and a block has ``block`` steps.
+
+    Returns:
+        Matrices (rows, n) on x_n and (rows, m blocks) on c, and whether each row is bounded (rows). There are m + 1
+        rows for each time: the inputs, then the pitch acceleration, which is bounded in near blocks only.
     """
     n, m = B.shape
     power, forced = [np.eye(n)], [np.zeros((n, m))]

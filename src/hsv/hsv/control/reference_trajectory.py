@@ -7,10 +7,10 @@ state is phi_T(x_r(k), u_r(k)) except for the defect
     d_r(k) = phi_T(x_r(k), u_r(k)) - x_r(k+1).
 
 The defect contains the jump at a step or at a corner of a ramp. On a ramp it is small: the difference between a
-sequence of trims and a solution of the equations of motion. Where the reference is constant it is exactly zero. The
-defect drives the nominal system, x_n(k+1) = A(p) x_n + B(p) u_n + d_r(k). With x_r(k) - x_r(k+1) in its place the
-climb itself, about 6 cm per period, would be a disturbance; that form is right for static trims only, for which
-phi_T(x_r) = x_r.
+sequence of trims and a solution of the equations of motion. If the reference is constant, the defect is exactly zero.
+It drives the nominal system, x_n(k+1) = A(p) x_n + B(p) u_n + d_r(k), with the model at altitude and velocity p. With
+x_r(k) - x_r(k+1) in place of d_r, the climb itself, about 6 cm per period, would be a disturbance; that form is right
+for static trims only, for which phi_T(x_r, u_r) = x_r.
 
 Corners can be blended: the piecewise-linear commands are averaged over time by a triangle of half-width w. Within w of
 a corner at which the rate changes by s, this adds s (w - |t|)^3 / (6 w^2), with t the time from the corner. The rate
@@ -53,14 +53,14 @@ REFERENCE_PARAMETERS = (
 )
 
 COLUMNS = ("times", "altitudes", "velocities", "blends")
-"""Names of the columns of a list of corners: parameters after ``reference.``, and fields of the message."""
+"""Columns of a list of corners, named as the parameters after ``reference.`` and as the fields of the message."""
 
 SUBSTEPS = 2
 """Runge-Kutta steps per period in phi_T; the plant has the same default."""
 
 
 class Corner(NamedTuple):
-    """A corner of the commands: time (s), altitude (m), velocity (m/s) and half-width (s) of its blend."""
+    """A corner of the commands: its time (s), altitude (m), velocity (m/s) and the half-width (s) of its blend."""
 
     time: float
     altitude: float
@@ -69,9 +69,9 @@ class Corner(NamedTuple):
 
 
 class ReferenceTrajectory:
-    """The reference x_r(k), u_r(k) and its defect d_r(k) for every step k, computed once.
+    """The reference x_r(k), u_r(k) and its defect d_r(k) for every step k.
 
-    Constant parts before the first and after the last corner take one row each.
+    They are computed once. The constant parts before the first and after the last corner are not stored step by step.
     """
 
     def __init__(
@@ -96,8 +96,8 @@ class ReferenceTrajectory:
             blend: Half-width of the blend, s; one value for all corners, or one for each (b).
 
         Raises:
-            ParameterError: Arrays of different lengths, times that decrease, or commands that cannot be blended.
-            TrimError: No equilibrium, or one outside the input limits; the time is named.
+            ParameterError: The arrays have different lengths, times decrease, or the commands cannot be blended.
+            TrimError: There is no equilibrium within the input limits at some step; the message names the time.
         """
         commands = _commands(times, altitudes, velocities)
         instants = _in_steps(np.asarray(times, float), period)
@@ -114,7 +114,7 @@ class ReferenceTrajectory:
         rows = len(steps)
         arrays = {name: np.zeros((rows, N_STATES)) for name in ("state", "defect")}
         self.data = Struct("hsv_reference", first=first, input=np.zeros((rows, N_INPUTS)), **arrays)
-        """x_r (r, 9), u_r (r, 2), d_r (r, 9); row 0 belongs to step ``first``. Before and after, nothing changes."""
+        """x_r (r, 9), u_r (r, 2), d_r (r, 9) from step ``first`` on; steps before and after equal the nearest row."""
         self._along: Struct | None = None
         self.corners = tuple(map(Corner, *(map(float, column) for column in (times, altitudes, velocities, blends))))
         """The corners of the commands in order of time."""
@@ -143,7 +143,7 @@ class ReferenceTrajectory:
 
         Args:
             values: Flat parameters.
-            period: Control period (s).
+            period: Control period, s.
         """
         v = validate(REFERENCE_PARAMETERS, values)
         vehicle = Vehicle.from_parameters(values)
@@ -159,15 +159,15 @@ class ReferenceTrajectory:
         return {name: list(column) for name, column in zip(COLUMNS, columns, strict=True)}
 
     def row(self, step: int) -> int:
-        """Return the row of :attr:`data` for ``step``."""
+        """Return the index of the row of :attr:`data` for ``step``."""
         return min(max(step - self.data.first, 0), len(self.data.state) - 1)
 
     def rows(self, steps: int) -> np.ndarray:
-        """Return the rows of :attr:`data` (steps) for the first ``steps`` steps."""
+        """Return the index of the row of :attr:`data` for each of the first ``steps`` steps, an array (steps)."""
         return np.clip(np.arange(steps) - self.data.first, 0, len(self.data.state) - 1)
 
     def along(self, steps: int) -> Struct:
-        """Return the reference with one row for each of the first ``steps`` steps, cached; do not change it."""
+        """Return :attr:`data` with one row for each of the first ``steps`` steps; it is cached, do not change it."""
         if self._along is None or len(self._along.state) != steps:
             arrays = {name: getattr(self.data, name)[self.rows(steps)] for name in ("state", "input", "defect")}
             self._along = Struct("hsv_reference", first=0, **arrays)
@@ -175,7 +175,7 @@ class ReferenceTrajectory:
 
     @property
     def end(self) -> float:
-        """Time at which the reference comes to rest, s."""
+        """Time from which the reference is constant, s."""
         return self.corners[-1].time + self.corners[-1].blend
 
     @property
@@ -196,7 +196,11 @@ def _commands(times: Sequence[float], altitudes: Sequence[float], velocities: Se
 
 
 def _blends(times: Sequence[float], blend: float | Sequence[float]) -> np.ndarray:
-    """Return the half-width of the blend of each corner (b), s; refuse wrong ones."""
+    """Return the half-width (b) of the blend of each corner, s.
+
+    Raises:
+        ParameterError: A blend begins before time 0 or lies at a step, or there is not one for each time.
+    """
     if isinstance(blend, Sequence) and len(blend) != len(times):
         raise ParameterError(
             f"parameter reference.blends: {len(blend)} values, expected as many as reference.times, {len(times)}"
@@ -223,7 +227,11 @@ def _blend(
     slope: np.ndarray,
     bend: np.ndarray,
 ) -> None:
-    """Blend ``command`` and its ``slope`` (r, 2) and ``bend`` (r), all per step, at every corner in place."""
+    """Blend all corners in ``command`` (r, 2), its ``slope`` (r, 2) and the second derivative ``bend`` (r) of altitude.
+
+    The arrays change in place. All times are in steps: ``instants`` (b) of the corners, at which altitude and velocity
+    are ``commands`` (b, 2), ``half`` (b) half-widths of their blends, and ``steps`` (r) of the rows.
+    """
     before = np.zeros(commands.shape[1])
     for index in range(len(instants)):
         after = np.zeros_like(before)
@@ -241,14 +249,17 @@ def _blend(
 
 
 def _in_steps(times: np.ndarray, period: float) -> np.ndarray:
-    """Return ``times`` (s) in steps; values that differ from an integer by rounding only become that integer."""
+    """Return ``times`` (s) in steps, not rounded except for values that only rounding keeps from an integer."""
     steps = times / period
     nearest = np.round(steps)
     return np.where(np.abs(steps - nearest) < 1e-9 * np.maximum(1.0, nearest), nearest, steps)
 
 
 def _evaluate(instants: np.ndarray, commands: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the commands (r, 2) at the integer ``steps`` (r), and their change per step (r, 2) from there on."""
+    """Return altitude and velocity (r, 2) at the integer ``steps`` (r), and their change per step (r, 2) from there.
+
+    The corners have the times ``instants`` (b), in steps, and the altitudes and velocities ``commands`` (b, 2).
+    """
     piece = np.searchsorted(instants, steps, side="right") - 1
     start, stop = np.clip(piece, 0, None), np.clip(piece + 1, None, len(instants) - 1)
     length = instants[stop] - instants[start]

@@ -20,14 +20,14 @@ ROBUST_MPC_PARAMETERS = (Parameter("robust_mpc.gain_index", 0, "which of nominal
 
 
 class RobustMpc(Controller):
-    """Robust MPC: one of the nominal gains K acts on the deviation from the reference; it has no memory."""
+    """Robust MPC without a tube: one of the nominal gains K acts on the deviation from the reference; no memory."""
 
     PARAMETERS = ROBUST_MPC_PARAMETERS
     in_core = True
     kernel: Struct
 
     def __init__(self, design: ControlDesign, gain_index: int = 0) -> None:
-        """Take gain number ``gain_index`` of the family.
+        """Use the gain with index ``gain_index`` in the family of ``design``, 0 for the outermost ellipsoid.
 
         Raises:
             ParameterError: The design has no such gain.
@@ -40,21 +40,18 @@ class RobustMpc(Controller):
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign | None = None) -> Self:
-        """Build from the design's parameters and :data:`ROBUST_MPC_PARAMETERS`; a wrong one is named.
+        """Build from the flat parameters ``values``: those of the design and :data:`ROBUST_MPC_PARAMETERS`.
 
-        ``design``: the one in ``values``, where it is known already.
+        ``design`` is the design in ``values``, if it is already built.
         """
         v = validate(ROBUST_MPC_PARAMETERS, values)
         return cls(design or ControlDesign.from_parameters(values), v["robust_mpc.gain_index"])
 
     def reset(self) -> None:
-        """Nothing to forget."""
+        """Do nothing: this law has no state."""
 
     def step(self, inputs: ControllerInput) -> TubeResult:
-        """Return the input of this step.
-
-        The nominal trajectory is not used, there is no set, and the error is the deviation from the reference.
-        """
+        """Return the input of this step, with an error that is the deviation from the reference, and without a set."""
         feedback, total, u, _ = tube_step(self.kernel, self._memory, inputs, monitored=False)
         finite = math.isfinite(total[0]) and math.isfinite(total[1])
         return TubeResult(
