@@ -1,4 +1,4 @@
-"""Graphs of real node processes, each on a ROS domain of its own and on this machine only."""
+"""Fixtures for graphs of real node processes, each on its own ROS domain and limited to this machine."""
 
 import pytest
 from node_processes import Processes
@@ -8,14 +8,14 @@ from short_campaigns import planned, results, short  # noqa: F401 (fixtures)
 
 @pytest.fixture
 def ros_environment():
-    """Return the environment of processes on a domain that nobody else uses."""
+    """Return an environment for processes on a ROS domain that no other process uses."""
     with own_environment() as environment:
         yield environment
 
 
 @pytest.fixture(scope="module")
 def shared_processes(tmp_path_factory):
-    """Start processes for all tests of a module, in one folder, on a domain of their own."""
+    """Start processes for all tests of a module, in one folder and on their own domain."""
     with own_environment() as environment:
         started = Processes(environment, tmp_path_factory.mktemp("graph"))
         yield started
@@ -24,7 +24,7 @@ def shared_processes(tmp_path_factory):
 
 @pytest.fixture
 def processes(ros_environment, tmp_path):
-    """Start processes in a temporary folder, on a domain of their own."""
+    """Start processes in a temporary folder, on their own domain."""
     started = Processes(ros_environment, tmp_path)
     yield started
     started.stop()

@@ -1,4 +1,4 @@
-"""Whatever is wrong on the command line of a node: one line that says what, and exit code 2."""
+"""Errors on the command line of a node end it with a one-line message and exit code 2."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The nodes started one by one with ``ros2 run``, faults injected in flight, bad parameters refused."""
+"""Nodes started one by one with ``ros2 run``; faults injected in flight; bad parameters refused."""
 
 import json
 import re
@@ -30,7 +30,7 @@ def start(processes, extra):
 
 def test_nodes_by_hand_with_a_fault_injected_in_flight(processes):
     path, fuel = processes.folder / "by_hand", "fuel_equivalence_ratio"
-    # It does not end before the commands, however slow the machine: it is interrupted.
+    # Long enough that the flight does not end before the commands, even on a slow machine; it is interrupted.
     endless = ["-p", "duration:=600.0", "-p", "real_time_factor:=2.0"]
     nodes = start(processes, {"recorder": ["-p", f"bag.directory:={path}"], "plant": endless})
     plant = nodes["plant"]
@@ -77,14 +77,14 @@ def test_nodes_by_hand_with_a_fault_injected_in_flight(processes):
 @pytest.mark.long
 def test_a_flight_by_hand_is_told_and_can_be_repeated(processes):
     bag = processes.folder / "by_hand"
-    # Nodes need not have the same parameters, and each is repeated with its own.
+    # Nodes may have different parameters; each is replayed with its own.
     tube = ["--params-file", str(find_design("adjustable")), "-p", "feedback.tau:=[0.9]"]
     extra = {
         "recorder": ["-p", f"bag.directory:={bag}"],
         "plant": ["-p", "duration:=12.0", "-p", "seed:=7"],
         "tube_mpc": tube,
     }
-    # Nor need they be in one namespace, where the topics are in one.
+    # Nodes may be in different namespaces, as long as their topics are in one.
     topics = ("measurement", "filtered_state", "run", "ready", "last_state")
     back = [word for topic in topics for word in ("-r", f"hsv/{topic}:=/hsv/{topic}")]
     nodes = start(processes, extra | {"notch_filter": ["-r", "__ns:=/elsewhere", *back]})
@@ -136,8 +136,8 @@ def test_commands_refuse_in_one_line(processes, words, code, expected):
 @pytest.mark.long
 @pytest.mark.parametrize(("number", "after"), [(signal.SIGINT, 0.2), (signal.SIGTERM, 2.0)])
 def test_a_command_is_interrupted_in_one_line(processes, number, after):
-    # However early it comes: on a fast machine 2 s is in the middle of the waiting, on a slow one in the imports.
-    # Somebody is there and silent, or the command might end by itself before it has used so much.
+    # Interrupt it early: after 2 s a fast machine is waiting, a slow one still importing. The silent node keeps the
+    # command from ending by itself before it has used so much processor time.
     silent = processes.start("ros2", "run", "hsv_ctrl", "notch_filter")
     domain = int(processes.environment["ROS_DOMAIN_ID"])
     wait_until(lambda: is_published(domain, "/hsv/filtered_state"), [silent.pid])
@@ -172,5 +172,5 @@ def test_topics_are_listed_and_printed_with_units(processes):
 
 def _lines(done):
     assert done.returncode == 0, done.stdout
-    # DDS says on standard error where another process of the machine holds a lock of its shared memory.
+    # DDS prints a line on standard error if another process of the machine holds a lock of its shared memory.
     return [line for line in done.stdout.splitlines() if not line.startswith("waiting for ") and "RTPS_" not in line]

@@ -1,4 +1,4 @@
-"""Flights of a campaign, flown again alone: in process, and over DDS."""
+"""Single flights of a campaign, repeated in this process and over DDS."""
 
 import pytest
 from ros_domain import own_domain

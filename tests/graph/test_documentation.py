@@ -1,4 +1,4 @@
-"""What the documentation says of the graph is what the graph is."""
+"""The documentation of the graph agrees with the graph."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A process that leaves the graph ends, even where the middleware waits for ever."""
+"""A process that leaves the graph ends, even if the middleware waits for ever."""
 
 import subprocess
 import sys
@@ -8,7 +8,7 @@ from marking import long
 
 
 def run(script, environment=None):
-    """Run a script that has said its answer and then leaves; one that hung would fail here."""
+    """Run a script that prints its answer and then leaves the graph; a time limit catches one that hangs."""
     begin = (
         "import ctypes, resource, sys, time\nfrom hsv_node.process import ends_with\nprint('the answer', flush=True)\n"
     )
@@ -18,7 +18,7 @@ def run(script, environment=None):
 
 @pytest.mark.parametrize("code", [2, long(0), long(130)])
 def test_a_process_that_waits_with_the_interpreter_locked_ends_with_its_code(code):
-    # PyDLL keeps the lock while it waits for a signal: no thread and no handler of Python's runs any more.
+    # PyDLL keeps the interpreter lock while it waits for a signal, so that no Python thread or handler can run.
     done = run(f"with ends_with({code}, within=0.3): ctypes.PyDLL(None).pause()")
     assert (done.returncode, done.stdout, done.stderr) == (code, "the answer\n", "")
 

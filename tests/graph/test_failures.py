@@ -1,4 +1,4 @@
-"""Whatever dies, hangs or is interrupted: the run ends, names the cause, and leaves a readable bag."""
+"""If a process dies, hangs or is interrupted, the run ends, names the cause, and leaves a readable bag."""
 
 import os
 import re
@@ -22,11 +22,11 @@ pytestmark = pytest.mark.graph
 
 
 ON_DISK = 50
-"""Steps."""
+"""Steps that must be on disk before a process is disturbed."""
 
 
 def _start_and_fly(processes, bag, *words):
-    """Start a long flight and return it once some of it is on disk."""
+    """Start a long flight and return its process when some steps are on disk."""
     scenario = short_scenario(processes.folder, duration=10_000, fault=100)
     run = processes.start("hsv", "run", scenario, "--no-report", "--bag", bag, "--real-time-factor", "4", *words)
     fly_until(run, bag, ON_DISK)
@@ -50,7 +50,7 @@ def test_a_killed_node_ends_the_run_by_name(processes, name, number, reason):
     run = _start_and_fly(processes, bag)
     nodes = children(run.pid)
     assert set(nodes) == {node.name for node in graph()}
-    # Asked to end in flight, a node ends in order; the flight is lost all the same.
+    # SIGTERM lets a node end in order, but the flight is lost in either case.
     os.kill(nodes[name], number)
     output = output_of(run)
     assert run.returncode == 1
@@ -79,7 +79,7 @@ def test_a_killed_recorder_loses_what_was_on_its_way_to_the_disk_and_nothing_els
 
 @pytest.mark.long
 def test_a_full_disk_loses_the_flight_by_the_recorders_name(processes):
-    # Bytecode of what is imported after the disk is full would be cut, too.
+    # Bytecode of modules imported after the disk is full would be cut, too.
     processes.environment["PYTHONDONTWRITEBYTECODE"] = "1"
     bag = processes.folder / "full"
     run = _start_and_fly(processes, bag)
@@ -128,7 +128,7 @@ def test_interrupt_ends_all_and_closes_the_bag(processes, number):
 def test_a_run_that_is_interrupted_before_its_first_step_leaves_no_bag(processes):
     bag = processes.folder / "waiting"
     run = processes.start("hsv", "run", "case1", "--external", "--composed", "--bag", bag)
-    # The recorder has its file, and waits with all others for a controller that is never started.
+    # The recorder has created its file; all nodes wait for a controller that is never started.
     wait_until(lambda: (bag / "waiting_0.mcap").exists(), [run.pid])
     run.send_signal(signal.SIGINT)
     output = output_of(run)
@@ -137,7 +137,7 @@ def test_a_run_that_is_interrupted_before_its_first_step_leaves_no_bag(processes
 
 
 def _refuse_to_disturb(processes, bag):
-    """Neither a second run nor a recovery touches a flight and its bag."""
+    """Assert that neither a second run nor a recovery disturbs a flight and its bag."""
     for words, refused in (
         (("run", "case1", "--bag", bag), "exists already"),
         (("recover", bag), "is being recorded"),
@@ -178,7 +178,7 @@ def test_a_hung_node_is_named_and_ends_the_run(processes, name):
 
 @pytest.mark.long
 def test_a_run_that_stands_still_as_a_whole_goes_on(processes):
-    """As on a machine so busy that nothing of it gets to run, or one that sleeps."""
+    """All processes stop for a while, as on an overloaded or suspended machine."""
     bag = processes.folder / "slept"
     run = _start_and_fly(processes, bag, "--step-timeout", "3")
     pids = [run.pid, *children(run.pid).values()]

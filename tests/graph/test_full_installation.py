@@ -1,4 +1,4 @@
-"""The graph among the tools of a full ROS 2 installation; skipped where none is sourced: make test-ros."""
+"""The graph with the tools of a full ROS 2 installation; skipped if none is sourced. Run by make test-ros."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ PAGE = "docs/installation.md"
 REFERENCE = ROOT / "bags" / "reference" / "case1"
 COMPRESSED: dict[str, dict[str, Any]] = {
     "file": {"compression_mode": "file"},
-    # With a shorter queue rosbag2 drops what it cannot compress in time.
+    # With a shorter queue rosbag2 drops the messages that it cannot compress in time.
     "message": {"compression_mode": "message", "compression_queue_size": 0},
 }
-"""What ros2 bag convert compresses: settings by mode."""
+"""Settings of ros2 bag convert by mode of compression: whole files or single messages."""
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -49,7 +49,7 @@ def arguments(**values: object) -> list[str]:
 
 def told(processes: Processes, *words: str | Path) -> Any:
     done = processes.run("hsv", *words, "--json")
-    assert done.returncode == 0 and done.stdout.startswith("{"), done.stdout  # a warning would stand before it
+    assert done.returncode == 0 and done.stdout.startswith("{"), done.stdout  # a warning would come first
     return json.loads(done.stdout)
 
 
@@ -178,13 +178,13 @@ def generate_launch_description():
 def test_a_refusal_ends_a_launch_file_that_includes_it(processes: Processes) -> None:
     (processes.folder / "mine.launch.py").write_text(INCLUDING)
     (processes.folder / "flown").mkdir()
-    # With a process running, launch itself has to end it: with its own exit code.
+    # A running process makes launch end it itself, with launch's own exit code.
     refused = processes.run("ros2", "launch", "./mine.launch.py", f"flight:={short_scenario(processes.folder)}")
     assert refused.returncode == 1 and "bag = 'flown': exists already" in refused.stdout, refused.stdout
 
 
 def start_to_record(processes: Processes, command: str) -> subprocess.Popen[str]:
-    """Start a printed ros2 bag record and return it once it subscribes."""
+    """Start a ros2 bag record printed in the documentation; return its process when it has subscribed."""
     log = processes.folder / "record.log"
     with log.open("w") as output:
         recorder = processes.start("bash", "-c", f"exec {command}", output=output)
@@ -200,7 +200,7 @@ def finish(process: subprocess.Popen[str]) -> None:
 
 @pytest.fixture(scope="module")
 def recorded(shared_processes: Processes) -> tuple[Path, Path]:
-    """Return the bags of Case 1 at the pace of the clock: its own, and that of ros2 bag record."""
+    """Return two bags of Case 1, flown in real time: the bench's own, and that of ros2 bag record."""
     bags = shared_processes.folder / "bags"
     bags.mkdir(exist_ok=True)
     recorder = start_to_record(shared_processes, the_printed(PAGE, "ros2 bag record -a"))
@@ -252,11 +252,11 @@ def test_a_node_answers_to_a_played_bag_as_it_was_recorded(processes: Processes,
     done = processes.run("bash", "-c", the_printed(PAGE, "ros2 bag play"))
     assert done.returncode == 0, done.stdout
     finish(recorder)
-    # ros2 run leaves Ctrl-C to the terminal, which sends it to all processes.
+    # In a terminal, Ctrl-C reaches all processes; ros2 run does not forward it.
     os.kill(children(node.pid)["tube_mpc"], signal.SIGINT)
     assert exit_code_of(node) == 0
     own, answers = Bag(recorded[0]), Bag(processes.folder / "bags" / "answers")
-    # On a busy machine not every message comes through: nobody holds ros2 bag play back.
+    # ros2 bag play does not wait for slow subscribers, so on a busy machine some messages are lost.
     given, expected = answers.messages("/hsv/command"), dict(own.messages("/hsv/command"))
     assert len(given) > len(expected) // 2 and all(expected[time] == data for time, data in given)
 
@@ -273,12 +273,12 @@ def test_faults_and_factors_come_and_go_in_flight(processes: Processes) -> None:
         ("ros2 param dump", "tau: - 0.9 "),
         ("ros2 topic echo", "tau: - 0.9 "),
     ):
-        for _ in range(20):  # the tools do not know every node and topic at once
+        for _ in range(20):  # the tools need time to discover all nodes and topics
             done = processes.run("bash", "-c", the_printed(PAGE, beginning))
             if done.returncode == 0:
                 break
         assert done.returncode == 0 and said in " ".join(done.stdout.split()), done.stdout
-    # It looks for half a second, in which it does not find everybody: what is wrong is found every time.
+    # ros2 doctor looks for half a second and misses some nodes. Only a real problem shows up in every report.
     alone: list[set[str]] = []
     while len(alone) < 20 and (not alone or set.intersection(*alone)):
         report = processes.run("bash", "-c", the_printed(PAGE, "ros2 doctor"))
@@ -286,7 +286,7 @@ def test_faults_and_factors_come_and_go_in_flight(processes: Processes) -> None:
         alone.append(set(re.findall(r"detected on (/hsv/\w+)", report.stdout)))
     assert not set.intersection(*alone), alone
     finish(flight)
-    # Commands on parameters and topics leave one that waits for more of them.
+    # Commands on parameters and topics leave a daemon behind, which waits for more of them.
     assert processes.run("ros2", "daemon", "stop").returncode == 0
 
 
@@ -330,9 +330,9 @@ def test_a_compressed_bag_gives_what_the_bag_gives(processes: Processes, mode: s
     theirs, ours = told(processes, "info", "made"), told(processes, "info", REFERENCE)
     lost = ["attachments", "custom_data"]
     for name in lost:
-        assert ours[name] and not theirs[name]  # convert keeps neither, nor what they tell
+        assert ours[name] and not theirs[name]  # convert keeps neither attachments nor metadata
     for name in ("path", "folder", *lost, "as_published", "not_covered"):
         del theirs[name], ours[name]
     assert theirs == ours
-    # Tables and pages of all forms: tests/cli/test_rosbag2_bags.py.
+    # All forms of tables and pages are tested in tests/cli/test_rosbag2_bags.py.
     assert processes.run("hsv", "diff", "made", REFERENCE).stdout.endswith("identical\n")

@@ -1,4 +1,4 @@
-"""The graph on two hosts: vehicle and recorder on one, the controllers on the other, a network between them."""
+"""The graph on two hosts with a network between them: vehicle and recorder on one, controllers on the other."""
 
 import json
 import os
@@ -14,15 +14,15 @@ pytestmark = pytest.mark.graph
 PROFILE = Path(__file__).parents[2] / "ros_ws/src/hsv_bringup/config/lossy_network.xml"
 VEHICLE_HOST = ("recorder", "fault_injector", "plant")
 STEPS = 10_000
-"""Of Case 1, after the first state."""
+"""Steps of Case 1 after the first state."""
 
 BOOT = "mount -t tmpfs tmpfs /dev/shm && ip link set lo up && echo up && exec sleep infinity"
-"""Without a shared memory of their own, participants on two hosts would find out that they are on one."""
+"""Each host needs its own shared memory; otherwise the participants would find out that they share one machine."""
 
 
 @pytest.fixture
 def hosts(processes):
-    """Return a function that sets up two hosts on a network and returns the words that run a command on each."""
+    """Return a function that sets up two networked hosts and returns, for each, the words that run a command on it."""
 
     def set_up(delay, loss):
         if os.geteuid() != 0:
@@ -72,5 +72,5 @@ def test_case1_across_two_hosts_has_the_published_fingerprint(processes, hosts, 
     ).groups()
     lap = (float(ended) - float(begun)) / STEPS
     print(f"delay {delay} ms, loss {loss} %: {1e3 * lap:.2f} ms a step")
-    # A step needs the network twice: measurement there, command back.
+    # A step uses the network twice: for the measurement, and for the command.
     assert 1e3 * lap > 2 * delay

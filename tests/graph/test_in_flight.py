@@ -1,4 +1,4 @@
-"""Changed in flight from outside: refused, taken, stamped with its step, recorded, and repeated bit for bit."""
+"""Changes in flight from outside: refused or accepted, stamped with their step, recorded, and replayed bit for bit."""
 
 import dataclasses
 import json
@@ -22,7 +22,7 @@ PERIOD = 0.02
 
 
 def start(processes, scenario, pace):
-    """Start a flight that no change comes too late for; return its process and its bag."""
+    """Start a flight long enough that no change comes too late; return its process and its bag."""
     bag = processes.folder / "flown"
     flight = processes.start("hsv", "run", scenario, "--bag", bag, "--real-time-factor", pace, "--no-report")
     fly_until(flight, bag, 50)
@@ -47,7 +47,7 @@ def interrupt(flight):
 
 
 def assert_repeated(processes, path, node):
-    """Assert that all nodes and the whole graph in process, and a node over DDS, repeat the bag."""
+    """Assert that replays of all nodes and of the graph in process, and of one node over DDS, equal the bag."""
     for words, count in (((), 5), (("--rerun",), 5), (("--over-dds", "--node", node), 1)):
         done = processes.run("hsv", "replay", path, *words)
         assert done.stdout.count("identical in every byte") == count, done.stdout
@@ -90,7 +90,7 @@ def test_tau_is_changed_recorded_and_repeated(processes):
     assert flown[:step] == [[1.0]] * 100 + [scheduled] * (step - 100)
     assert flown[step:] == [changed] * (len(flown) - step) and 100 < step < len(flown)
     values = flown_parameters(bag)
-    # Other nodes keep what they had: their design need not be certified for what the controller flew with.
+    # Other nodes keep their parameters, as their design need not be certified for the controller's new tau.
     assert values.of("nominal_trajectory")["tau_change.starts"] == [2.0]
     assert values.of("tube_mpc")["tau_change.starts"] == pytest.approx([2.0, step * PERIOD])
     assert_repeated(processes, path, "tube_mpc")
@@ -98,7 +98,7 @@ def test_tau_is_changed_recorded_and_repeated(processes):
 
 def test_points_are_commanded_recorded_and_repeated(processes):
     flight, path = start(processes, short_scenario(processes.folder, duration=3600, fault=6), "2.0")
-    # Paused, the second command certainly comes before the first is flown.
+    # While the flight is paused, the second command certainly comes before the first takes effect.
     answered(processes, "set", "paused", "true")
     refused(processes, "command", "200000 ft", "8000 ft/s", said="altitude = 60960 m: expected")
     said = "no reference to 26000 m and 2400 m/s fits"
@@ -123,7 +123,7 @@ def test_points_are_commanded_recorded_and_repeated(processes):
     assert np.array_equal(once[: len(planned)], planned) and np.array_equal(twice[: len(once)], once)
     assert np.array_equal(twice[-1, 1:], [26243.28, 2484.12, 1.5])
     assert [answer["end_s"] for answer in taken] == pytest.approx([once[-1, 0] + 1.5, twice[-1, 0] + 1.5])
-    # The second begins to turn where the first has its last corner.
+    # The second reference begins to turn where the first has its last corner.
     assert second * PERIOD == pytest.approx(once[-1, 0] + PERIOD - 1.5)
     altitude = bag.columns("/hsv/nominal")["reference.altitude"]
     assert np.flatnonzero(np.diff(altitude))[0] == first

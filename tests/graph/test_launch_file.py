@@ -1,4 +1,4 @@
-"""What can be said of the launch file without launch; with it: test_full_installation.py."""
+"""Checks of the launch file that do not need launch; test_full_installation.py runs it."""
 
 import ast
 import inspect
@@ -10,7 +10,7 @@ from hsv.cli.fly import prepare, run
 FILE = Path(__file__).parents[2] / "ros_ws" / "src" / "hsv_bringup" / "launch" / "sil.launch.py"
 TREE = ast.parse(FILE.read_text(encoding="utf-8"))
 INSTALLED = {"launch", "launch_ros", "ament_index_python"}
-"""What every ROS 2 installation has that can launch a file."""
+"""Packages in every ROS 2 installation that has launch."""
 
 
 def arguments():

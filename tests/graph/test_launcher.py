@@ -1,4 +1,4 @@
-"""What the launcher refuses before it starts anything."""
+"""Conditions under which the launcher refuses to start anything."""
 
 import os
 import subprocess
@@ -11,18 +11,18 @@ from hsv.base.errors import ParameterError, RunError
 from hsv.graph.exclusive import claim
 from hsv.graph.launcher import Launcher
 
-# A number that no graph can have and no other test run takes: only its name is held.
+# Not a valid domain, and used by no other test run: only the lock on its name matters here.
 DOMAIN = 10**9 + os.getpid()
 
 
 def launcher(namespace=ROOT, *nodes):
-    """Return a launcher that has nothing to start, or is refused before it starts it."""
+    """Return a launcher that has no processes to start, or that is refused before it starts them."""
     return Launcher(nodes, [], lambda step: None, lambda node, text: None, namespace=namespace)
 
 
 @pytest.fixture
 def domain(monkeypatch):
-    """Make this process believe that it is in :data:`DOMAIN`."""
+    """Make this process use :data:`DOMAIN`."""
     monkeypatch.setattr("hsv.graph.exclusive.LAST_DOMAIN", DOMAIN)
     monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
 
@@ -45,7 +45,7 @@ def test_a_node_that_runs_by_hand_is_named(node):
     refused = "publishes /veh1/hsv/command already: expected no other tube_mpc there"
     with held, pytest.raises(RunError, match=refused), launcher("/veh1", node):
         pass
-    # What a refused run has claimed itself is free again.
+    # The refused run has released the names that it claimed.
     with launcher("/veh1"):
         pass
 

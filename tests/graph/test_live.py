@@ -1,4 +1,4 @@
-"""A flight that is watched: with viewers of every kind it is the same flight, and what they ask of it is recorded."""
+"""Viewers of every kind do not change a flight, and the commands that they send are recorded."""
 
 import json
 import os
@@ -26,7 +26,7 @@ LIVE = ("--live", "--live-port", "0", "--no-report")
 
 
 class Watched:
-    """A live flight, and what it has printed."""
+    """A flight with the live view, and its output so far."""
 
     def __init__(self, processes, *words):
         self.log = processes.folder / "live.txt"
@@ -40,7 +40,7 @@ class Watched:
         return self.log.read_text()
 
     def land(self):
-        """Wait for the end, which must be a good one."""
+        """Wait until the flight has ended, which must be with exit code 0."""
         wait_until(lambda: self.popen.poll() is not None, [self.popen.pid])
         assert self.popen.returncode == 0, self.text
 
@@ -65,9 +65,9 @@ def test_five_viewers_one_of_whom_never_reads_change_no_bit(processes, tmp_path)
     assert flight_fingerprint(bag) == fly(assemble_flight(load_scenario(str(scenario)))).fingerprint
     for reader in readers:
         reader.wait()
-        # At ten times real time a busy machine may not leave them time for every message.
+        # At ten times real time, a reader on a busy machine may miss messages.
         assert_as_recorded(reader, bag)
-    # Whoever comes late sees the flight from its start to its end, and how it ended.
+    # A late viewer gets the flight from its start to its end, and how it ended.
     times = late.times(len(LIVE_CURVES))
     assert times[0] < 10.0 and times[-1] == pytest.approx(20.0) and np.all(np.diff(times) > 0)
     assert late.status["ending"] == {"how": "finished", "time": 20.0}
@@ -89,7 +89,7 @@ def test_what_the_page_asks_is_acknowledged_and_recorded(processes, tmp_path):
     injected = page.ask("inject", **loss, parameters="0.9")
     assert injected["accepted"], injected
     paused = page.ask("pause", paused="true")
-    # Nothing is flown any more from the acknowledged step on.
+    # No step is flown from the acknowledged step on.
     assert paused["message"].startswith(f"paused = true from step {paused['step']} on")
     while not page.status["settings"].get("paused"):
         assert page.read()
@@ -163,7 +163,7 @@ def test_a_flight_is_watched_to_its_end_and_its_bits_are_the_same(processes, tmp
     fly_until(flying, bag, 1)
     with said.open("w") as output:
         watching = processes.start("hsv", "watch", "--json", output=output)
-    # The flight takes its time until somebody sees it, however long that one starts.
+    # The flight is slow until the viewer shows it, however long the viewer takes to start.
     wait_until(lambda: "{" in said.read_text(), [watching.pid])
     assert processes.run("hsv", "set", "real_time_factor", "2").returncode == 0
     assert exit_code_of(watching) == 0 == exit_code_of(flying), said.read_text()

@@ -1,4 +1,4 @@
-"""A graph of processes flies exactly what the library flies in one process, and a bag is enough to repeat it."""
+"""A graph of processes has the same bits as a flight of the library in one process, and a bag can repeat it."""
 
 import json
 import re
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.graph
 
 
 def shortened(folder, name, duration, fault, effectiveness=0.9):
-    """Write a shipped scenario, shortened and without limits; return its path."""
+    """Write a shipped scenario, shortened and without limits, and return its path."""
     text = scenario_text(name).replace('"200 s"', f'"{duration} s"').replace('"100 s"', f'"{fault} s"')
     text = re.sub(r"\[limits\]\n([^\[\n].*\n|\n)*", "", text).replace("ess = 0.9", f"ess = {effectiveness}")
     path = folder / f"{name}.toml"
@@ -31,7 +31,7 @@ def shortened(folder, name, duration, fault, effectiveness=0.9):
 
 
 def short_case2(folder):
-    """Case 2 in five seconds, a twentieth of its ramp in a twentieth of its time, tau back to 1 in between."""
+    """Write Case 2 with a duration of 5 s: a twentieth of its ramp, with tau back at 1 in between."""
     path = folder / "ramp.toml"
     path.write_text(
         'extends = "case2"\nduration = "5 s"\n'
@@ -44,7 +44,7 @@ def short_case2(folder):
 
 
 def flown(processes, scenario, name, *words):
-    # On a busy machine a node may be silent for longer than a person would wait.
+    # On a busy machine a node may be silent for longer than the default time limit.
     command = ("hsv", "run", scenario, "--no-report", "--step-timeout", "30", "--bag", processes.folder / name)
     done = processes.run(*command, *words)
     assert done.returncode == 0, done.stdout
@@ -57,7 +57,7 @@ def in_process(scenario):
 
 @pytest.fixture(scope="module")
 def case1(shared_processes):
-    """Case 1 in five seconds."""
+    """Return the bag of Case 1, shortened to 5 s."""
     return flown(shared_processes, short_scenario(shared_processes.folder), "case1")
 
 
@@ -90,7 +90,7 @@ def test_composed_and_started_paused_equals_separate_processes_in_every_byte(sha
     assert exit_code_of(run) == 0
     compared = shared_processes.run("hsv", "diff", case1.path, path)
     assert compared.returncode == 0, compared.stdout
-    # No "except the padding": of that, too, every byte is the same.
+    # The output has no "except the padding": even padding bytes are equal.
     assert f"{251 * len(TOPICS)} messages: identical\n" in compared.stdout
 
 
@@ -124,14 +124,14 @@ def test_an_estimated_flight_is_that_of_the_library_and_tells_its_equipment(proc
     forces = bag.columns("/hsv/forces")
     assert np.any(forces["wind_up"] != 0.0)
     assert np.any(forces["effector.elevator_deflection"] != bag.columns("/hsv/actuator")["elevator_deflection"])
-    # Of a sensor, too, from the step in which it fails, though the message before it tells of that.
+    # A sensor fault counts from the step in which it acts, although an earlier message announces it.
     acting = {(row["channel"], row["type"]): (row["start_s"], row["end_s"]) for row in describe(bag)["faults"]}
     assert acting["velocity", "sensor_freeze"] == (2.0, 4.0) and acting["engine", "thrust_loss"] == (1.0, 4.0)
 
 
 @pytest.mark.long
 def test_the_node_that_estimates_the_elevator_says_what_it_found(processes):
-    # Of ten seconds at least: hsv replay refuses a shorter flight.
+    # Longer than 10 s, the shortest flight that hsv replay accepts.
     scenario = shortened(processes.folder, "case1", 11, 3, effectiveness=0.5)
     scenario.write_text(f"{scenario.read_text()}\n[effectiveness]\nenabled = true\n")
     bag = flown(processes, scenario, "flown")
@@ -171,7 +171,7 @@ def test_qp_flies_as_in_process_and_leaving_the_tube_is_told(processes):
 @pytest.mark.long
 def test_a_vehicle_outside_the_certified_set_is_told(processes):
     scenario = short_scenario(processes.folder, duration=1, fault=0.5, coupling="derived")
-    # Warnings of nodes are shown whatever form of the log the user has chosen.
+    # Warnings of nodes are shown for any log format of the user.
     processes.environment["RCUTILS_CONSOLE_OUTPUT_FORMAT"] = "[{severity}]: {message}"
     path = processes.folder / "uncertified"
     ran = processes.run("hsv", "run", scenario, "--no-report", "--bag", path, "--composed")
@@ -213,5 +213,5 @@ def test_a_slow_pace_is_kept_and_not_taken_for_a_hang(processes):
     words = ("--composed", "--no-report", "--step-timeout", "0.5", "--real-time-factor", "0.01", "--json")
     done = processes.run("hsv", "run", scenario, *words)
     assert done.returncode == 0 and "is stuck" not in done.stdout, done.stdout
-    # A lower bound only: a loaded machine may be late, but never early.
+    # Only a lower bound: a busy machine may be slower than the pace, but never faster.
     assert json.loads(done.stdout[done.stdout.index("{") :])["wall_time_s"] >= 9.5

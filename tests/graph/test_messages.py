@@ -1,4 +1,4 @@
-"""Signals to messages and back: the same numbers and bytes as those of rclpy, whatever the messages hold."""
+"""Conversion of signals to messages and back gives the same numbers and bytes as rclpy, for any content."""
 
 import random
 
@@ -32,7 +32,7 @@ REVERSAL = ActiveFault(Fault.of("fuel_equivalence_ratio", "reversal", {"about_st
 
 
 def signals_of(seed, *, sizes, active=()):
-    """Return signals with numbers in every place; ``sizes``: of the filter, of a gain, of the tube's set."""
+    """Return signals without zeros; ``sizes`` are those of the filter, of a gain, and of the tube's set."""
     draw = np.random.default_rng(seed)
     filter_size, gain_rows, tube_size = sizes
     signals = Signals()
@@ -79,7 +79,7 @@ CASES = [
 
 
 def typed(topic, signals, frame=FRAME):
-    """Return the message of rclpy that holds these signals."""
+    """Return the rclpy message that holds these signals."""
     message = deserialize_message(StepMessages(topic).pack(signals), message_class(TOPICS[topic]))
     if topic != description.CLOCK:
         message.header.frame_id = frame
@@ -87,7 +87,7 @@ def typed(topic, signals, frame=FRAME):
 
 
 def sent(message):
-    """Return the bytes of a message of rclpy as DDS sends them: with zeros between the fields, and no surplus."""
+    """Return the bytes of an rclpy message as DDS sends them: padding of zeros, nothing after the last field."""
     kind = "/".join((*type(message).__module__.split(".")[:2], type(message).__name__))
     data = bytes(STORE.serialize_cdr(deserialized(STORE, serialize_message(message), kind), kind))
     return data + bytes(-len(data) % WIRE_ALIGNMENT)
@@ -101,11 +101,11 @@ NEEDED = {
     description.COMMAND: {"command"},
     description.ACTUATOR: {"actuator", "active_faults"},
 }
-"""The signals of each topic that a block needs, or passes on."""
+"""The signals of each topic that a block uses or passes on."""
 
 
 def same(first, second):
-    """Compare signals: arrays by their bits; the core needs them aligned."""
+    """Compare signals, arrays by their bits. The core needs aligned arrays."""
     if isinstance(first, np.ndarray):
         aligned = second.flags.c_contiguous and second.ctypes.data % 8 == 0
         return aligned and first.dtype == second.dtype and first.tobytes() == second.tobytes()
@@ -134,7 +134,7 @@ def test_codes_are_the_constants_of_the_messages(codes, message):
 
 @pytest.mark.parametrize("topic", TOPICS)
 def test_packed_bytes_are_those_of_rclpy(topic):
-    messages = StepMessages(topic)  # one for all: nothing of one message may remain in the next
+    messages = StepMessages(topic)  # one object for all: no message may leave anything for the next
     for signals in (*CASES, *reversed(CASES)):
         data = messages.pack(signals)
         assert data == sent(typed(topic, signals))
@@ -186,7 +186,7 @@ def test_the_surplus_behind_faults_without_parameters_is_accepted():
 def test_an_empty_text_may_lack_its_closing_zero():
     topic, given, unpacked = description.COMMAND, CASES[2], Signals()
     data = sent(typed(topic, given, ""))
-    # With the closing zero the length is 1, and three bytes of padding follow.
+    # With the closing zero the length is 1, followed by the zero and three bytes of padding.
     assert data[12:20] == bytes([1, 0, 0, 0, 0, 0, 0, 0])
     StepMessages(topic).unpack(data[:12] + bytes(8) + data[20:], unpacked)
     assert_unpacked(topic, given, unpacked)
@@ -210,7 +210,7 @@ def test_a_length_beyond_the_message_is_refused_at_once():
 
 
 def loss(since=(3,), **fields):
-    """Return the message of a loss of effectiveness in which something may be wrong."""
+    """Return the message of a loss of effectiveness, with ``fields`` that may be wrong."""
     right = {"parameter_names": ["effectiveness"], "parameter_values": [0.9]}
     acting = msg.Fault(**{"channel": "elevator_deflection", "type": "loss_of_effectiveness"} | right | fields)
     return msg.Actuator(active=[acting], since=since)

@@ -1,4 +1,4 @@
-"""Settings of Fast DDS: ours by default, others where somebody has them."""
+"""Settings of Fast DDS: ours by default, unless the user has set others."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ node.create_publisher(Ready, "hsv/ready", 1)
 node.destroy_node()
 rclpy.shutdown()
 """
-"""What every node does first."""
+"""A script with the first steps of every node."""
 
 
 def said_by_fast_dds(environment, folder):
-    """Return what a process says that has made a node and a publisher."""
+    """Return the output of a process that creates a node and a publisher."""
     words = [sys.executable, "-c", JOIN]
     done = subprocess.run(words, env=environment, cwd=folder, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr

@@ -1,4 +1,4 @@
-"""Graphs that are moved and remapped, duplicates of their nodes, and their parameters dumped and loaded again."""
+"""Graphs with namespaces and remapping, duplicate nodes, and parameters that are dumped and loaded again."""
 
 import json
 import re
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.graph
 FUEL = "fuel_equivalence_ratio"
 
 DURATION = 11.0
-"""Seconds; a replay wants ten in which the controller does something."""
+"""Seconds: a replay needs more than ten in which the controller acts."""
 
 REMAPPED = [
     word
@@ -40,11 +40,11 @@ REMAPPED = [
     )
     for word in ("-r", rule)
 ]
-"""Of all topics and services some: given to every node, as they are only remapped where they are used."""
+"""Remapping of some topics and services, given to every node; it has no effect on nodes that do not use them."""
 
 
 def by_hand(processes, nodes, arguments):
-    """Start nodes one by one, with the arguments of each under its name."""
+    """Start nodes one by one, each with the arguments under its name."""
     return {
         node.name: processes.start("ros2", "run", node.package, node.executable, "--ros-args", *arguments[node.name])
         for node in nodes
@@ -64,7 +64,7 @@ def test_two_graphs_in_one_domain(processes):
     bags = [Bag(processes.folder / name) for name in ("first", "second")]
     assert [flight_fingerprint(bag) for bag in bags] == [flight.fingerprint] * 2
     assert [bag.namespace for bag in bags] == ["/lab/veh1", "/veh2"]
-    # The logs of both are on one topic, and each bag has its own events only; so they are one flight, step by step.
+    # Both graphs log to one topic, but each bag has only its own events; so the bags agree in every step.
     compared = processes.run("hsv", "diff", processes.folder / "first", processes.folder / "second")
     assert compared.returncode == 0 and "messages: identical\n" in compared.stdout, compared.stdout
     replayed = processes.run("hsv", "replay", processes.folder / "first", "--over-dds", "--node", "tube_mpc")
@@ -75,7 +75,7 @@ def test_two_graphs_in_one_domain(processes):
 def test_remapped_by_hand_with_duplicates_and_parameters_dumped(processes):
     folder = processes.folder
     alone = processes.start("ros2", "run", "hsv_ctrl", "notch_filter", "--ros-args", "-r", "__ns:=/alone")
-    # Nothing that is done to this flight comes too late; it is interrupted.
+    # The flight is long enough that no change comes too late; it is interrupted.
     prepared = prepare(str(short_scenario(folder, 3600, 3)), RunOptions(real_time_factor=4.0), bag=folder / "remapped")
     files = parameter_arguments(prepared.parameter_files)
     arguments = {node.name: [*files, *REMAPPED] for node in graph()}
@@ -101,14 +101,14 @@ def test_remapped_by_hand_with_duplicates_and_parameters_dumped(processes):
     flown = fly(assemble(flight_parameters(scenario))).history.state
     recorded = state_columns(bag.columns("hsv/state"))
     assert np.array_equal(recorded[:steps], flown[:steps])
-    # Quiet: said once, then every ten seconds.
+    # The waiting node logs once, then only every ten seconds.
     stamps = [float(found[1]) for found in re.finditer(r"\[(\d+\.\d+)\].*waiting for", output_of(alone))]
     assert stamps and all(later - earlier > 9.0 for earlier, later in pairwise(stamps))
     _fly_dumped(processes)
 
 
 def _ask(processes):
-    """Find the nodes by their roles; what is changed is as it was before."""
+    """Find the nodes by their roles. Every changed setting is restored."""
     injected = processes.run("hsv", "fault", "inject", FUEL, "loss_of_effectiveness", "1")
     assert injected.returncode == 0 and f"1 of {FUEL} from step " in last_line(injected), injected.stdout
     changed = processes.run("hsv", "set", "tau", "1")
@@ -119,7 +119,7 @@ def _ask(processes):
 
 
 def _refuse_duplicates(processes, files):
-    """Start everything a second time beside the flight; each ends by itself with one line."""
+    """Start all nodes a second time during the flight; each duplicate ends by itself with one line."""
     second = [
         processes.start("ros2", "run", node.package, node.executable, "--ros-args", *files, *REMAPPED, *words)
         for node, words in (
@@ -141,7 +141,7 @@ def _refuse_duplicates(processes, files):
 
 
 def _fly_dumped(processes):
-    """Fly with the dumped parameters, and simulated time for all, which changes no bit."""
+    """Fly with the dumped parameters. Simulated time for all nodes changes no bit."""
     folder = processes.folder
     arguments = {
         node.name: ["--params-file", str(folder / "dumps" / f"{'nf2' if node is NOTCH_FILTER else node.name}.yaml")]

@@ -1,4 +1,4 @@
-"""Custom controllers over DDS: a class, a function in C, and a node that knows only the messages."""
+"""Custom controllers over DDS: a class, a C function, and a node that knows only the messages."""
 
 import json
 import os
@@ -30,14 +30,14 @@ SHORT = 'extends = "{example}"\nfault = []\nduration = "{duration} s"\n{more}\n'
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
-    """Build the example's node as a workspace of its own; return what an environment needs to find all examples."""
+    """Build the example's node in its own workspace; return the environment variables that find all examples."""
     folder = tmp_path_factory.mktemp("workspace")
     shutil.copytree(EXAMPLES / "node", folder / "src", ignore=shutil.ignore_patterns("build", "install", "log"))
     words = ["colcon", "--log-base", "log", "build", "--base-paths", "src"]
     subprocess.run(words, cwd=folder, check=True, capture_output=True)
     prefix = folder / "install" / "hsv_example_node"
     [site] = prefix.glob("lib/python3*/site-packages")
-    # Class and function in C are named by their place: nothing is installed into the environment of the tests.
+    # The class and the C function are found by their paths; nothing is installed into the tests' environment.
     modules = (site, EXAMPLES / "lqr", SUPPORT)
     return {
         "AMENT_PREFIX_PATH": os.pathsep.join((str(prefix), os.environ["AMENT_PREFIX_PATH"])),
@@ -54,14 +54,14 @@ def processes(installed, tmp_path):
 
 
 def scenario(folder, example, more="", duration=11.0):
-    """Write a shortened scenario of an example."""
+    """Write a shortened scenario of an example and return its path."""
     path = folder / f"{example}.toml"
     path.write_text(SHORT.format(example=EXAMPLES / SCENARIOS[example], more=more, duration=duration))
     return path
 
 
 def flown(processes, path, name, *words):
-    # On a busy machine a node may be silent for longer than a person would wait.
+    # On a busy machine a node may be silent for longer than the default time limit.
     command = ("hsv", "run", path, "--no-report", "--step-timeout", "30", "--bag", processes.folder / name)
     done = processes.run(*command, *words)
     assert done.returncode == 0, done.stdout
@@ -88,7 +88,7 @@ def test_a_class_and_a_function_in_c_fly_as_in_process(processes, place):
 def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes):
     path = scenario(processes.folder, "node")
     bags = [flown(processes, path, "started")]
-    # Late: all others wait for it.
+    # The controller is started late; all other nodes wait for it.
     run = processes.start(
         *("hsv", "run", path, "--external", "--composed", "--no-report", "--step-timeout", "30"),
         *("--bag", processes.folder / "late"),
@@ -150,7 +150,7 @@ def test_a_node_that_goes_wrong_is_named_and_the_bag_is_whole(processes, how, wo
     assert done.returncode == 1 and words in done.stdout, done.stdout
     assert "Traceback" not in done.stdout
     bag = Bag(processes.folder / how)
-    # What was not a number is recorded, and flown no further.
+    # A command that is not a number is recorded but not applied.
     assert bag.complete and complete_steps(bag) == WRONG_STEP + (how == "nan")
     assert (exit_code_of(foreign) == -9) if how == "killed" else foreign.poll() is None
 
@@ -180,13 +180,13 @@ def test_what_cannot_fly_is_refused_in_a_line(processes, more, words):
 
 @pytest.mark.long
 def test_two_controllers_end_the_run(processes):
-    # Paced, so that the second joins before the flight is over, however long its start takes.
+    # The flight is paced, so that the second controller joins before its end, however long the start takes.
     path = scenario(processes.folder, "node", 'controller = "node:"', duration=200.0)
     for name in ("one", "two"):
         processes.start("ros2", "run", "hsv_example_node", "regulator", "--ros-args", "-r", f"__node:={name}")
     paced = ("--real-time-factor", "2", "--step-timeout", "30")
     done = processes.run("hsv", "run", path, "--composed", "--no-report", *paced, "--bag", processes.folder / "bag")
-    # The second may join in flight, and its answer come before DDS tells whose it is.
+    # If the second joins in flight, its answer may come before DDS identifies the sender.
     assert done.returncode == 1, done.stdout
     [said] = [line for line in done.stdout.splitlines() if "publish /hsv/command: expected one controller" in line]
     assert "/one" in said or "/two" in said

@@ -1,4 +1,4 @@
-"""Parameters by node: gathered, written, read back, laid over one another; disagreements are named."""
+"""Parameters by node: collected, written, read back and merged; conflicts are named."""
 
 from hsv.bags.parameter_sections import ParameterSections, disagreements
 

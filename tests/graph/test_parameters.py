@@ -1,4 +1,4 @@
-"""What a node tells ROS of its parameters: types, ranges, words; and what may be changed in flight."""
+"""Parameters as nodes declare them to ROS: types, ranges, descriptions; and which can be changed in flight."""
 
 import math
 import sys
@@ -19,7 +19,7 @@ ALL = {p.name: p for table in (*NODE_PARAMETERS.values(), LOCKSTEP_PARAMETERS) f
 
 @pytest.fixture(scope="module")
 def context():
-    """Return a context in a domain of its own."""
+    """Return an rclpy context in its own domain."""
     with own_domain() as domain:
         made = Context()
         rclpy.init(args=[], context=made, domain_id=domain)
@@ -29,7 +29,7 @@ def context():
 
 @pytest.fixture(scope="module")
 def declared(context):
-    """Return a node with every parameter of every node."""
+    """Return a node that declares the parameters of all nodes."""
     node = rclpy.create_node("declared", context=context)
     declare(node, ALL.values())
     yield node

@@ -1,4 +1,4 @@
-"""The player beside a graph that flies or waits."""
+"""The player next to a graph that flies or waits."""
 
 import pytest
 from changed_bags import changed_bag
@@ -14,7 +14,7 @@ STEPS = 3
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
-    """A bag of three steps."""
+    """Return a bag of three steps."""
     folder = tmp_path_factory.mktemp("bags")
     flown = record_flight(folder / "flown", duration=1.0, fault=0.5).folder
     return changed_bag(flown, folder / "short", messages=lambda _, messages: messages[:STEPS])
@@ -42,7 +42,7 @@ def test_a_plant_that_waits_does_not_fly_on_what_is_played(processes, bag):
         words = ["--topic", "/hsv/actuator", "--no-clock", "--delay", "2"]
 
         def ignored():
-            # Played before the plant has found the player, nothing arrives: on a busy machine that takes its time.
+            # The plant ignores messages that are played before it has discovered the player, which takes time.
             done = processes.run("hsv", "play", bag, *words)
             assert done.returncode == 0, done.stdout
             return "ignored" in log.read_text()

@@ -1,4 +1,4 @@
-"""What a run is refused for, before any process starts."""
+"""Errors that refuse a run before any process starts."""
 
 import pytest
 
@@ -26,6 +26,6 @@ def test_the_bag_of_a_foreign_controller_keeps_the_scenario_that_is_flown(tmp_pa
         prepared = prepare(name, RunOptions(external=external), bag=folder / "bag", folder=folder)
         kept = parse_scenario((folder / "scenario.toml").read_text(), name)
         assert kept == prepared.scenario and kept.controller.startswith("node:") == external
-        # Only the scenario's own controller is compared with the publication.
+        # A flight with an external controller is not compared with the published fingerprint.
         design = read_design(find_design(kept.design)).digest
         assert as_published("v1:another", kept, design) is (None if external else False)

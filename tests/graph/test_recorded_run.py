@@ -1,4 +1,4 @@
-"""A run of real nodes, repeated by real nodes, played again, and read by others."""
+"""A run of real nodes: replayed by real nodes, played again, and read by other tools."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STEPS = 601
 
 @pytest.fixture(scope="module")
 def bag(shared_processes):
-    """A flight of twelve seconds, long enough to be worth a replay."""
+    """Return the bag of a flight of 12 s, long enough for a replay."""
     scenario = short_scenario(shared_processes.folder, duration=12, fault=6)
     done = shared_processes.run("hsv", "run", scenario, "--bag", shared_processes.folder / "flown")
     assert done.returncode == 0, done.stdout

@@ -1,4 +1,4 @@
-"""A flight under the ROS 2 standard for simulators: a client that knows nothing else pauses, steps and resets it."""
+"""A flight under the ROS 2 standard for simulators: its client pauses, steps and resets the flight."""
 
 import json
 import sys
@@ -57,7 +57,7 @@ def test_pause_steps_reset_and_the_whole_flight_again(processes, scenario, pace,
 
 
 def assert_each_has_its_own(*bags):
-    """Assert that every bag has one run, announced before its reference, and the nodes that were ready for it."""
+    """Assert that every bag has one run, announced before its reference, with the nodes that were ready for it."""
     runs = [list(bag.decode("/hsv/run")) for bag in bags]
     assert [len(run) for run in runs] == [1] * len(bags)
     for bag, [(_, run)] in zip(bags, runs, strict=True):

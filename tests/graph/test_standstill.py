@@ -1,4 +1,4 @@
-"""What is told from slow: standing still, and using no processor time."""
+"""Detection of a standstill: a process is slow as long as anything changes or it uses processor time."""
 
 import os
 import signal
@@ -19,7 +19,7 @@ def test_time_counts_while_nothing_changes_and_a_gap_between_looks_little(monkey
         now += 0.5
         assert standstill.look("a") == expected
     now += 60.0
-    # This process did not get to run for a minute: no sign that the others would have.
+    # This process did not run for a minute; the others may not have run either, so the gap does not count.
     assert standstill.look("a") == 2.5
     now += 0.5
     assert standstill.look("b") == 0.0

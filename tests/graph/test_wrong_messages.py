@@ -1,4 +1,4 @@
-"""A message that no block can take ends the run by topic and field, and nothing flies on with it."""
+"""A message that no block can accept ends the run; the error names topic and field, and no step uses it."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ COMPOSED = ("--composed",)
 def test_a_message_that_no_block_can_take_ends_the_run_by_topic_and_field(processes, how, words, node, said):
     bag = processes.folder / how
     disturber = processes.start(sys.executable, DISTURBER, how, str(FROM_STEP))
-    # Paced, so that the wrong message of a step comes before the right one.
+    # The flight is paced, so that the wrong message of a step comes before the right one.
     paced = ("--real-time-factor", "2", "--step-timeout", "30")
     run = ("hsv", "run", short_scenario(processes.folder, duration=100), "--no-report", "--bag", bag, *paced, *words)
     done = processes.run(*run)
     assert done.returncode == 1 and "Traceback" not in done.stdout, done.stdout
     fatal = [line for line in done.stdout.splitlines() if "[FATAL]" in line]
-    # Two nodes take the measurement.
+    # Two nodes subscribe to the measurement.
     assert fatal and all(f"{node}]: {said}" in line for line in fatal) and len(fatal) <= 2 - bool(node), done.stdout
     assert disturber.poll() is None
     flown = Bag(bag)
