@@ -34,11 +34,11 @@ class Cantilever:
     """Mass per length in kg/m."""
 
     def shape(self, distance: np.ndarray | float, derivative: int = 0) -> np.ndarray:
-        """Return the mode shape (kg^-0.5) at a distance (m, any shape) from the clamp, or its n-th derivative."""
+        """Return the mode shape (kg^-0.5) or its n-th derivative (kg^-0.5/m^n) at a ``distance`` (m) from the clamp."""
         b = EIGENVALUE
         x = b * np.asarray(distance, float) / self.length
         ratio = (np.cosh(b) + np.cos(b)) / (np.sinh(b) + np.sin(b))
-        # Derivatives of cosh - cos and of sinh - sin; the fourth is the function itself.
+        # The derivatives of cosh - cos and of sinh - sin; the fourth derivative equals the function.
         hyperbolic = (np.cosh(x), np.sinh(x))
         circular = ((-np.cos(x), -np.sin(x)), (np.sin(x), -np.cos(x)), (np.cos(x), np.sin(x)), (-np.sin(x), np.cos(x)))
         turn = derivative % 4
@@ -108,11 +108,11 @@ class Airframe:
         return -self.aft_body, float(self.upper(-self.aft_body))
 
     def upper(self, x: float | np.ndarray) -> Any:
-        """Return the height of the upper surface at a station ``x`` (m, any shape)."""
+        """Return the height z (m) of the upper surface at a station ``x`` (m), a number or an array."""
         return self.nose[1] + (self.fore_body - x) * math.tan(self.upper_surface_angle)
 
     def lower(self, x: float | np.ndarray) -> Any:
-        """Return the height of the lower surface at a station ``x`` (m, any shape)."""
+        """Return the height z (m) of the lower surface at a station ``x`` (m), a number or an array."""
         corners = [self.tail, (self.nozzle, self.engine_roof), (self.inlet, self.engine_roof), self.nose]
         stations, heights = np.array(corners).T
         return np.interp(x, stations, heights)
@@ -129,7 +129,7 @@ class Airframe:
 
     @cached_property
     def cantilevers(self) -> tuple[Cantilever, Cantilever]:
-        """Fore and aft body as cantilevers clamped at the centre of gravity."""
+        """The fore body and the aft body, as cantilevers clamped at the centre of gravity."""
         return Cantilever(self.fore_body, self.mass_per_length), Cantilever(self.aft_body, self.mass_per_length)
 
     def mode(self, x: float) -> int:
@@ -137,7 +137,7 @@ class Airframe:
         return 0 if x >= 0.0 else 1
 
     def shape(self, x: float, derivative: int = 0) -> float:
-        """Return the mode shape (kg^-0.5, up positive) at station ``x`` (m), or a derivative by x (kg^-0.5/m^n)."""
+        """Return the mode shape (kg^-0.5, up positive) at station ``x`` (m), or its n-th derivative (kg^-0.5/m^n)."""
         return (-1.0 if x < 0.0 and derivative % 2 else 1.0) * float(
             self.cantilevers[self.mode(x)].shape(abs(x), derivative)
         )

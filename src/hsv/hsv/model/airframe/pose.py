@@ -24,14 +24,14 @@ FLAMES = ("flame_1", "flame_2", "flame_3")
 """Frames of the three parts of the flame, which slide out of the engine by one, two and three times the same length."""
 
 FORE_SEGMENTS, AFT_SEGMENTS = 5, 4
-"""Rigid segments ahead of the inlet and behind the nozzle; two more reach from there to the centre of gravity."""
+"""Numbers of rigid segments ahead of the inlet and behind the nozzle; one more on each side reaches to the centre."""
 
 STEEPEST = 0.9
-"""Largest sine of a segment's rotation: a diverging flight has elastic coordinates that no chain can show."""
+"""Largest sine of a segment's rotation; the elastic coordinates of a diverging flight would exceed it."""
 
 
 class Sample(NamedTuple):
-    """Quantities that determine the picture at one time, SI: angles in rad, elastic coordinates in kg^0.5 m."""
+    """Quantities that determine the drawing at one time: angles in rad, elastic coordinates in kg^0.5 m."""
 
     angle_of_attack: float
     pitch_angle: float
@@ -62,7 +62,7 @@ def transforms(sample: Sample, exaggeration: float | None = None) -> list[Transf
 
     Args:
         sample: Finite values.
-        exaggeration: Factor on the bending; default: the value in ``airframe.toml``.
+        exaggeration: Factor on the bending; None: the value in ``airframe.toml``.
     """
     frame = airframe()
     scale = frame.exaggeration if exaggeration is None else exaggeration
@@ -87,7 +87,7 @@ def transforms(sample: Sample, exaggeration: float | None = None) -> list[Transf
 
 
 def segments(frame: Airframe) -> dict[str, np.ndarray]:
-    """Return the stations of the segment ends, from the centre of gravity outward, by the stem of the frame names."""
+    """Return the stations (m) of the segment ends, outward from the centre of gravity, for ``fore_body``, ``aft_body``."""
     return {
         "fore_body": np.array([0.0, *np.linspace(frame.inlet, frame.fore_body, FORE_SEGMENTS + 1)]),
         "aft_body": np.array([0.0, *np.linspace(frame.nozzle, -frame.aft_body, AFT_SEGMENTS + 1)]),
@@ -103,7 +103,7 @@ def segment_at(frame: Airframe, x: float) -> tuple[str, float]:
 
 
 def _chain(frame: Airframe, name: str, stations: np.ndarray, coordinate: float) -> list[Transform]:
-    """Return the transforms of the segments of a bent beam; each segment keeps its length."""
+    """Return the transforms of the segments of a beam bent by an elastic ``coordinate``; segments keep their length."""
     height = np.array([frame.shape(x) for x in stations]) * coordinate
     sines = np.clip(np.diff(height) / np.diff(stations), -STEEPEST, STEEPEST)
     found, parent, x, previous = [], BODY, 0.0, 0.0

@@ -26,14 +26,14 @@ SCENE_TOPIC = "/hsv/airframe/scene"
 TRANSFORMS_TOPIC = "/hsv/airframe/transforms"
 
 RATE = 25.0
-"""Maximum rate of the frames, Hz. (The period of the faster bending mode is a third of a second.)"""
+"""Maximum rate of the frames (Hz); the period of the faster bending mode is a third of a second."""
 
 _ARROWS: dict[str, Colour] = {FLIGHT_PATH: (0.1, 0.5, 0.25, 1.0), BODY: (0.0, 0.45, 0.7, 1.0)}
-"""Frames with an arrow along their x axis, and its colour."""
+"""Frames that have an arrow along their x axis, with the colour of the arrow."""
 
 
 def scene(time_ns: int, exaggeration: float | None = None) -> SceneUpdate:
-    """Return the scene; it is sent once, to each new client, and when the exaggeration changes."""
+    """Return the scene, stamped ``time_ns``; each client needs it once, and again when the exaggeration changes."""
     stamp = _stamp(time_ns)
     entities = [_entity(solid, stamp) for solid in solids()]
     length = 0.7 * airframe().length

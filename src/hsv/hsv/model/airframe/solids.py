@@ -26,7 +26,7 @@ LABEL_HEIGHT, LABEL_SIZE = 5.0, 1.0
 _FLAME_HEIGHTS = (0.85, 0.6, 0.3)
 """Heights of the parts of the flame, relative to the height of the engine."""
 _SUNK = 0.8
-"""Depth (m) of the engine in the body, so that no gap opens when the body bends."""
+"""Depth (m) by which the engine reaches into the body, so that no gap opens when the body bends."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Solid:
 
 
 def label(exaggeration: float | None = None) -> str:
-    """Return the label above the vehicle; ``exaggeration`` as in :func:`hsv.model.airframe.pose.transforms`."""
+    """Return the text of the label, for ``exaggeration`` as in :func:`hsv.model.airframe.pose.transforms`."""
     return f"bending x {airframe().exaggeration if exaggeration is None else exaggeration:g}"
 
 
@@ -104,7 +104,10 @@ def _flame(frame: Airframe, name: str, height: float, colour: Colour) -> Solid:
 
 
 def _prism(section: Sequence[Point], sides: Callable[[float], tuple[float, float]]) -> np.ndarray:
-    """Return the triangles (n, 3, 3) of a prism: a convex section, counter-clockwise from the right, between sides."""
+    """Return the triangles (n, 3, 3) of a prism whose width is given by ``sides``, the right and left y at a station.
+
+    ``section`` has the corners (x, z) of the convex side view, counter-clockwise as seen from the right.
+    """
     right = [np.array([x, sides(x)[0], z]) for x, z in section]
     left = [np.array([x, sides(x)[1], z]) for x, z in section]
     found = []

@@ -1,1 +1,1 @@
-"""The fault vocabulary as pure functions of command and time."""
+"""Faults: their types and parameters, the schedule of a flight, and the fault injector."""

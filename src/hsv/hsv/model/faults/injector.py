@@ -30,16 +30,16 @@ FAULT_PARAMETERS = (
 )
 DURATION = Parameter("duration", 0.0, "time until a fault injected in flight ends; 0: until cleared", "s", 0.0, 1e5)
 LINK_PARAMETERS = (COMPUTATION_PARAMETER, *COMMAND_LINK_PARAMETERS)
-"""Parameters of the link that carries the command to the injector."""
+"""Parameters of the link from the controller to the injector."""
 
 NEVER_TIME = 1e9
-"""Stop (s) of a fault that does not end, in a list with faults that do."""
+"""Stop (s) that a list of stops contains for a fault without an end."""
 
 
 class FaultResult(NamedTuple):
-    """Input that reaches the actuators (2), and the active faults.
+    """The input that reaches the actuators (2), and the active faults.
 
-    Faults of command, actuators, effectors and engine act in this step, faults of sensors on the next measurement.
+    Faults of the command, actuators, effectors and engine act in this step, those of sensors on the next measurement.
     """
 
     actuator: np.ndarray
@@ -47,9 +47,9 @@ class FaultResult(NamedTuple):
 
 
 class FaultInjector:
-    """Applies scheduled faults, and those injected or cleared in flight, which act from the next step on.
+    """Applies the faults of a schedule; in flight, faults can be injected or cleared from the next step on.
 
-    Faults of the command are applied here, after its link; the plant receives the other faults.
+    Faults of the command are applied here, behind the link from the controller. The plant applies all other faults.
     """
 
     PARAMETERS = (*FAULT_PARAMETERS, *LINK_PARAMETERS, *INITIAL_PARAMETERS, *VEHICLE_PARAMETERS)
@@ -62,14 +62,14 @@ class FaultInjector:
         link: Struct | None = None,
         before: np.ndarray | None = None,
     ) -> None:
-        """Take the faults of a schedule.
+        """Prepare a flight with scheduled faults.
 
         Args:
-            scheduled: Faults.
-            period: T (s).
+            scheduled: Faults with their first step and the step after their last one.
+            period: Control period T (s).
             seed: Seed of the flight.
-            link: Link that carries the command; None: an ideal one.
-            before: The input (2) sent before the flight.
+            link: Link from the controller; None: an ideal link.
+            before: Input (2) that the link delivers first, sent before the flight; None: zeros.
         """
         for row in scheduled:
             row.fault.check_period(period)
@@ -84,7 +84,7 @@ class FaultInjector:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
-        """Build from :data:`FAULT_PARAMETERS` and :data:`LINK_PARAMETERS`; a link also needs the initial trim."""
+        """Return the injector that values of :attr:`PARAMETERS` describe; an ideal link does not need the vehicle's."""
         v = validate(FAULT_PARAMETERS, values)
         period, seed = v["period"], v[SEED_PARAMETER.name]
         link = command_link(values, period)
@@ -110,18 +110,18 @@ class FaultInjector:
         return other
 
     def reset(self) -> None:
-        """Return to the schedule: everything injected or cleared in flight is discarded."""
+        """Reset to the schedule; what was injected or cleared in flight is discarded."""
         self.known = list(self.scheduled)
         self._next = 0
         self._rows = self.rows((COMMAND,))
         self._link_state = self.link_state()
 
     def link_state(self) -> np.ndarray:
-        """Return the state of the link with which a flight begins."""
+        """Return the initial memory of the link."""
         return link_state(self.link, N_INPUTS, self._before)
 
     def rows(self, sides: Sequence[str], earlier: Struct | None = None) -> Struct:
-        """Return the known faults of some sides; those in ``earlier`` keep their memory."""
+        """Return the known faults of the given ``sides`` as :func:`fault_rows`; those in ``earlier`` keep their memory."""
         return fault_rows(sides, self.known, self.period, earlier)
 
     def parameters(self) -> dict[str, list[str] | list[float]]:
@@ -137,13 +137,13 @@ class FaultInjector:
         }
 
     def inject(self, fault: Fault, steps: int = NEVER) -> int:
-        """Start ``fault`` in the next step, for ``steps`` steps; it replaces a fault of its type on its channel.
+        """Start ``fault`` in the next step, for ``steps`` steps; it replaces any fault of the same type and channel.
 
         Returns:
             The first step of the fault.
 
         Raises:
-            ParameterError: The fault comes and goes faster than the control period.
+            ParameterError: The period of an intermittent fault is shorter than the control period.
         """
         fault.check_period(self.period)
         self.clear(fault.channel, fault.type)
@@ -156,10 +156,10 @@ class FaultInjector:
         """End the active faults of ``channel`` and of type ``kind``; empty: all channels, all types.
 
         Returns:
-            The first step without them: the next one, or the one after if only sensors are concerned.
+            The first step without them: the next step, or the one after it if all are faults of sensors.
 
         Raises:
-            ParameterError: Unknown channel or kind.
+            ParameterError: The channel or the kind is unknown.
         """
         if channel and channel not in CHANNELS:
             raise ParameterError(f"channel = {channel!r}: expected {one_of(CHANNELS, channel, ', or empty for all')}")
@@ -191,12 +191,12 @@ class FaultInjector:
         )
 
     def _first(self, fault: Fault) -> int:
-        """Return the first step in which a fault can still be begun or ended."""
+        """Return the first step from which ``fault`` can still be started or ended."""
         return self._next + 1 if fault.kind.side == SENSOR else self._next
 
 
 def read_parameters(text: str) -> dict[str, float]:
-    """Return the parameters of a fault, SI, written as :func:`written_parameters` does.
+    """Return the parameters of a fault (SI) by name from a text such as :func:`written_parameters` returns.
 
     Raises:
         ParameterError: The text has another form.
@@ -214,5 +214,5 @@ def read_parameters(text: str) -> dict[str, float]:
 
 
 def written_parameters(parameters: Mapping[str, Any]) -> str:
-    """Return parameters of a fault as text, without loss of bits."""
+    """Return the ``parameters`` (SI) of a fault as text such as ``effectiveness=0.9``, without loss of bits."""
     return ",".join(f"{name}={float(value)!r}" for name, value in parameters.items())

@@ -1,4 +1,4 @@
-"""Scheduled faults, and the rows and memory by which the core applies them, see ``core/faults.h``."""
+"""Scheduled faults, and the structs with which the core applies them, see ``core/faults.h``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class ScheduledFault(NamedTuple):
 
 
 class ActiveFault(NamedTuple):
-    """A fault that acts, and since which step."""
+    """A fault within its start and stop, where an intermittent one may pause, and its first step."""
 
     fault: Fault
     since: int
@@ -37,13 +37,13 @@ def fault_rows(
     period: float,
     earlier: Struct | None = None,
 ) -> Struct:
-    """Return the scheduled faults of the given ``sides`` in the order of composition.
+    """Return the scheduled faults of the given ``sides``, in the order of composition, as an ``hsv_faults``.
 
     Args:
         sides: Names of sides, see :mod:`hsv.model.faults.table`.
-        scheduled: Faults with their first step and their stop, in any order.
+        scheduled: Faults with their first step and the step after their last one, in any order.
         period: T (s).
-        earlier: The faults before a change in flight; the same faults keep their memory.
+        earlier: The result before a change in flight; faults that are in both keep their memory.
     """
     chosen = sorted((row for row in scheduled if row[0].kind.side in sides), key=_order)
     rows = np.zeros(len(chosen), dtype("hsv_fault"))
@@ -65,7 +65,7 @@ def fault_rows(
 
 
 def _identity(row: np.void) -> bytes:
-    """Return the bytes that identify a fault: all but its stop, which a clearance in flight moves."""
+    """Return the bytes that identify a fault: all but its stop, which changes when the fault is cleared in flight."""
     same = row.copy()
     same["stop"] = 0.0
     return bytes(same.tobytes())
@@ -79,7 +79,7 @@ def _place(channel: str) -> int:
 def _order(row: tuple[Fault, int, int]) -> tuple[Any, ...]:
     fault, start, stop = row
     code = fault.kind.code
-    # The faults that replace the position are one stage, in which the newest is last.
+    # Faults that replace the position form a single stage, in which the one that started last comes last.
     stage = (REPLACING[0], start, code) if code in REPLACING else (code, start, 0)
     return *stage, fault.channel, fault.values, stop
 

@@ -1,9 +1,9 @@
-"""The vocabulary of faults, with their channels and parameters; parser, help and documentation follow it.
+"""All kinds of faults with their channels and parameters, from which the parser, help and documentation follow.
 
-A fault has a side, where it acts: on the command on its way to the actuator, on the actuator's dynamics, on the
-effector that it moves, on the engine, or on a sensor. Faults that act at once are composed in one order whatever the
-order in which they are listed, that of :data:`FAULT_KINDS`; among those that replace the effector's position the newest
-wins. Any kind may come and go, see :data:`OCCURRENCE_PARAMETERS`.
+The side of a fault is where it acts: on the command before the actuator, on the dynamics of the actuator, on the
+effector moved by it, on the engine, or on a sensor. Faults that act at the same time are composed in the order of
+:data:`FAULT_KINDS`, whatever the order in which they are listed. Of several that replace the position of an effector,
+the one that started last prevails. Every kind may be intermittent, see :data:`OCCURRENCE_PARAMETERS`.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from hsv.core import lib
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 
 ENGINE = "engine"
-"""The channel of faults of the engine itself."""
+"""Name of the channel for faults of the engine."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """Channel on which faults can act: the SI unit of its signal, and a travel that scales the ranges of parameters."""
+    """Channel on which faults can act: SI unit of its signal, and a typical travel that scales ranges of parameters."""
 
     unit: str
     travel: float
 
 
 _STOP = parse_quantity("30 deg", "rad", "stop")
-"""Stop of the elevator, rad, with the same bits as 30 deg in a file."""
+"""Stop of the elevator (rad), with the same bits as "30 deg" in a file."""
 
 CHANNELS = {
     **{
@@ -47,20 +47,20 @@ CHANNELS = {
         )
     },
 }
-"""Control inputs, the engine, and the states, whose sensors fail."""
+"""Channels by name: the control inputs, the engine, and the states, whose sensors can fail."""
 
 COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR = "command", "dynamics", "effector", "engine", "sensor"
 
 REPLACING = (lib.LOCK, lib.LOCK_AT, lib.FLOAT, lib.HARD_OVER, lib.SOLID_OSCILLATION)
-"""Types that replace the position of an effector; the most recent one applies."""
+"""Codes of the kinds that replace the position of an effector; the one that started last prevails."""
 
 MAX_DELAY = lib.MAX_DELAY
-"""Steps."""
+"""Largest delay of a command, in control periods."""
 
 
 @dataclass(frozen=True)
 class FaultParameter:
-    """A parameter of a kind of fault; ``{}`` in its unit is the unit of the channel, whose travel scales the range."""
+    """A parameter of a kind of fault; ``{}`` in its unit is the channel's unit, and the channel's travel scales the range."""
 
     name: str
     description: str
@@ -68,11 +68,11 @@ class FaultParameter:
     minimum: float
     maximum: float
     default: float | None = None
-    """Default value; None: the parameter must be given."""
+    """Default value, or None if the parameter must be given."""
     whole: bool = False
 
     def of(self, channel: str) -> Parameter:
-        """Return it for a ``channel``: unit, range and default in the channel's unit."""
+        """Return the parameter for a ``channel``, with the unit and the range that it has there."""
         described = CHANNELS[channel]
         own = "{}" in self.unit
         scale = described.travel if own else 1.0
@@ -88,7 +88,7 @@ class FaultParameter:
         )
 
     def written(self, channel: str, value: float, system: UnitSystem = UnitSystem.metric) -> str:
-        """Return a ``value``, SI, of a fault of ``channel`` in the units of ``system``."""
+        """Return ``value`` (SI), for a fault of ``channel``, as text with its unit in ``system``."""
         # Angles are read in degrees, but natural frequencies in rad/s.
         given = UnitSystem.si if self.unit == "rad/s" else system
         return readable(value, self.of(channel).unit or "1", given)
@@ -96,7 +96,7 @@ class FaultParameter:
 
 @dataclass(frozen=True)
 class FaultKind:
-    """A kind of fault: its code and side, which channels it may have, its meaning and its own parameters."""
+    """A kind of fault: its code in the core, side, possible channels, meaning, and own parameters."""
 
     code: int
     side: str
@@ -176,7 +176,7 @@ _MEANINGS = {
         "sensor_freeze": "the output of the sensor stays at its value at the start of the fault",
     },
 }
-"""Meaning of every kind of fault by its side, in the order of composition, which is that of the codes in core.h."""
+"""Meanings of all kinds by side and name, in the order of composition, which is that of the codes in core.h."""
 
 _ABOUT_START = "0: the whole command is reversed, 1: only its change since the start of the fault"
 _PARAMETERS = {
@@ -212,7 +212,7 @@ _PARAMETERS = {
 _CHANNELS_OF = {ENGINE_SIDE: (ENGINE,), SENSOR: STATE_NAMES}
 
 FAULT_KINDS: dict[str, FaultKind] = {}
-"""The vocabulary, in the order in which faults that act at once are composed."""
+"""All kinds of faults by name, in the order in which faults that act at the same time are composed."""
 
 for _side, _meanings in _MEANINGS.items():
     for _name, _meaning in _meanings.items():
@@ -226,14 +226,14 @@ OCCURRENCE_PARAMETERS = (
     _P("random_on", "mean of the random time for which the fault acts; 0: it stays", "s", 0.0, 1e4, 0.0),
     _P("random_off", "mean of the random time between", "s", 0.0, 1e4, 0.0),
 )
-"""Parameters of faults of all types: permanent between start and stop, periodic, or as a two-state Markov chain."""
+"""Parameters of all kinds: a fault acts always, periodically or as a Markov chain, between its start and stop."""
 
 
 def fault_parameters(channel: str, kind: str) -> tuple[FaultParameter, ...]:
-    """Return the parameters of a kind of fault and then those of its occurrence.
+    """Return the parameters of a kind of fault, followed by :data:`OCCURRENCE_PARAMETERS`.
 
     Raises:
-        ParameterError: Unknown kind, or a channel that it does not support.
+        ParameterError: The kind is unknown or does not exist for the channel.
     """
     if kind not in FAULT_KINDS:
         raise ParameterError(f"fault.type = {kind!r}: expected {one_of(FAULT_KINDS, kind)}")
@@ -246,10 +246,10 @@ def fault_parameters(channel: str, kind: str) -> tuple[FaultParameter, ...]:
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of one channel: ``values``, SI, are the parameters of its kind and then those of its occurrence.
+    """A fault of one channel; ``values`` (SI) are those of :func:`fault_parameters`, in the same order.
 
     Raises:
-        ParameterError: Unknown kind, a channel that the kind does not support, or a value that it does not admit.
+        ParameterError: The kind is unknown or does not exist for the channel, or a value is not admissible.
     """
 
     channel: str
@@ -280,7 +280,7 @@ class Fault:
 
     @classmethod
     def of(cls, channel: str, kind: str, parameters: Mapping[str, float]) -> Self:
-        """Return the fault with these ``parameters`` of its kind, by name, SI; those with a default may be left out."""
+        """Return a fault from its ``parameters`` (SI) by name; those with a default may be left out."""
         table = fault_parameters(channel, kind)
         optional = {p.name: p.default for p in table if p.default is not None}
         due = [p.name for p in table if p.default is None]
@@ -300,7 +300,7 @@ class Fault:
         """Check that the fault comes and goes no faster than the control ``period`` (s).
 
         Raises:
-            ParameterError: Names the parameter.
+            ParameterError: It is faster; the message names the parameter.
         """
         cycle = self.parameters.get("intermittent_period", math.inf)
         if cycle < period:
@@ -322,13 +322,13 @@ class Fault:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Parameters by name, SI, without those at their defaults."""
+        """Values of the parameters (SI) by name, without those at their defaults."""
         table = fault_parameters(self.channel, self.type)
         return {p.name: value for p, value in zip(table, self.values, strict=True) if value != p.default}
 
 
 def read_fault(channel: str, kind: str, parameters: Sequence[str]) -> Fault:
-    """Return the fault whose ``parameters`` are written as ``name=quantity``, with units; a single one without name."""
+    """Return the fault whose ``parameters`` are texts ``name=quantity``; the only required one needs no name."""
     known = {parameter.name: parameter.of(channel) for parameter in fault_parameters(channel, kind)}
     due = [parameter.name for parameter in FAULT_KINDS[kind].parameters if parameter.default is None]
     given = {}

@@ -1,4 +1,4 @@
-"""Exact discretisation of linear systems behind actuators and a delay, with commands held over a period."""
+"""Exact discretisation of actuators, and of linear systems driven through actuators and a delay; commands are held."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from hsv.model.signals import INPUT_NAMES, N_INPUTS
 
 
 def actuator_names(actuators: Sequence[ActuatorSet]) -> tuple[str, ...]:
-    """Return the names of the states of ``actuators``: a position each and, for second order, a rate."""
+    """Return the names of the states of ``actuators``: a position for each and, if of second order, a rate."""
     return tuple(
         f"{actuator.channel}_{state}" for actuator in actuators for state in ("position", "rate")[: actuator.order]
     )
 
 
 def actuator_system(actuators: Sequence[ActuatorSet]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return A (a, a), B (a, 2), C (2, a), D (2, 2) of all actuators in continuous time, from commands to positions.
+    """Return continuous-time A (a, a), B (a, 2), C (2, a), D (2, 2) of all actuators, from commands to positions.
 
     Position and rate limits are ignored. On a channel without an actuator the position is the command.
 
@@ -47,8 +47,8 @@ def actuator_system(actuators: Sequence[ActuatorSet]) -> tuple[np.ndarray, np.nd
 def sampled_actuators(actuators: Sequence[ActuatorSet], period: float) -> Struct:
     """Return ``actuators`` (see :func:`actuator_system`) sampled at ``period`` (s) with held commands.
 
-    The state a+ = A a + B c is exact; C a + D c is the mean position, to which a slow vehicle responds. With it as the
-    input, the vertices of the polytopic model stay unchanged.
+    The state a+ = A a + B c is exact. C a + D c is the mean position over the period; a vehicle that is slow compared
+    with the period responds to this mean, which is therefore the input of the unchanged polytopic model.
     """
     A, B, C, D = actuator_system(actuators)
     # Integrators of the positions give their means.
@@ -82,7 +82,7 @@ def held_behind(
         B: (n, 2) input matrix, continuous time.
         period: Period of the commands (s).
         actuators: See :func:`actuator_system`; their states follow those of x.
-        delay: Delay of all commands (s).
+        delay: Delay of all commands (s), which may exceed the period.
 
     Returns:
         A (n + a + d, n + a + d) and B (n + a + d, 2) for n states of x, a states of the actuators and d delayed

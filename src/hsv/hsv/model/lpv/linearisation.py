@@ -16,7 +16,7 @@ from hsv.model.trim import trim
 
 
 def zero_order_hold(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the discrete A and B of dx/dt = A x + B u with u held over ``period`` (paper eq. 12).
+    """Return the discrete A (n, n) and B (n, m) of dx/dt = A x + B u with u held over ``period`` (paper eq. 12).
 
     Args:
         A: (n, n) continuous-time state matrix, SI per second.
@@ -44,14 +44,14 @@ class Filter(NamedTuple):
 
 
 def extended_derivative(x: np.ndarray, u: np.ndarray, p: VehicleParameters, notch: Filter, printed: bool) -> np.ndarray:
-    """Return the derivative (9 + k) of the extended state of vehicle and filter (paper eq. 40).
+    """Return the derivative (9 + k) of the extended state, that of vehicle and filter (paper eq. 40).
 
     Args:
         x: (9 + k) extended state with the filtered pitch rate, real or complex.
         u: (2) inputs, real or complex.
         p: Vehicle.
         notch: Filter with k states.
-        printed: True: the filtered pitch rate moves the vehicle, as the paper prints it; False: the true one does.
+        printed: Whether the filtered pitch rate moves the vehicle, as the paper prints it, or the true one does.
     """
     filtered, s = x[PITCH_RATE], x[N_STATES:]
     passed = 0.0 * filtered
@@ -130,10 +130,10 @@ def linearise(vehicle: VehicleParameters, altitude: float, velocity: float) -> t
 def linearise_extended(
     vehicle: VehicleParameters, notch: Filter, altitude: float, velocity: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return continuous-time A' (9 + k, 9 + k) and B' (9 + k, 2) of the decoupled ECM at trim (paper eq. 44), SI.
+    """Return continuous-time A' (9 + k, 9 + k) and B' (9 + k, 2) of vehicle and filter at trim (paper eq. 44).
 
-    The true pitch rate moves the vehicle. Arguments and errors are those of :func:`linearise`, with the filter
-    ``notch`` of k states.
+    The vehicle is decoupled, and the true pitch rate moves it. Units, arguments and errors are those of
+    :func:`linearise`; ``notch`` is the filter with k states.
     """
     rigid = vehicle.decoupled()
     equilibrium = trim(rigid, altitude, velocity)
@@ -160,7 +160,7 @@ def sample(
 
 @dataclass(frozen=True)
 class Mode:
-    """A mode: its pole (rad/s; of a pair the upper one), natural frequency (rad/s) and damping ratio."""
+    """A mode: its pole (rad/s; of a complex pair the upper one), natural frequency (rad/s) and damping ratio."""
 
     pole: complex
     natural_frequency: float
@@ -209,7 +209,7 @@ def bode(response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def bode_difference(response: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the absolute differences of magnitude (dB) and phase (deg, at most 180) of two complex responses.
 
-    Two responses of zero do not differ: an input has no effect on the elastic states of a rigid vehicle.
+    Two responses of zero count as equal: no input has an effect on the elastic states of a rigid vehicle.
     """
     ratio = np.divide(response, expected, out=np.ones_like(response), where=(response != 0.0) | (expected != 0.0))
     return np.abs(20.0 * np.log10(np.abs(ratio))), np.abs(np.degrees(np.angle(ratio)))

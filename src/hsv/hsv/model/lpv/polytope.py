@@ -76,7 +76,7 @@ def _spline(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def evaluate(weights: Struct, values: np.ndarray) -> np.ndarray:
-    """Return the weights (n, r) at ``values`` (n) of the variable, which are clamped to the breakpoints."""
+    """Return the weights (n, r) of r vertices at ``values`` (n) of the variable, clamped to the breakpoints."""
     breakpoints, coefficients = weights.breakpoints, weights.coefficients
     clamped = np.clip(values, breakpoints[0], breakpoints[-1])
     piece = np.clip(np.searchsorted(breakpoints, clamped, side="right") - 1, 0, len(breakpoints) - 2)
@@ -89,8 +89,8 @@ def evaluate(weights: Struct, values: np.ndarray) -> np.ndarray:
 class Polytope:
     """A discrete-time polytopic model (paper eq. 12) scheduled by altitude (m) and velocity (m/s).
 
-    ``A`` (r, n, n) and ``B`` (r, n, m) are ordered by altitude, then velocity: vertex i * r_velocity + j. The
-    scheduling variables are clamped to the breakpoints.
+    ``A`` (r, n, n) and ``B`` (r, n, m) are ordered by altitude, then velocity: vertex i * r_velocity + j has the weight
+    i of ``altitude`` and j of ``velocity``. The scheduling variables are clamped to the breakpoints.
     """
 
     A: np.ndarray
@@ -105,7 +105,7 @@ class Polytope:
             raise DesignError(f"vertices A {self.A.shape}, B {self.B.shape}: expected {r} matrices of matching size")
 
     def data(self) -> Struct:
-        """Return the model in the layout of the core, row by row, padded with zeros to a multiple of :data:`BLOCK`."""
+        """Return the model as an ``hsv_polytope``, whose rows are padded with zeros to a multiple of :data:`BLOCK`."""
         n, m = self.B.shape[1:]
         S = np.concatenate((self.A, self.B), axis=2).reshape(len(self.A), -1)
         entries = np.flatnonzero(S.any(axis=0))

@@ -26,22 +26,22 @@ from hsv.model.signals import N_STATES
 from hsv.model.vehicle import Vehicle
 
 _POINTS = 46
-"""Altitudes, and velocities, at which the model is compared with the vehicle."""
+"""Number of altitudes, and of velocities, at which the model is compared with the vehicle."""
 
 _BODE_POINTS = 6
-"""Altitudes, and velocities, at which Bode plots are compared."""
+"""Number of altitudes, and of velocities, at which Bode plots are compared."""
 
 _FREQUENCIES = np.logspace(-2.0, 2.0, 200)
-"""rad/s, those of the paper's figure 2; those above the Nyquist frequency are left out."""
+"""Frequencies (rad/s) of the paper's figure 2; those above the Nyquist frequency are left out."""
 
 
 @dataclass(frozen=True)
 class PolytopicModel:
-    """The model, how it was found, and the model in continuous time that it represents.
+    """A polytopic model of a vehicle, and ``exact``, the continuous-time model that it approximates.
 
-    ``polytope``: of nine states. ``whole``: as it was found; with a filter it has the filtered pitch rate in place of
-    the true one, and the filter's states after the nine. ``samples``: positions (k) and weights (k, v) of the vertices
-    in altitude and in velocity, to interpolate between.
+    ``polytope`` has the nine states. ``whole`` is the model as it was computed: with a filter, the filtered pitch rate
+    replaces the true one, and the states of the filter follow the nine. ``samples``: breakpoints (k) and weights (k, v)
+    of the vertices in altitude and in velocity. ``singular_values``: see :func:`tensor_product`; else empty.
     """
 
     vehicle: Vehicle
@@ -56,12 +56,12 @@ class PolytopicModel:
     def accuracy(self, judged: Polytope, scales: tuple[np.ndarray, np.ndarray]) -> dict[str, float]:
         """Return the largest deviations of ``judged`` from the linearised vehicle between the samples, for JSON.
 
-        The error of the scaled [A - I, B] is relative to its Frobenius norm. Bode plots of all states to all inputs are
-        compared at the point of the largest error, and at some altitudes and velocities, the outermost included.
+        The error of the scaled [A - I, B] is relative to its Frobenius norm. Bode plots from all inputs to all states
+        are compared at the point of the largest error and on a coarser grid that covers the envelope.
 
         Args:
-            judged: Polytopic model.
-            scales: Of states (n) and inputs (m), SI.
+            judged: Polytopic model, ``polytope`` or one with the same states.
+            scales: Scales of the states (n) and of the inputs (m), SI.
         """
 
         def exact(altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
@@ -112,15 +112,15 @@ def polytopic_model(
     """Return the polytopic model of ``vehicle``, decoupled, over its envelope.
 
     Args:
-        vehicle: Its inertial coupling is left out.
-        notch: The filter that is a part of the model, if one is.
-        period: s.
-        counts: Samples in altitude and in velocity.
-        scales: Sizes of states and inputs that count as equal, SI.
-        tensor: Tolerance and functions of the tensor-product transformation; None: the samples are the vertices.
+        vehicle: The vehicle; its inertial coupling is ignored.
+        notch: Filter that is part of the model, or None.
+        period: Sampling period (s).
+        counts: Numbers of samples in altitude and in velocity.
+        scales: Scales of the states (n) and of the inputs (m), SI: errors of these sizes count as equal.
+        tensor: Tolerance and functions of :func:`tensor_product`; None: the samples are the vertices.
 
     Raises:
-        DesignError: Too few samples for the tolerance, or no hull.
+        DesignError: There are too few samples for the tolerance, or no hull was found.
     """
     exact: Linearised = partial(linearise, vehicle.decoupled)
     if notch:

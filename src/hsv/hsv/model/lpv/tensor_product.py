@@ -26,10 +26,10 @@ def tensor_product(
     tolerance: float,
     functions: str = "singular",
 ) -> tuple[Polytope, tuple[Samples, Samples], list[np.ndarray]]:
-    """Return the polytopic model of discrete-time samples on a grid (paper eq. 11), with a tight hull.
+    """Return a polytopic model of discrete-time samples on a grid (paper eq. 11) with a tight hull.
 
-    With it come the samples of the weights, and the singular values of the unfolding along each variable, relative to
-    the largest.
+    The other results, one for altitude and one for velocity each, are the samples of the weights and the singular
+    values of the unfolding along the variable, relative to the largest.
 
     The higher-order singular value decomposition is applied to the scaled [A - I, B]; with A in place of A - I the
     ranks would depend on the sampling period.
@@ -47,7 +47,7 @@ def tensor_product(
             error more evenly over small and large entries.
 
     Raises:
-        DesignError: Unknown functions, too few samples for the rank, or no hull.
+        DesignError: The functions are unknown, there are too few samples for the rank, or no hull was found.
     """
     if functions not in FUNCTIONS:
         raise DesignError(f"tensor_product.functions = {functions!r}: expected {one_of(FUNCTIONS, functions)}")
@@ -88,10 +88,10 @@ _SUBDIVISION = 16
 
 
 def hull_weights(breakpoints: np.ndarray, functions: np.ndarray) -> np.ndarray:
-    """Return the weights of the vertices of a small simplex that encloses a curve.
+    """Return the weights of the vertices of a small simplex that encloses the curve of ``functions``.
 
-    The curve is (functions, 1). The cubic splines of the weights are non-negative and sum to one between the
-    breakpoints as well. The result is deterministic.
+    The cubic splines through the weights are non-negative and sum to one between the breakpoints as well. The result is
+    deterministic.
 
     Args:
         breakpoints: (s) increasing values of the scheduling variable.
@@ -117,7 +117,7 @@ def hull_weights(breakpoints: np.ndarray, functions: np.ndarray) -> np.ndarray:
 
 
 def smallest_weight(breakpoints: np.ndarray, weights: np.ndarray) -> float:
-    """Return the exact minimum of the cubic splines through ``weights`` (s, r) over all breakpoints and columns."""
+    """Return the exact minimum of the cubic splines through the columns of ``weights`` (s, r) at ``breakpoints``."""
     least = float(np.min(weights))
     for column in weights.T:
         spline = CubicSpline(breakpoints, column)
@@ -129,13 +129,13 @@ def smallest_weight(breakpoints: np.ndarray, weights: np.ndarray) -> float:
 
 
 def relaxed(weights: np.ndarray, least: float) -> np.ndarray:
-    """Return the weights (s, r) for the simplex, enlarged about its centre until the weight ``least`` becomes zero."""
+    """Return the weights (s, r) after the simplex is enlarged about its centre until a weight of ``least`` is zero."""
     excess = max(0.0, -least)
     return np.asarray((weights + excess) / (1.0 + weights.shape[1] * excess))
 
 
 def _start(basis: np.ndarray) -> np.ndarray:
-    """Return Q (r, r) of the simplex through r points of the curve, enlarged to contain the whole curve."""
+    """Return Q (r, r), see :func:`_smallest_simplex`, of a simplex through r points, enlarged to contain the curve."""
     s, r = basis.shape
     chosen = np.round(0.5 * (1.0 - np.cos(np.pi * np.arange(r) / (r - 1))) * (s - 1)).astype(int)
     if np.linalg.matrix_rank(basis[chosen]) < r:
@@ -150,7 +150,8 @@ def _start(basis: np.ndarray) -> np.ndarray:
 def _smallest_simplex(basis: np.ndarray, start: np.ndarray) -> np.ndarray:
     """Return Q (r, r) that maximises log |det Q| subject to basis Q >= 0 and Q 1 = e_1.
 
-    The vertices are the rows of Q^-1; the last column of Q follows from the others.
+    The rows of ``basis`` are points of the curve, those of Q^-1 the vertices of the simplex, and ``basis`` Q are the
+    weights. The last column of Q follows from the others.
     """
     points, r = basis.shape
 
