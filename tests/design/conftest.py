@@ -22,7 +22,7 @@ def model(inputs):
 
 @pytest.fixture(scope="session")
 def design(subject):
-    """Return the shipped baseline, which the tests hold to the study; that it comes out anew, the long run shows."""
+    """Return the shipped baseline, which stands for a newly computed one; the long run checks that they agree."""
     return subject.design
 
 

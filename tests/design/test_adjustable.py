@@ -1,4 +1,4 @@
-"""The adjustable design: what is certified for every factor, and what cannot be adjusted."""
+"""The adjustable design: certificates for every factor, and designs that cannot be adjusted."""
 
 import dataclasses
 from pathlib import Path
@@ -43,21 +43,21 @@ def test_incomplete_fault_and_bounds_are_scaled_by_the_factor(subject):
 def test_set_is_invariant_under_every_factor_that_is_certified(subject):
     found = subject.invariant_set()
     design, model = subject.design, ChannelModel(subject.design, subject.vehicle)
-    # The inequality is linear in vertices and multipliers: between the two factors those between theirs prove it.
+    # The inequality is linear in vertices and multipliers, so interpolated multipliers prove it between two factors.
     least, one = np.split(found.multipliers, 2)
     for tau, multipliers in ((0.8, least), (0.87, 0.65 * least + 0.35 * one), (1.0, one)):
         gain = tau * design.feedback_gain[:, :5]
         system = error_system(design.polytope.A, design.polytope.B, gain, model.notch, model.columns)
         problem = dataclasses.replace(found.problem, system=system)
         assert dataclasses.replace(found, problem=problem, multipliers=multipliers).residuals().min() > 0.0
-        # From the boundary straight on, every disturbance at its worst sign for the direction taken.
+        # Start on the boundary; every disturbance has its worst sign for the direction of the free motion.
         factor = np.linalg.cholesky(found.Q)
         start = np.random.default_rng(3).normal(size=(500, len(factor)))
         start = start / np.linalg.norm(start, axis=1, keepdims=True)
         free = np.einsum("rij,kj->rki", np.linalg.solve(factor, system.A @ factor), start)
         columns = np.linalg.solve(factor, problem.columns(found.centre))
         signs = np.sign(np.einsum("rki,rid->rkd", free, columns))
-        signs[..., -1] = 1.0  # the drift of the centre is what it is
+        signs[..., -1] = 1.0  # the drift of the centre has a fixed sign
         reached = np.linalg.norm(free + np.einsum("rid,rkd->rki", columns, signs), axis=2)
         assert 0.9 < reached.max() <= 1.0
     assert len(found.problem.system.A) == 12
@@ -68,7 +68,7 @@ def test_full_state_feedback_rebuilds_the_pitch_rate_and_cancels_the_notch(store
     full = stored["full_state"]
     assert_allclose(full["elevator_on_pitch_rate"], full["structured_elevator_on_pitch_rate"], rtol=0.02)
     parts = full["largest_real_part"]
-    assert max(full["spectral_radii"]) < 1.0  # fine on the model that it was found on
+    assert max(full["spectral_radii"]) < 1.0  # stable on the model for which it was found
     assert parts["full_state"]["derived"] > 0.5 and parts["structured"]["derived"] < -0.1
     assert parts["full_state"]["paper_like"] > parts["structured"]["paper_like"] + 0.2
 

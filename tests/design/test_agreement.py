@@ -1,4 +1,4 @@
-"""Designs agree with what is shipped, on other processors too; wrong inputs are named."""
+"""Agreement of computed designs with the shipped ones, also from other processors; wrong inputs are named."""
 
 import copy
 import dataclasses
@@ -25,7 +25,7 @@ def test_a_design_agrees_with_itself(subject):
 
 def test_a_deviation_is_counted_in_scaled_coordinates_and_named(subject):
     gains = subject.design.nominal_gains.copy()
-    scale = 0.1 / 0.02  # elevator over angle of attack
+    scale = 0.1 / 0.02  # scale of elevator over scale of angle of attack
     expected = float(gains[2, 1, 2])
     gains[2, 1, 2] += 0.01 * max(scale, abs(expected))
     changed = dataclasses.replace(subject.design, nominal_gains=gains)
@@ -34,7 +34,7 @@ def test_a_deviation_is_counted_in_scaled_coordinates_and_named(subject):
     assert abs(worst.scaled - 0.01) < 1e-9
     assert str(worst).startswith(f"nominal.gains[2, 1, 2] = {float(gains[2, 1, 2])!r}: expected {expected!r}")
     slightly = subject.design.nominal_gains.copy()
-    slightly[:, :, 5:] += 1e-9  # zero; a share of the size is what counts
+    slightly[:, :, 5:] += 1e-9  # these entries are zero, but deviations are relative to the scale
     assert all(d.ok for d in deviations(dataclasses.replace(subject.design, nominal_gains=slightly), subject))
 
 
@@ -80,7 +80,7 @@ def test_a_missing_field_is_named(table):
 
 
 AGREED = 1e-4
-"""In scaled coordinates; `hsv design --check` itself asks for ten times less."""
+"""Largest deviation in scaled coordinates; `hsv design --check` itself allows a tenth of it."""
 
 WITHOUT_FMA = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2_Usable,-FMA_Usable,-AVX2,-FMA"}
 PROCESSORS = {

@@ -1,4 +1,4 @@
-"""Disturbances of flights in channels, and the error system that they drive, actuators included."""
+"""Disturbances of flights by channel, and the error system that they drive, with actuators."""
 
 import dataclasses
 import tomllib
@@ -67,7 +67,7 @@ def actuated_flight(design, subject):
 
 
 def test_the_error_system_predicts_the_error_of_a_flight_with_actuators(actuated_flight, design, subject):
-    """From one step to the next, states of filter and actuators included; the lag of the plan is taken out before."""
+    """One step ahead, including the states of filter and actuators, after the lag of the plan is removed."""
     model = ChannelModel(design, subject.vehicle)
     errors, _ = model.errors(actuated_flight)
     channels = model.signals(actuated_flight).channels

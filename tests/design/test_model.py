@@ -1,4 +1,4 @@
-"""The polytopic model of a design, and linear matrix inequalities with one answer, whatever rounds on the way to it."""
+"""The polytopic model of a design, and linear matrix inequalities whose solution does not depend on rounding."""
 
 import dataclasses
 from pathlib import Path
@@ -37,10 +37,10 @@ def test_tensor_product_has_the_paper_s_vertices_and_meets_its_accuracy(designed
 
 
 def test_vertices_have_the_unstable_pole_of_the_vehicle(designed):
-    # Control study, section 1: 1.64 to 1.81 rad/s at the vertices.
+    # Control study, section 1: the pole is 1.64 to 1.81 rad/s at the vertices.
     radii = [np.log(np.abs(np.linalg.eigvals(A)).max()) / 0.02 for A in designed.polytope.A]
     assert min(radii) > 1.63 and max(radii) < 1.82
-    # The matrix exponential leaves rounding where the rigid states do not depend on the elastic ones.
+    # Where rigid states do not depend on elastic ones, the matrix exponential leaves rounding errors.
     assert np.abs(designed.polytope.A[:, :5, 5:]).max() < 1e-15
 
 
@@ -74,7 +74,7 @@ def sections(inputs):
 
 
 def test_the_cost_is_above_its_optimum_by_the_gap():
-    # Minimum of t x - log(x - 3): x = 3 + 1 / t.
+    # The minimum of t x - log(x - 3) is at x = 3 + 1 / t.
     (x,), report = minimise([Unknown((1, 1))], lambda x: x[0, 0], lambda x: [x - 3.0], "scalar")
     assert GAP / 2.0 < x[0, 0] / 3.0 - 1.0 < 2.0 * GAP
     assert report.objective == x[0, 0]
@@ -86,7 +86,7 @@ def test_what_has_no_solution_is_refused_by_name():
 
 
 def test_nominal_gain_hardly_moves_with_the_rounding_of_vertices(inputs, model):
-    # The optimum itself is so flat that entries of the gain moved by 88 % between two processors.
+    # Without regularisation the optimum is so flat that entries of the gain moved by 88 % between two processors.
     problem = nominal_problem(inputs, model.polytope, inputs.nominal.input_bound.array())
     state = 0.2 * initial_deviation(inputs)
     noise = np.random.default_rng(1).uniform(-1e-10, 1e-10, problem.A.shape)
@@ -107,10 +107,10 @@ def test_digits_are_counted_from_the_size_not_the_value():
 
 
 @given(st.floats(1e-12, 1e12), st.sampled_from([-1.0, 1.0]))
-@example(1.000000000001, -1.0)  # less than the margin above a bound that it is rounded to
+@example(1.000000000001, -1.0)  # above the rounded bound by less than the margin
 def test_bounds_grow_by_no_more_than_their_last_digit(size, sign):
     value = outward(np.array([sign * size]))[0]
     assert np.sign(value) == sign
-    # The margin of outward, and a hundredth of it for the rounding of these operations, some 5e-16.
+    # The margin of outward, and 1 % of it for the rounding of these operations, about 5e-16.
     assert -1.01e-12 <= abs(value) / size - 1.0 <= 10.0 ** (1 - BOUND_DIGITS)
     assert outward(np.array([value]))[0] == value

@@ -24,7 +24,7 @@ def state(inputs):
 
 def test_certified_cost_is_a_bound_close_to_the_solver_s(report):
     first = report["nominal"][0]
-    # Control study, section 6: 1060 s certified for the five rigid states.
+    # Control study, section 6: a certified cost of 1060 s for the five rigid-body states.
     assert_allclose(first["certified_gamma"], 1060.0, rtol=0.02)
     for row in report["nominal"]:
         assert_allclose(row["certified_gamma"], row["gamma"], rtol=5e-3)
@@ -60,7 +60,7 @@ def rigid(design):
 
 
 def test_gain_agrees_with_the_control_study(design):
-    # Control study, section 0, design R, found on grid vertices; per foot.
+    # Control study, section 0, design R, computed on grid vertices; gains per foot.
     expected = [[-0.0028, -0.0144, 50.30, -54.27, -1.409], [0.0033, -0.0024, -52.89, 61.48, 3.819]]
     gain = design.feedback_gain[:, :5] * [FOOT, FOOT, 1.0, 1.0, 1.0]
     assert_allclose(gain, expected, rtol=0.04, atol=6e-5)

@@ -1,4 +1,4 @@
-"""From a vehicle's file to a controller that is certified for it."""
+"""From a vehicle file to a controller that is certified for this vehicle."""
 
 import json
 
@@ -37,7 +37,7 @@ disturbance = { coupling = 0.3, duration = "8 s", fault_start = "4 s", share = 0
 
 @pytest.fixture
 def folder(tmp_path):
-    """A design's inputs beside the file of the vehicle that they name."""
+    """Return a folder with design inputs and the vehicle file that they name."""
     (tmp_path / "inputs").mkdir()
     (tmp_path / "inputs" / "mine.toml").write_text(VEHICLE)
     (tmp_path / "inputs" / "small.toml").write_text(SMALL)
@@ -49,7 +49,7 @@ def holds(path, quick=False):
 
 
 def designed(monkeypatch, source, target):
-    """Run ``hsv design`` from another folder than that of the inputs."""
+    """Run ``hsv design`` from a folder other than that of the inputs."""
     words = ["hsv", "design", str(source), "--out", str(target)]
     monkeypatch.chdir(target.parent)
     monkeypatch.setattr("sys.argv", words)
@@ -60,7 +60,7 @@ def designed(monkeypatch, source, target):
 
 @pytest.mark.long
 def test_a_design_is_for_the_vehicle_beside_its_inputs_and_its_certificate_is_enough(folder, monkeypatch):
-    # Random sequences, which say nothing of vehicles, take most of a small design's time.
+    # Random sequences, which do not depend on the vehicle, take most of the time of a small design.
     monkeypatch.setattr("hsv.design.tube.SEQUENCES", 1000)
     design, source = folder / "small.yaml", folder / "inputs" / "small.toml"
     designed(monkeypatch, source, design)
@@ -73,7 +73,7 @@ def test_a_design_is_for_the_vehicle_beside_its_inputs_and_its_certificate_is_en
     short = {"duration": "4 s", "fault": [], "limits": {}}
     parts = assemble_flight(load_scenario("case1", flown | short))
     assert next(steps(parts)).diagnostics.status is TubeStatusCode.OK
-    # Whoever verifies has the certificate alone.
+    # Verification must need only the certificate.
     for path in (folder / "inputs").iterdir():
         path.unlink()
     assert holds(design, quick=True)

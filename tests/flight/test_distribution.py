@@ -1,4 +1,4 @@
-"""Distributions in the place of numbers of a scenario."""
+"""Distributions in place of numbers in a scenario."""
 
 from statistics import NormalDist
 
@@ -16,7 +16,7 @@ BASE = {"title": "Distributions", "duration": "4 s", "initial": INITIAL}
 
 
 def over_base(table):
-    """Return the base scenario with a ``table`` over it."""
+    """Return the base scenario, changed by a ``table``."""
     return BASE | table | {"initial": BASE["initial"] | table.get("initial", {})}
 
 

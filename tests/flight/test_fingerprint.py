@@ -19,7 +19,7 @@ def columns(rows=3):
 
 
 def test_every_shipped_scenario_that_calls_no_solver_flies_as_published():
-    """The table is repeated, bit for bit, by a build of this machine."""
+    """A build on this machine reproduces the published table bit for bit."""
     flown = [name for name in scenario_names() if load_scenario(name).settings.get("nominal.law", "family") == "family"]
     assert sorted(_table()) == flown
     for name in flown:
@@ -49,7 +49,7 @@ def test_published_fingerprints_hold_for_the_shipped_scenario_with_its_design():
     same, design, scenario = entry["fingerprint"], entry["design_hash"], load_scenario(name)
     assert as_published(same, scenario, design) is True
     assert as_published("v1:0", scenario, design) is False
-    # A flight by hand has neither scenario nor name: its fingerprint tells.
+    # A flight started by hand has no scenario and no name; its fingerprint identifies it.
     assert as_published(same, None, "") is True
     for other, with_design in (
         (scenario, "another design"),
@@ -62,9 +62,9 @@ def test_published_fingerprints_hold_for_the_shipped_scenario_with_its_design():
 
 
 SOLVED_IN_FLIGHT = {
-    # Metrics, and how far another machine's may be from them. The optimum of the QP is unique, and so is the point of
-    # the central path to which the LMI is solved: other kernels of OpenBLAS give 1e-11. A gain found in flight begins
-    # to act in a step, though, which may be the next one.
+    # Metrics, and their tolerance to other machines. The optimum of the QP is unique, as is the point of the central
+    # path at which the LMI is solved; other OpenBLAS kernels give differences of 1e-11. But a gain that is found in
+    # flight takes effect at a step, which may be one step later.
     "case1_qp": (
         1e-6,
         {

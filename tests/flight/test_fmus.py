@@ -1,4 +1,4 @@
-"""FMUs: the exported controller and vehicle, alone under FMPy and in the loop, and FMUs that others make."""
+"""FMUs: the exported controller and vehicle, alone in FMPy and in the loop; FMUs of other tools."""
 
 import shutil
 import subprocess
@@ -30,7 +30,7 @@ TRIM = {"phi": 0.25, "delta": 0.2}
 
 @pytest.fixture(scope="session")
 def exported(tmp_path_factory):
-    """A folder with the FMUs of design baseline and scenario case1."""
+    """Return a folder with the FMUs of the design baseline and the scenario case1."""
     folder = tmp_path_factory.mktemp("exported")
     write_fmu(folder / "controller.fmu", exported_controller(read_design(find_design("baseline"))))
     write_fmu(folder / "vehicle.fmu", exported_vehicle(load_scenario("case1")))
@@ -39,7 +39,7 @@ def exported(tmp_path_factory):
 
 @pytest.fixture
 def page(exported, monkeypatch):
-    """The names that the page's master defines, in the folder of the FMUs."""
+    """Return the names that the page's co-simulation master defines, run in the folder of the FMUs."""
     monkeypatch.chdir(exported)
     [master] = blocks("docs/fmi.md", "python")
     names = {"__name__": "page"}
@@ -49,7 +49,7 @@ def page(exported, monkeypatch):
 
 @pytest.fixture
 def pair(page):
-    """The controller and the vehicle."""
+    """Return the controller and the vehicle."""
     instances = [page.Fmu(f"{name}.fmu") for name in ("controller", "vehicle")]
     yield instances
     for each in instances:
@@ -99,14 +99,14 @@ def test_a_state_is_restored_from_its_bytes(page, pair):
 
 @contextmanager
 def refused(match, error=HsvError):
-    """Expect an error of one line."""
+    """Expect an error whose message is one line."""
     with pytest.raises(error, match=match) as caught:
         yield
     assert "\n" not in str(caught.value)
 
 
 def flight(folder, table="", changes=None):
-    """Return the components of a flight of 2 s of Case 1 with the controller model.fmu."""
+    """Return the components of a Case 1 flight of 2 s with the controller model.fmu."""
     (folder / "fmu.toml").write_text(f'extends = "case1"\ncontroller = "model.fmu"\nduration = "2 s"\n[fmu]\n{table}')
     return assemble_flight(load_scenario(str(folder / "fmu.toml"), {"fault": [], **(changes or {})}))
 

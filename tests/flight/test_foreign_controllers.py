@@ -1,4 +1,4 @@
-"""Custom controllers in Python in the loop."""
+"""Custom Python controllers in the loop."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def flight(controller="Mine", design="", settings="", table="mine", duration="4 
 
 
 class Mine:
-    """Commands the trim of the reference; its parameters have ranges and units."""
+    """A controller that commands the reference's trim input; its parameters have ranges and units."""
 
     PARAMETERS = (
         Parameter("mine.gain", 1.0, "times the feedback", "", 0.0, 10.0),
@@ -58,7 +58,7 @@ class Mine:
 
 
 class Late(Mine):
-    """Answers well up to step 20."""
+    """A controller that fails after step 20."""
 
     answer = np.nan, 0.0
 
@@ -98,7 +98,7 @@ def test_the_times_of_steps_are_told_by_node_beside_the_period():
 def test_settings_reach_the_controller_in_si_units():
     parts = flight(design="baseline", settings='time = "1.5 min"', duration="1 s")
     assert parts.controller._controller.own["mine.time"] == 90.0
-    assert fly(parts).history.deviation.any()  # with a design there is a nominal trajectory, too
+    assert fly(parts).history.deviation.any()  # a design provides a nominal trajectory, too
 
 
 @pytest.mark.parametrize(

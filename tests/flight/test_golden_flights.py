@@ -1,4 +1,4 @@
-"""300 random flights of commit b8ecf8c, whose kernels numba compiled: alone, step by step and in lanes the same bits.
+"""300 random flights of commit b8ecf8c, which numba compiled: the same bits alone, step by step and in lanes.
 
 They cover every type and occurrence of faults, sensors, actuators, links, air, estimator, active law, notch filters,
 designs and references; see tests/golden/README.md.
@@ -31,7 +31,7 @@ PARTS = 20
 
 
 def golden(index):
-    """Return the components of a golden flight, and its expected digests."""
+    """Return the components and the expected digests of a golden flight."""
     line = json.loads(LINES[index])
     parsed = parse_scenario(tomli_w.dumps(line["scenario"]), line["name"])
     return assemble({**flight_parameters(parsed), **line.get("parameters", {})}), line["expected"]
@@ -49,7 +49,7 @@ def check(flight, expected):
 
 
 def stepwise(parts):
-    """Return the fingerprint of the flight that the blocks fly one at a time."""
+    """Return the fingerprint of the flight, computed with the blocks one step at a time."""
     rows = []
     for s in steps(parts):
         mine = s.state, s.filtered_pitch_rate, s.deviation, s.nominal_input, s.command, s.actuator
@@ -58,7 +58,7 @@ def stepwise(parts):
 
 
 def variants(parts):
-    """Return as many flights as the core has lanes: that of ``parts``, and others of other vehicles and seeds."""
+    """Return ``parts`` and variants with other vehicles and seeds, one for each lane of the core."""
     group = [parts]
     for i in range(1, lanes()):
         seed = parts.plant.data.seed + 7 * i

@@ -1,4 +1,4 @@
-"""Controllers in C in the loop: the same bits as in Python, and what they do wrong ends their own process only."""
+"""C controllers in the loop have the same bits as in Python; their errors end only their own process."""
 
 import re
 import shutil
@@ -38,7 +38,7 @@ altitude_change = "60 ft"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder with the library and its source."""
+    """Return a folder with the library and its source."""
     folder = tmp_path_factory.mktemp("probe")
     build_probe(folder)
     shutil.copy(PROBE, folder)
@@ -46,7 +46,7 @@ def folder(tmp_path_factory):
 
 
 def written(folder, settings="", controller="probe.so:probe", design=""):
-    """Return the path of a scenario, written to a folder."""
+    """Write a scenario to a folder and return its path."""
     path = folder / "mine.toml"
     path.write_text(SCENARIO.format(settings=settings, controller=controller, design=design))
     return str(path)
@@ -54,12 +54,12 @@ def written(folder, settings="", controller="probe.so:probe", design=""):
 
 @pytest.fixture
 def flight(folder):
-    """Assemble the flight of a scenario beside the library."""
+    """Return a function that assembles the flight of a scenario next to the library."""
     return lambda *settings, **named: assemble_flight(load_scenario(written(folder, *settings, **named)))
 
 
 class Probe:
-    """What ``probe.c`` does, in Python."""
+    """The Python counterpart of ``probe.c``."""
 
     PARAMETERS = (Parameter("probe.weight", [0.5, 0.02, 0.5], "of the integral", "1/s"),)
 
@@ -86,7 +86,7 @@ def test_c_and_python_fly_the_same_bits(flight, folder, design, settings):
     one = fly(ours)
     assert one.fingerprint == fly(other).fingerprint == fly(ours).fingerprint
     assert len(one.time) == 201 and one.history.command[:, 1].std() > 0.0
-    # The library is never loaded here.
+    # This process never loads the library.
     assert str(folder) not in Path("/proc/self/maps").read_text()
 
 
@@ -145,7 +145,7 @@ def test_a_library_that_is_built_anew_is_loaded_anew(tmp_path):
 )
 def test_a_library_that_is_no_controller_is_refused(tmp_path, flags, message, monkeypatch):
     build_probe(tmp_path, "-w", *flags)
-    # As in the library's process, without starting one for each.
+    # Load the library here, as its own process would; starting a process for each case takes longer.
     library = LoadedLibrary(tmp_path / "probe.so", SharedMemory(-1))
     monkeypatch.setattr("hsv.control.library_process._in_this_process", library)
     with pytest.raises(ScenarioError, match=message):

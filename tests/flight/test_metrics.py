@@ -17,7 +17,7 @@ REFERENCE = np.array([1000.0, 500.0, 0.02, 0.03, 0.0, 1.0, 0.0, 0.8, 0.0])
 
 
 def flight(duration=100.0, fault=None, **columns):
-    """A flight that rests at its reference, with the given columns (functions of time) laid over it."""
+    """Return a flight at rest at its reference, except for the given columns (functions of time)."""
     time = np.arange(round(duration / PERIOD) + 1) * PERIOD
     state = np.tile(REFERENCE, (len(time), 1))
     deviation = np.zeros_like(state)
@@ -83,7 +83,7 @@ def test_response_metrics_stop_at_the_fault_but_errors_do_not():
 
 def test_attitude_deviation_is_from_the_mean_before_the_fault_or_from_nominal():
     def alpha(t):
-        # Swings about 0.001 in the last five seconds before the fault, was elsewhere earlier, jumps by 0.004 after it.
+        # It oscillates about 0.001 in the 5 s before the fault, differs before, and jumps by 0.004 at the fault.
         return np.select([t < 45.0, t < 50.0], [0.1, 0.001 + 1e-4 * np.sin(2 * math.pi * t)], 0.005)
 
     m = flight_metrics(flight(fault=50.0, alpha=alpha, nominal_alpha=lambda t: 0.002 + 0 * t))
@@ -114,7 +114,7 @@ def test_input_ranges_and_saturated_steps():
     )
     assert_allclose([m["fuel_equivalence_ratio_minimum"], m["fuel_equivalence_ratio_maximum"]], [0.2, 0.4], atol=1e-4)
     assert_allclose([m["elevator_deflection_minimum"], m["elevator_deflection_maximum"]], [0.15, 0.2])
-    # Steps 0-4 and 3-7: a step in which both are limited counts once.
+    # Limited: steps 0-4 of one input, 3-7 of the other. A step with both limited counts once.
     assert m["saturated_steps"] == 8
 
 

@@ -1,4 +1,4 @@
-"""Flights with hardware that is not ideal, along ramps and governed commands, and of another law."""
+"""Flights with imperfect hardware, along ramps and governed commands, and with other control laws."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_an_estimator_makes_the_hard_sensors_flyable():
         before_fault = (flight.time >= 60.0) & (flight.time < 95.0)
         return np.degrees(flight.history.actuator[before_fault, 1].std())
 
-    # Measured: 5.16 deg and 0.32 deg.
+    # The measured values are 5.16 deg and 0.32 deg.
     assert elevator_rms() > 4.0
     assert elevator_rms(estimator={"enabled": True}) < 1.0
 
@@ -76,7 +76,7 @@ def test_without_fault_coupling_and_filter_the_tube_has_nothing_to_do():
     ideal = {"vehicle__model": "DM", "notch__enabled": False, "fault__channels": ["none"]}
     flight = fly(components("case2_baseline", duration=100.0, **ideal))
     error = np.abs(flight.history.state - flight.reference - flight.history.deviation).max(axis=0)
-    # What is left is linearisation about trims while x_n is not zero; the climb alone would be 600 ft and 250 ft/s.
+    # Only linearisation errors remain while x_n is not zero. The step itself is 600 ft and 250 ft/s.
     assert error[0] < 0.5 and error[1] < 0.1
 
 
@@ -84,7 +84,7 @@ def test_robust_mpc_is_the_tube_law_about_a_nominal_trajectory_under_its_own_gai
     values = {**flight_parameters(load_scenario("case1_rmpc_fourth_k")), "duration": 4.0, "fault.starts": [1.0]}
     design = ControlDesign.from_parameters(values)
     gain = design.nominal_gains[values["robust_mpc.gain_index"]].ravel().tolist()
-    # The nominal state drops out of K (x - x_r - x_n) + K x_n + u_r; the invariant set is another loop's.
+    # In K (x - x_r - x_n) + K x_n + u_r the nominal state cancels. The invariant set belongs to another loop.
     as_tube_law = {name: value for name, value in values.items() if not name.startswith("tube.")}
     as_tube_law |= {"controller": "tube_mpc", "feedback.gain": gain, "nominal.gains": gain}
     as_tube_law["nominal.ellipsoids"] = design.nominal_ellipsoids[0].ravel().tolist()

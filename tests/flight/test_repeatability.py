@@ -1,4 +1,4 @@
-"""Controllers that do not fly the same bytes every time, and those that do."""
+"""Controllers whose flights are repeatable byte for byte, and controllers whose flights are not."""
 
 import os
 import random
@@ -20,7 +20,7 @@ STEPS = 100
 
 
 class Steady:
-    """Feedback with an integral of the pitch angle, all of it forgotten in reset."""
+    """Feedback with an integral of the pitch angle, which reset clears."""
 
     PARAMETERS = ()
 
@@ -43,21 +43,21 @@ class Steady:
 
 
 class NotReset(Steady):
-    """Keeps its integral from one run to the next."""
+    """Keeps its integral from one flight to the next."""
 
     def reset(self):
         pass
 
 
 class Random(Steady):
-    """Adds noise from step 30 on."""
+    """Adds random noise from step 30 on."""
 
     def more(self, inputs):
         return 1e-9 * random.random() if inputs.step >= 30 else 0.0
 
 
 class Shared(Steady):
-    """Keeps the integral of all instances in one place."""
+    """Shares one integral between all instances."""
 
     everybodys = SimpleNamespace(integral=0.0)
 
@@ -69,14 +69,14 @@ class Shared(Steady):
 
 
 class OfTheProcess(Steady):
-    """Depends on the process that it is in."""
+    """Depends on the process that it runs in."""
 
     def more(self, inputs):
         return 1e-12 * os.getpid()
 
 
 class Failing(Steady):
-    """Fails in the second flight of the process."""
+    """Fails in the second flight of a process."""
 
     flights = 0
 
@@ -98,7 +98,7 @@ class Compiled(Steady):
 
 
 class CompiledStatic(Compiled):
-    """Counts steps outside of its state, among its parameters."""
+    """Counts steps outside its state, in its parameters."""
 
     outside = 1.0
 
@@ -110,7 +110,7 @@ def scenario(controller):
 
 @pytest.fixture
 def found(monkeypatch):
-    """Return what differs, by check, without the processes of the load."""
+    """Return the differences by check, without starting processes for load."""
     monkeypatch.setattr(repeatability, "under_load", lambda *_: repeatability.Finding("under load", 0, ""))
 
     def differing(controller):

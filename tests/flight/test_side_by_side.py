@@ -1,4 +1,4 @@
-"""Flights side by side: each has the bits that it has alone, whatever flies in the other lanes."""
+"""Flights side by side have the same bits as alone, whatever flies in the other lanes."""
 
 from itertools import cycle
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(WIDTH == 1, reason="this processor flies one at 
 
 
 def check(flights, group=None):
-    """Check that these flights are the same side by side and alone; return them alone."""
+    """Assert that the flights are the same side by side and alone; return the flights alone."""
     assert FlightGroup.takes(flights)
     alone = [fly(own) for own in flights]
     group, levels = FlightGroup() if group is None else group, TubeLevels(flights[0])
@@ -119,7 +119,7 @@ def test_flights_of_different_lengths_or_designs_are_not_taken():
 
 
 def published_levels(parts, flight):
-    """Return what the controller says of each step."""
+    """Return the tube level that the controller publishes in each step."""
     h, notch, law = flight.history, parts.notch_filter, parts.controller
     for part in (notch, law):
         part.reset()

@@ -1,4 +1,4 @@
-"""Flights of other vehicles: named in a scenario, read from beside it, taken along, not taken for certified."""
+"""Flights of other vehicles: named in a scenario, found next to it, kept with the flight, and not certified."""
 
 import shutil
 from pathlib import Path
@@ -16,7 +16,7 @@ from hsv.flight.scenario import load_scenario, parse_scenario, scenario_text
 SHORT = {"duration": "4 s", "fault[0].start": "2 s", "limits": {}}
 
 OTHER = Path(__file__).parents[1] / "golden" / "stiffened"
-"""Vehicle and design of the golden flights that are not Parker's."""
+"""Vehicle and design of the golden flights that do not fly Parker's vehicle."""
 
 MINE = """extends = "parker"
 rigid_body.mass = { value = "4600 kg", uncertainty = "5 %" }
@@ -33,7 +33,7 @@ FLIGHT = 'extends = "case1"\ntitle = "mine"\nvehicle = "{}"\n'
 
 @pytest.fixture
 def folder(tmp_path):
-    """A vehicle beside a scenario that names it."""
+    """Return a folder with a vehicle and a scenario that names it."""
     (tmp_path / "mine.toml").write_text(MINE)
     (tmp_path / "flight.toml").write_text(FLIGHT.format("mine.toml"))
     return tmp_path
@@ -51,7 +51,7 @@ def test_a_vehicle_beside_its_scenario_is_flown_from_any_folder_and_taken_along(
     assert taken.vehicle.described.digest == scenario.vehicle.described.digest != ""
     assert taken.vehicle.name == "mine" and taken.vehicle.described.decoupled.mass == 4600.0
     assert flight.fingerprint != fly(assemble_flight(load_scenario("case1", SHORT))).fingerprint
-    # Flat parameters, which a bag keeps, repeat the flight.
+    # The flat parameters, which a bag keeps, are enough to repeat the flight.
     assert fly(assemble(flight_parameters(scenario))).fingerprint == flight.fingerprint
     with pytest.raises(ScenarioError, match=r"scenario 'flight': vehicle '.*mine.toml': cannot be read \(No such file"):
         load_scenario(str(folder / "flight.toml"))

@@ -1,4 +1,4 @@
-"""Repeated flights and random sequences agree with the design's own decomposition and keep to the certificate."""
+"""Repeated flights and random sequences agree with the design's own decomposition and its certificate."""
 
 import copy
 
@@ -33,7 +33,7 @@ def baseline():
 
 @pytest.mark.parametrize("name", ["baseline", "adjustable", "realistic"])
 def test_disturbances_and_errors_are_those_of_the_design(name):
-    """Two independent decompositions of one flight: numpy here, the core's compiled sums in the design."""
+    """Compare two independent decompositions of one flight: plain numpy here, compiled sums in the design."""
     subject = load_certified(find_design(name))
     share = share_of(subject.certificate["inputs"])
     flight = fly(region(subject, subject.design, share).perturbed({"mass": 0.05}))
@@ -63,7 +63,7 @@ FALSIFIED = {
     ("flights", "worst_level"): (0.383, "tube.flights: level"),
     ("tightening", "plan", "highest", 1): (0.2, "nominal plan of flown corners, highest"),
 }
-"""By statement of the certificate: a false value of it, and the check that fails."""
+"""For each statement of the certificate: a false value, and the name of the check that fails."""
 
 
 def test_falsified_statements_about_flights_are_noticed(baseline):

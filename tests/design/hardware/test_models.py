@@ -45,7 +45,7 @@ def test_an_error_that_the_sensor_hides_moves_neither_feedback_nor_filter(proble
 
 @pytest.mark.parametrize(("column", "size"), [(0, 0.5), (1, 0.5), (2, 0.01)])
 def test_air_moves_the_vehicle_as_its_equations_say(problem, subject, column, size):
-    """A period in air that moves, or is denser, less one in still air, at mid-envelope; 1 % for what is not linear."""
+    """A period in moving or denser air minus one in still air, at mid-envelope; 1 % is left for nonlinearity."""
     vehicle, period = subject.vehicle, subject.design.period
     effect = air(vehicle, period, 1.0, 1.0, 1.0)(problem.system)
     point = trim(vehicle.decoupled, *vehicle.centre)
@@ -78,9 +78,9 @@ DECLARED = {
 @pytest.mark.long
 @pytest.mark.parametrize("name", DECLARED)
 def test_the_errors_of_an_equipped_flight_evolve_as_the_enlarged_system_says(subject, plan, name):
-    """Each step of e in a flight with sensors is A e + G d + the sensors' channels, and every channel is in its bound.
+    """Each step of the error e in a flight with sensors is A e + G d + sensor channels, all within their bounds.
 
-    What the scheduling with a measurement adds is what remains, and in the bounds widened for it.
+    The remainder, due to scheduling with measured states, is within the widened bounds of the disturbance.
     """
     scenario = load_scenario("case1", DECLARED[name])
     design, vehicle = subject.design, subject.vehicle
@@ -97,7 +97,7 @@ def test_the_errors_of_an_equipped_flight_evolve_as_the_enlarged_system_says(sub
     seen_plan = queued(planned, late) - planned
     e = x - planned
     seen_error = flight.history.estimate[:, :N_RIGID] - planned
-    # Beyond the samples that are late, of plan and error: what sensors add to them.
+    # The errors that sensors add to plan and error, apart from late samples.
     added = seen_error - queued(e, late) - seen_plan
     settled = slice(int(late.max()) + 1, None)
     bound = sum(one.error for one in models.values())
@@ -124,13 +124,13 @@ def test_the_errors_of_an_equipped_flight_evolve_as_the_enlarged_system_says(sub
 
 
 def queued(columns, late):
-    """Each column so many steps late, a queue at first full of its first sample."""
+    """Return the columns, each delayed by its number of steps; the delay line begins filled with the first sample."""
     rows = [np.concatenate((np.repeat(c[:1], n), c[: len(c) - n])) for c, n in zip(columns.T, late, strict=True)]
     return np.column_stack(rows)
 
 
 def pad(rigid):
-    """The error of the pitch rate alone, which the filter sees."""
+    """Return states (n, 9) with only the error of the pitch rate, the input of the filter."""
     whole = np.zeros((len(rigid), N_STATES))
     whole[:, PITCH_RATE] = rigid[:, PITCH_RATE]
     return whole

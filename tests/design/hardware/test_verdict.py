@@ -13,9 +13,9 @@ from hsv.model.trim import trim
 
 
 def test_no_error_in_the_set_moves_actuators_farther_or_faster(realistic):
-    """Random errors on the edge of the set and disturbances at their bounds, and the error that is worst for the rate.
+    """Errors on the set's boundary, random ones and the worst for the rate, with disturbances at their bounds.
 
-    Actuators by the exponential of their equations in continuous time.
+    The actuators move by the matrix exponential of their continuous-time equations.
     """
     design, found, plan = realistic.design, realistic.invariant_set(), Plan.of(realistic)
     fuel, elevator = sorted(reaches(found, design, plan), key=lambda reach: INPUT_NAMES.index(reach.channel))
@@ -59,7 +59,7 @@ def test_a_design_that_knows_actuators_is_judged_with_those_that_fly(realistic):
     known, ideal = verdict.certified_with(realistic, {}, "ideal")
     assert (known.name, ideal.name) == ("as certified", "ideal actuators")
     assert np.allclose(known.half_width, tube["invariant_set"]["half_width"][:5], rtol=1e-5)
-    # No lag: a smaller set, less feedback, more room, and no limits to say anything about.
+    # Ideal actuators have no lag: the set is smaller, the feedback needs less input, and no reach is limited.
     assert np.all(ideal.half_width < known.half_width) and np.all(ideal.feedback < known.feedback)
     assert ideal.shares.min() > known.shares.min() and not ideal.reaches
 
@@ -69,7 +69,7 @@ def test_a_flight_may_start_where_both_ellipsoid_and_star_norms_allow_it():
     at_rest = np.zeros(5)
     norms = found.star_norms.level_at_start(found.problem, found.centre)
     assert verdict._start(found, at_rest) == max(norms, found.level(np.zeros(len(found.centre))))
-    # Such an error of the pitch angle is inside the ellipsoid; for star norms it is too far, if one channel takes it.
+    # This pitch-angle error is inside the ellipsoid; for star norms it is too large if one channel causes it.
     error = np.array([0.0, 0.0, 0.0, 0.1 * found.half_width[3], 0.0])
     assert max(found.level(side * np.append(error, [0.0, 0.0])) for side in (1.0, -1.0)) < 1.0
     assert verdict._start(found, error) > 1.0

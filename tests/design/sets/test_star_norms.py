@@ -1,4 +1,4 @@
-"""Star norms and counter-examples: what a bound by row and channel promises, and what no bound can be below."""
+"""Star norms and counter-examples: upper bounds by row and channel, and a lower limit of any such bound."""
 
 import dataclasses
 
@@ -15,12 +15,12 @@ from hsv.design.sets.star_norms import StarNorms
 
 @pytest.fixture(scope="module")
 def tight():
-    """Return the set of the shipped design ``tight``, which star norms narrow."""
+    """Return the star norms of the shipped design ``tight``, whose half-widths they reduce."""
     return load_certified(find_design("tight")).invariant_set()
 
 
 def test_published_bounds(tight):
-    """As in docs/certified_bounds.md: the pitch angle is certified within 1 deg, of which 82 % are attained."""
+    """Values of docs/certified_bounds.md: the pitch angle is certified within 1 deg, of which 82 % are attained."""
     driven = counter_examples(tight.problem).half_range
     assert np.degrees([tight.half_width[3], driven[3]]) == pytest.approx([0.972, 0.792], abs=0.001)
     derived = load_certified(find_design("derived")).invariant_set()
@@ -30,7 +30,7 @@ def test_published_bounds(tight):
 
 
 def test_no_sequence_leaves_the_bounds(tight):
-    """Vertices and disturbances change at random; some are held for long, which drives slow poles farthest."""
+    """Vertices and disturbances change at random; some are held for long, which excites slow poles most."""
     rng = np.random.default_rng(5)
     system, w = tight.problem.system, tight.problem.disturbance
     rows, bounds = tight.problem.output_rows(), tight.star_norms.bounds(tight.problem)
@@ -69,7 +69,7 @@ def test_certificate_holds_and_fails_just_beyond(tight):
     ],
 )
 def test_what_is_checked_is_what_bounds(tight, change, named):
-    """A contraction less would leave an ellipsoid unchecked, and a factorisation reads one triangle only."""
+    """Without one contraction, an ellipsoid would go unchecked; a factorisation reads only one triangle."""
     report = tight.star_norms.as_dict()
     change(report)
     with pytest.raises(DesignError, match=f"star_norms.{named}"):
@@ -84,5 +84,5 @@ def test_star_norms_lie_between_the_ellipsoid_and_the_counter_examples(found, su
     ellipsoid, narrowed, driven = rows
     assert ellipsoid.size > narrowed.size > driven.size
     assert np.all(narrowed.feedback <= ellipsoid.feedback) and np.all(driven.feedback < narrowed.feedback)
-    # docs/certified_bounds.md: half-widths of the pitch angle.
+    # Half-widths of the pitch angle in docs/certified_bounds.md.
     assert np.degrees([row.half_width[3] for row in rows]) == pytest.approx([1.92, 1.76, 1.48], abs=0.01)

@@ -1,4 +1,4 @@
-"""Campaigns over the distributions of a scenario, and their flights flown by themselves."""
+"""Campaigns over the distributions of a scenario, and single flights of such campaigns."""
 
 import pytest
 
@@ -56,7 +56,7 @@ def test_every_distribution_is_a_factor_beside_those_of_the_command(scenario):
     assert {f.name for f in plan(scenario, scale=0.0).factors} == own | {"mass", "fault[0].effectiveness"}
     everything = {f.name: f for f in plan(scenario, factors={"fault[0].effectiveness": (0.9, 1.0)}).factors}
     assert len(everything) == 10 + len(own) + 1
-    # What the file says of a parameter comes before the bounds of all, what the command says before both.
+    # A distribution in the file replaces the bounds of all parameters; one in the command replaces both.
     assert (everything["mass"].kind, everything["mass"].high) == ("normal", 0.06)
     assert everything["fault[0].effectiveness"].low == 0.9
 
@@ -71,7 +71,7 @@ def test_every_number_drawn_is_flown(flown):
     for flight in range(3):
         sample, scenario = flown.sample(flight), parse_scenario(flown.file(flight), "alone")
         assert scenario.initial.velocity == sample["initial.velocity"]
-        # Before them stands the change that leads to the same goal from another start.
+        # Before the sampled changes stands the change that leads to the same target from another start.
         assert scenario.command[1].altitude_change == sample["command[0].altitude_change"]
         assert scenario.command[1].start == scenario.command[1].end == sample["command[0].start"]
         assert scenario.settings["integral.rate"] == sample["integral.rate"]

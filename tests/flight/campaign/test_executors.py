@@ -42,7 +42,7 @@ def test_a_worker_killed_in_mid_campaign_loses_and_doubles_nothing(planned, resu
 
 @pytest.mark.parametrize("address", ["nonsense", "nowhere://x", "tcp://127.0.0.1", "tcp://h:99999", "inproc://x"])
 def test_an_address_that_is_none_is_refused_at_once(monkeypatch, address):
-    # Without asking anybody: it would take until the end of the tests.
+    # The address is refused without contact; waiting for an answer would outlast the tests.
     monkeypatch.setattr("hsv.flight.campaign.executors.ANSWER", 1e6)
     with (
         pytest.raises(CampaignError, match=f"^scheduler = '{address}': .*expected an address"),
@@ -70,7 +70,7 @@ def test_a_scheduler_that_does_not_answer_is_named_once(monkeypatch, capfd, answ
 
 @pytest.fixture
 def cluster():
-    """A scheduler of its own, without workers."""
+    """Return a new scheduler without workers."""
     with LocalCluster(
         n_workers=0, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
     ) as started:
@@ -129,7 +129,7 @@ def test_a_lost_scheduler_is_a_failed_run_that_goes_on_later(planned, cluster, o
 
 @contextmanager
 def dask_worker(address, folder, environment, *flags):
-    """A worker started by hand, as on another machine."""
+    """Start a worker as one does by hand on another machine."""
     module = "-m", "distributed.cli.dask_worker"
     command = [sys.executable, *flags, *module, "--nthreads", "1", "--no-dashboard", address]
     popen = subprocess.Popen(command, env=environment, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -148,7 +148,7 @@ def test_a_worker_without_the_program_or_with_another_one_is_refused_by_its_addr
     (other / "__init__.py").touch()
     path = os.pathsep.join((str(other.parent), os.environ.get("PYTHONPATH", "")))
     address = cluster.scheduler_address
-    # Isolated, Python does not look where the workspace is.
+    # With -I, Python does not search the workspace's folders.
     for flags, has in (["-I"], "no hsv"), ([], "hsv 0.0.1, sources 0"):
         expected = rf"^scheduler = '{address}': worker tcp://127\.0\.0\.1:\d+ has {has}, expected hsv .*, as here$"
         with (
@@ -161,14 +161,14 @@ def test_a_worker_without_the_program_or_with_another_one_is_refused_by_its_addr
 
 
 def end_of_the_third(text, batch):
-    """Fly a batch; with the third the worker ends."""
+    """Fly a batch; on the third batch the worker process ends."""
     if batch == 3:
         os._exit(1)
     return b""
 
 
 def length_of(text, batch):
-    """Fly a batch."""
+    """Fly a batch and return the length of the text."""
     return str(len(text)).encode()
 
 
@@ -184,14 +184,14 @@ def test_a_batch_that_ends_its_worker_is_named_and_ends_the_campaign_and_not_the
 
 
 def begin_and_never_end(text, batch):
-    """Fly a batch that says in the folder named in the text that it has begun."""
+    """Create a file in the folder that the text names, as a sign that the batch has begun, and never return."""
     Path(text.split()[0], str(batch)).touch()
     time.sleep(1e6)
     return b""
 
 
 def test_a_campaign_with_a_long_text_is_interrupted_while_batches_wait(tmp_path):
-    """On Python 3.11 the pool's own pipe, full with the texts of waiting batches, once held up the end for ever."""
+    """On Python 3.11 the pool's pipe, filled by texts of waiting batches, once blocked the end for ever."""
     with pytest.raises(KeyboardInterrupt), make_executor(2) as workers:
         for batch in range(4):
             workers._submit(begin_and_never_end, f"{tmp_path} {'x' * 1_000_000}", batch)
@@ -217,7 +217,7 @@ def test_a_stopped_worker_is_reported_and_waited_for(monkeypatch):
 
 
 def alive(pid):
-    """Tell whether a process runs, or has ended and is still to be waited for."""
+    """Return whether a process exists, be it only as a zombie."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except (FileNotFoundError, ProcessLookupError):

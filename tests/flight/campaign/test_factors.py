@@ -103,7 +103,7 @@ DIGESTS = {
 
 @pytest.mark.parametrize("method", METHODS)
 def test_samples_stay_what_they_were_in_every_bit(method):
-    # A campaign begun with an earlier version, and the replay of one of its flights, draw the same.
+    # Campaigns begun with an earlier version, and replays of their flights, must draw the same samples.
     campaign = plan("case1", method=method, samples=64, seed=7, factors={"fault[0].start": ("90 s", "110 s")})
     drawn = tuple(hashlib.sha256(array.tobytes()).hexdigest()[:16] for array in draw(campaign))
     assert drawn == DIGESTS[method]

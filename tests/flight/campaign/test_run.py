@@ -1,4 +1,4 @@
-"""Campaigns to their end, whatever happens in between: interruption, damage, full disks, flights that crash."""
+"""Campaigns complete in spite of interruption, damaged files, full disks and crashing flights."""
 
 import json
 from contextlib import ExitStack
@@ -22,7 +22,7 @@ from hsv.pages.campaign import write_campaign_page
 
 
 class Counting(Executor):
-    """Flies here and notes what."""
+    """An executor that flies in this process and notes the batches."""
 
     def __init__(self):
         self.flown = []
@@ -110,7 +110,7 @@ def test_a_full_disk_is_one_error_and_what_is_finished_is_kept(planned, results,
 
 
 def rewritten(path, campaign=None, without=()):
-    """Write a result file again as another version might have."""
+    """Write a result file again, as another version might have written it."""
     table = parquet.read_table(path)
     metadata = {key: value for key, value in parquet.read_metadata(path).metadata.items() if key.startswith(b"hsv.")}
     if campaign:
@@ -159,7 +159,7 @@ velocity = "7900 ft/s"
 
 @pytest.fixture(scope="module")
 def fly(tmp_path_factory):
-    """Plan and fly a campaign of a library with settings."""
+    """Return a function that plans and flies a campaign with a C library and its settings."""
     folder = tmp_path_factory.mktemp("probe")
     build_probe(folder)
 

@@ -1,4 +1,4 @@
-"""The faults that are tried, campaigns of them to their end, and the result that is shipped."""
+"""The faults of resilience campaigns, complete campaigns, and the shipped result."""
 
 import re
 from pathlib import Path
@@ -31,7 +31,7 @@ def kept(store):
 
 @pytest.fixture(scope="module")
 def whole(campaign, tmp_path_factory):
-    """What the campaign brings in this process, undisturbed."""
+    """Return the result of the campaign, flown in this process without disturbance."""
     store = CaseStore(tmp_path_factory.mktemp("whole"), campaign)
     assert run_campaign(campaign, store, Executor()).batches == len(campaign.batches)
     return kept(store)
@@ -92,7 +92,7 @@ def test_the_ends_of_a_range_may_be_survived_or_lost():
 
 
 def flight(altitude, attitude):
-    """A flight of a step a second, at rest but for altitude (m) and pitch angle (rad)."""
+    """Return a flight with one step per second, at rest except for altitude (m) and pitch angle (rad)."""
     n = len(altitude)
     state, zeros = np.zeros((n, 9)), np.zeros((n, 9))
     state[:, 0], state[:, 3] = altitude, attitude
@@ -109,7 +109,7 @@ def test_recovery_is_the_last_exit_from_the_band():
     assert distances(flight(apart, np.zeros(10)), still, 2.0)[2] is None
     tilted = flight(np.zeros(10), np.full(10, 0.9 * ATTITUDE_BAND))
     assert distances(tilted, still, 2.0) == (pytest.approx(0.9 * ATTITUDE_BAND), 0.0, 0.0)
-    # A flight that ends early is compared as far as it goes.
+    # A flight that ends early is compared up to its end.
     assert distances(flight(np.zeros(6), np.linspace(0.0, 1.0, 6)), still, 2.0) == (1.0, 0.0, None)
 
 
@@ -152,7 +152,7 @@ def test_values_and_severities_are_the_two_sides_of_a_range():
     assert delay.value(0.49) == 25.0 and delay.resolution == pytest.approx(1.0 / 49.0)
     slow = TRIED["elevator_rate_limit"]
     assert (slow.value(0.0), slow.value(1.0)) == (100.0, 0.01)
-    assert slow.value(0.5) ** 2 == pytest.approx(slow.harmless * slow.worst)  # equal steps are equal ratios
+    assert slow.value(0.5) ** 2 == pytest.approx(slow.harmless * slow.worst)  # equal steps of severity are equal ratios
     assert slow.severity(slow.value(0.3)) == pytest.approx(0.3)
 
 
@@ -173,7 +173,7 @@ PAGE = Path(__file__).parents[3] / "docs/resilience_result.md"
 
 
 def rows(heading):
-    """Return the rows of the table under a heading: by fault, the entries by controller."""
+    """Return the rows of the table under a heading: entries by controller, by fault."""
     section = PAGE.read_text(encoding="utf-8").partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
     table = [[entry.strip() for entry in line.strip("|").split("|")] for line in section.splitlines() if "|" in line]
     _, *controllers = table[0]
@@ -186,7 +186,7 @@ def test_the_baseline_is_lost_where_the_table_says(all_faults):
     for name, entries in rows("Largest severity survived").items():
         fault, first = TRIED[name], entries["case1"].split("; ")[0]
         said = float(re.search(r"to (\S+)", first)[1])
-        # The table's digits are fewer than the flight's.
+        # The table's severities are rounded.
         severity = fault.severity(said)
         if first.startswith("all"):
             assert said == pytest.approx(fault.worst) and runner.survives(fault, 1.0)
