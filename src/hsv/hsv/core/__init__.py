@@ -44,7 +44,7 @@ _ELEMENTS = {"double": np.dtype(float), "int64_t": np.dtype(np.int64), "uint8_t"
 
 
 class _Dimension(NamedTuple):
-    """A dimension of an array: a ``size``, or what ``counts`` names, a field of the struct, plus ``more``."""
+    """A dimension of an array: a fixed ``size``, or the field ``counts``, at most ``greatest``, plus ``more``."""
 
     text: str
     size: int | None
@@ -60,7 +60,7 @@ class _Dimension(NamedTuple):
 
 
 class _Pointer(NamedTuple):
-    """A pointer field as core.h declares it."""
+    """A pointer in a struct of core.h: whether its array is read only, the shape, and whether NULL is allowed."""
 
     constant: bool
     shape: tuple[_Dimension, ...]
@@ -79,13 +79,13 @@ def _pointers(kind: str) -> dict[str, _Pointer]:
 
 @cache
 def _fields(kind: str) -> dict[str, Any]:
-    """Return the types of the fields of a struct, except the fields that count elements of arrays."""
+    """Return the C types of the fields of a struct by name, except the fields that count elements of arrays."""
     counts = {dimension.counts for pointer in _pointers(kind).values() for dimension in pointer.shape}
     return {name: field.type for name, field in ffi.typeof(kind).fields if name not in counts}
 
 
 def _element(declared: Any) -> tuple[str, tuple[int, ...]]:
-    """Return the type of the elements and the shape of a field."""
+    """Return the name of the element type, and the shape, of a field of the ``declared`` C type."""
     shape = []
     while declared.kind == "array":
         shape.append(declared.length)
@@ -95,10 +95,10 @@ def _element(declared: Any) -> tuple[str, tuple[int, ...]]:
 
 @cache
 def dtype(kind: str) -> np.dtype[Any]:
-    """Return the numpy type of a struct of core.h.
+    """Return the structured numpy type of the struct ``kind`` of core.h.
 
     Raises:
-        TypeError: It holds pointers or other structs.
+        TypeError: The struct contains pointers or other structs.
     """
     fields = ffi.typeof(kind).fields
     elements = [_element(field.type) for _, field in fields]
@@ -120,11 +120,11 @@ def vector(value: Any) -> np.ndarray:
 
 
 def doubles(array: np.ndarray, *shape: int) -> Any:
-    """Return the pointer to the numbers of an array of float64 without gaps, of a ``shape`` if one is given.
+    """Return a pointer to the numbers of a contiguous ``array`` of float64.
 
     Raises:
-        ValueError: It has another shape: the core does not check the lengths of what it is given.
-        TypeError: It is no such array.
+        ValueError: The array is not contiguous or not of the ``shape``, if given; the core itself checks no lengths.
+        TypeError: The array is not of float64.
     """
     if array.dtype != np.float64:
         raise TypeError(f"array of {array.dtype}, expected float64")
@@ -134,7 +134,7 @@ def doubles(array: np.ndarray, *shape: int) -> Any:
 
 
 def records(kind: str, array: np.ndarray) -> Any:
-    """Return the pointer to the records of an array of the type :func:`dtype` gives."""
+    """Return a pointer ``kind *`` to the structs in an ``array`` whose type is :func:`dtype` of ``kind``."""
     return ffi.cast(f"{kind} *", ffi.from_buffer(array))
 
 
@@ -142,10 +142,10 @@ def records(kind: str, array: np.ndarray) -> Any:
 def instruction_set() -> str:
     """Return the instruction set of the core: the widest of this processor, or the one in ``HSV_CORE``.
 
-    Other processors than x86-64 have only one set, with the name of the first set of x86-64.
+    On processors other than x86-64 there is only one, which is called ``sse2`` as well.
 
     Raises:
-        ParameterError: ``HSV_CORE`` names none, or one that this processor does not have.
+        ParameterError: ``HSV_CORE`` is not an instruction set of this processor.
     """
     usable = [*_LANES][: lib.hsv_widest() + 1]
     chosen = os.environ.get("HSV_CORE") or usable[-1]
@@ -155,7 +155,7 @@ def instruction_set() -> str:
 
 
 def lanes() -> int:
-    """Return how many flights the core flies at a time."""
+    """Return how many flights the core can simulate at a time."""
     return _LANES[instruction_set()]
 
 
@@ -164,16 +164,16 @@ def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int, ha
 
     Args:
         flights: Structs ``hsv_flight``.
-        memory: What the core keeps between pieces, see :func:`loop_memory`; step 0 begins it.
+        memory: State of the loop between calls, see :func:`loop_memory`; step 0 initialises it.
         start: First step.
         stop: Step after the last one.
         halves: The halves of each step that are simulated, ``lib.SENSE``, ``lib.ACT`` or both.
 
     Returns:
-        The step after the last one flown; -1 - k where a block from outside failed in step k.
+        The step after the last one simulated, or -1 - k if an external block failed in step k.
 
     Raises:
-        ValueError: Another number of flights, too little memory, or more steps than a history has rows.
+        ValueError: The number of flights is wrong, the memory too small, or a history has fewer rows than steps.
     """
     if len(flights) not in (1, lanes()) or memory.nbytes < lib.hsv_memory_size(len(flights)) or memory.ctypes.data % 64:
         raise ValueError(f"{len(flights)} flights, expected 1 or {lanes()}, with the memory for as many")
@@ -185,24 +185,24 @@ def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int, ha
 
 
 def loop_memory(flights: int) -> np.ndarray:
-    """Return aligned memory for the state of the loop of this number of flights between calls."""
+    """Return aligned memory (bytes) for the state of the loop of so many flights between calls of :func:`fly`."""
     room = np.zeros(lib.hsv_memory_size(flights) + 64, np.uint8)
     return room[-room.ctypes.data % 64 :]
 
 
 class Struct:
-    """A struct of core.h. The values of its fields are attributes, and live as long as this does."""
+    """A struct of core.h; the values of its fields are attributes, so that arrays live as long as pointers to them."""
 
     def __init__(self, kind: str, **values: Any) -> None:
         """Fill the struct ``kind``.
 
         Args:
-            kind: Its name in core.h.
-            values: By the names of the fields, all but the counts of arrays. An array that the core writes to is not
-                copied; a nested struct is a :class:`Struct`.
+            kind: Name of the struct in core.h.
+            values: Values of the fields by name, without the fields that count elements. An array that the core writes
+                to is not copied; a nested struct is a :class:`Struct`.
 
         Raises:
-            ParameterError: A value that is missing, or of another type or shape than declared; the field is named.
+            ParameterError: A value is missing or has the wrong type or shape; the message names its field.
         """
         vars(self).update(values)
         self.kind = kind
@@ -219,7 +219,7 @@ class Struct:
 
     @property
     def values(self) -> dict[str, Any]:
-        """The values by field."""
+        """The values of the fields by name."""
         return {name: getattr(self, name) for name in _fields(self.kind)}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -248,7 +248,7 @@ class Struct:
             raise ParameterError(f"{self.kind}.{name}: {error}") from error
 
     def _address(self, name: str, declared: Any, value: Any, counts: dict[str, int]) -> Any:
-        pointer = _pointers(self.kind).get(name)  # of a function there is none
+        pointer = _pointers(self.kind).get(name)  # None for a pointer to a function
         if value is None and (pointer is None or pointer.optional):
             return ffi.NULL
         if isinstance(value, Struct):
@@ -285,7 +285,7 @@ def _copy_array(target: Any, declared: Any, value: np.ndarray) -> None:
 
 
 def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: dict[str, int]) -> None:
-    """Note the counts that follow from the shape of an array; refuse another shape than declared."""
+    """Store the ``counts`` that follow from the shape ``found``; raise a ValueError if it is not as ``declared``."""
     fits = len(found) == len(declared)
     for size, dimension in zip(found, declared, strict=False):
         count = size - dimension.more
@@ -299,13 +299,13 @@ def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: d
 
 
 class Callback:
-    """A Python function as a step function of ``hsv_block.h`` while this object lives; keeps its exception.
+    """A Python function that the core can call as a step function of ``hsv_block.h``, as long as this object lives.
 
-    ``times`` are the wall times (s) of its calls.
+    ``error`` is the exception that the function raised, or None; ``times`` are the wall times (s) of its calls.
     """
 
     def __init__(self, function: Callable[[int, Any, Any], None]) -> None:
-        """Call ``function`` with k and the pointers to its inputs and outputs."""
+        """Wrap ``function``, which is called with the step k and the pointers to its inputs and outputs."""
         self.function = function
         self.error: BaseException | None = None
         self.times = array("d")

@@ -14,27 +14,27 @@ tangent: Callable[[float], float] = lib.hsv_tangent
 """Return the tangent of an angle (rad) up to 1e5 in magnitude."""
 
 arcsine: Callable[[float], float] = lib.hsv_arcsine
-"""Angle (rad) from -pi / 2 to pi / 2 whose sine is given, from -1 to 1."""
+"""Return the angle (rad) from -pi / 2 to pi / 2 whose sine is the argument, from -1 to 1."""
 
 exponential: Callable[[float], float] = lib.hsv_exponential
 """Return the exponential of a number up to 700 in magnitude."""
 
 logarithm: Callable[[float], float] = lib.hsv_logarithm
-"""The natural one of a normal positive number."""
+"""Return the natural logarithm of a normal positive number."""
 
 
 def of_each(function: Callable[[float], float], values: Any) -> np.ndarray:
-    """Return a ``function`` of one number of each of ``values`` (n)."""
+    """Return the array (n) of ``function`` applied to each of ``values`` (n)."""
     return np.array([function(value) for value in np.asarray(values, float).tolist()])
 
 
 def solve(A: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return X (n, m) with A X = b for ``A`` (n, n) and ``b`` (n, m), by elimination with partial pivoting.
 
-    Where ``A`` is singular, the result is not finite.
+    If ``A`` is singular, the result is not finite.
 
     Raises:
-        ValueError: Other shapes.
+        ValueError: The shapes do not match.
     """
     left, right = np.array(A, float, order="C"), np.array(b, float, order="C")
     n, m = right.shape
@@ -46,4 +46,4 @@ SEED_PARAMETER = Parameter("seed", 0, "key of all random numbers of the flight",
 """Seed of a flight, at most 2^53, which all file formats represent exactly."""
 
 LARGEST = float(np.sqrt(106.0 * 0.6931471805599453))
-"""Largest magnitude of a normal number, 8.57: the logarithm in Box and Muller has an argument of at least 2^-53."""
+"""Largest random normal number, 8.57: the argument of the logarithm in Box and Muller's method is at least 2^-53."""

@@ -14,9 +14,9 @@ from pathlib import Path
 from cffi import FFI
 
 FOLDER = Path(__file__).parent
-# Contraction of a * b + c would change the bits of a flight. gcc's own vectorisation only makes a flight slower.
+# Fused multiply-add would change the bits of a flight. Automatic vectorisation by gcc only makes a flight slower.
 FLAGS = ["-std=gnu99", "-O3", "-g0", "-ffp-contract=off", "-fno-math-errno", "-fno-tree-vectorize"]
-# Vector types do not leave the core, so that their calling convention does not matter.
+# Warnings about the calling convention of vector types do not matter, because these do not leave the core.
 FLAGS += ["-Wno-psabi"]
 
 compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC"))[0]

@@ -121,7 +121,7 @@ class FaultInjector:
         return link_state(self.link, N_INPUTS, self._before)
 
     def rows(self, sides: Sequence[str], earlier: Struct | None = None) -> Struct:
-        """Return the known faults of the given ``sides`` as :func:`fault_rows`; those in ``earlier`` keep their memory."""
+        """Return the known faults of the given ``sides``, for the core; faults in ``earlier`` keep their memory."""
         return fault_rows(sides, self.known, self.period, earlier)
 
     def parameters(self) -> dict[str, list[str] | list[float]]:

@@ -60,7 +60,10 @@ MAX_DELAY = lib.MAX_DELAY
 
 @dataclass(frozen=True)
 class FaultParameter:
-    """A parameter of a kind of fault; ``{}`` in its unit is the channel's unit, and the channel's travel scales the range."""
+    """A parameter of a kind of fault. ``{}`` in ``unit`` stands for the channel's unit.
+
+    With ``{}``, the range is relative to the travel of the channel.
+    """
 
     name: str
     description: str
