@@ -86,7 +86,7 @@ def test_composed_and_started_paused_equals_separate_processes_in_every_byte(sha
     run = shared_processes.start("hsv", "run", *words)
     wait_until(lambda: (path / "composed_0.mcap").exists() or run.poll() is not None, [run.pid])
     released = shared_processes.run("hsv", "set", "paused", "false")
-    assert "from step 1 on" in released.stdout, released.stdout
+    assert "from step 0 on" in released.stdout, released.stdout
     assert exit_code_of(run) == 0
     compared = shared_processes.run("hsv", "diff", case1.path, path)
     assert compared.returncode == 0, compared.stdout

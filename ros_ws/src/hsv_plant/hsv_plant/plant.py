@@ -95,6 +95,8 @@ class PlantNode(LockstepNode):
         self._signals = Signals()
         self._advance()
         self._started = False
+        self._published = False
+        """Whether step 0 is published, which a flight that starts paused does not do before it is resumed."""
         self._recorded_step = -1
         self._answered = False
         """Whether the input of the actuators for this step has arrived."""
@@ -153,7 +155,7 @@ class PlantNode(LockstepNode):
                     self._stepping_to = 0
                 self._paced_from = time.monotonic(), step
                 said = str(parameter.value).lower()  # as it is written in files: true, not True
-                self.log_change(f"{parameter.name} = {said} from step {step + 1} on")
+                self.log_change(f"{parameter.name} = {said} from step {step + 1 if self._published else step} on")
         return SetParametersResult(successful=True)
 
     def _on_progress(self, progress: RecorderProgress) -> None:
@@ -164,7 +166,7 @@ class PlantNode(LockstepNode):
     def _on_actuator(self, message: bytes) -> None:
         signals = self._signals
         step = self._actuator_messages.step(message)
-        if not self._started or step != signals.step:
+        if not self._published or step != signals.step:
             # A message from outside this graph.
             self.get_logger().error(
                 f"{self.resolve_topic_name(ACTUATOR)} of step {step}: expected {signals.step}, ignored (published by "
@@ -191,10 +193,13 @@ class PlantNode(LockstepNode):
 
     def _continue(self) -> None:
         """Execute the next step, unless the plant must wait for its input, the recorder or the wall clock."""
-        if self._resets and (self._answered or not self._started):
+        if self._resets and (self._answered or not self._published):
             # The answer to a step is the last message of that step which a node waits for.
             self.get_logger().info(f"run {short_id(self._run)} reset at {step_in_words(self.step, self.plant.period)}")
             self._begin()
+        elif not self._published:
+            if self._started and not self.paused:
+                self._publish()
         elif self._flown and (not self.recorded or self._recorded_step >= self._signals.step):
             self._land()
         elif self._answered and not self.paused and self._delay() <= 0.0 and self._room():
@@ -216,7 +221,7 @@ class PlantNode(LockstepNode):
         return due - time.monotonic()
 
     def _publish(self) -> None:
-        signals = self._signals
+        signals, self._published = self._signals, True
         for pack, publish in self._answers:
             publish(pack(signals))
         status = FlightStatus(signals.status)
@@ -272,7 +277,7 @@ class PlantNode(LockstepNode):
             self._paced_from = time.monotonic(), 0
             self._standstill = Standstill()
             self.get_logger().info(f"starts {run_in_words(self._run)}")
-            self._publish()
+            self._continue()
             return
         self.log_waiting(missing, decides=True)
         limit = self.values["start_timeout"]
