@@ -1,4 +1,4 @@
-"""Files and texts with errors: one line, in a bounded time; files that extend another one."""
+"""Files and texts with errors give a one-line message in bounded time; files can extend other files."""
 
 from __future__ import annotations
 

@@ -25,13 +25,13 @@ Closed()
 ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))()
 """,
 }
-"""Programs that are interrupted where Python only reports an exception, and goes on."""
+"""Programs interrupted where Python only prints an exception and continues."""
 
 
 @pytest.mark.parametrize("program", SWALLOWED.values(), ids=SWALLOWED)
 def test_ctrl_c_is_not_lost_where_no_exception_gets_through(program) -> None:
     begin = "import ctypes, signal\nfrom hsv.base.processes import take_interrupts\ntake_interrupts()"
-    # Lost for good, it would be waited for in vain: ten seconds of processor time end that.
+    # If the interrupt is lost, the loop never ends by itself; a limit of 10 s of processor time ends it.
     end = "signal.setitimer(signal.ITIMER_PROF, 10.0)\nwhile True: pass"
     ran = subprocess.run([sys.executable, "-c", f"{begin}{program}{end}"], capture_output=True, text=True)
     assert ran.returncode == -signal.SIGINT, ran.stderr
@@ -41,7 +41,7 @@ def test_ctrl_c_is_not_lost_where_no_exception_gets_through(program) -> None:
 @pytest.mark.parametrize("code", [0, 2])
 @pytest.mark.parametrize("number", ["SIGINT", "SIGALRM"])
 def test_the_exit_code_stands_when_ctrl_c_comes_at_the_very_end(code, number) -> None:
-    # SIGALRM: an interruption that was to come later.
+    # SIGALRM stands for an interruption that was postponed.
     program = f"""
 import os, signal, sys
 from hsv.base.processes import take_interrupts
@@ -57,7 +57,7 @@ sys.exit({code})
 
 @pytest.fixture
 def interrupted_as_a_command() -> Iterator[None]:
-    """Take Ctrl-C as the commands do."""
+    """Handle Ctrl-C as the commands do."""
     hook, handlers = sys.unraisablehook, {number: signal.getsignal(number) for number in NUMBERS}
     take_interrupts()
     yield

@@ -39,7 +39,7 @@ def test_quantities_become_si(text, unit, value):
         ("__import__('os')", "m", "no number"),
         ("nan ft", "m", "no number"),
         ("1e999 ft", "m", "expected a finite quantity"),
-        # Angles are no bare numbers, nor bare numbers angles; a frequency is no angular frequency.
+        # Angles need a unit, ratios are not lengths, and a frequency is not an angular frequency.
         ("12", "rad", "the unit is missing"),
         ("10 %", "m", "wrong unit"),
         ("15 Hz", "rad/s", "wrong unit"),
@@ -59,7 +59,7 @@ def test_what_is_not_such_a_quantity_is_refused_by_name(text, unit, problem):
 @settings(max_examples=100)
 @given(st.integers(0, 10**9))
 def test_a_decimal_in_feet_becomes_the_decimal_in_metres(thousandths):
-    # 0.3048 is exact: the value in metres has a short decimal, and that is what must come out.
+    # 0.3048 is exact, so the value in metres is a short decimal; the result must be the number nearest to it.
     digits = f"{thousandths * 3048:08d}"
     expected = float(f"{digits[:-7]}.{digits[-7:]}")
     assert parse_quantity(f"{thousandths / 1000} ft", "m", "h") == expected

@@ -1,4 +1,4 @@
-"""Custom controllers, in Python and compiled, and robust MPC: answers are checked and limited, states are their own."""
+"""Custom controllers, in Python and compiled, and robust MPC: outputs are checked and limited, states are separate."""
 
 import ctypes
 import math
@@ -32,7 +32,7 @@ INPUTS = ControllerInput(
 
 
 class Counting:
-    """Answers how often it was stepped since its reset, and something else."""
+    """A controller that outputs the number of steps since its reset (times 0.1) and a constant elevator."""
 
     def __init__(self, elevator):
         self.elevator = elevator
@@ -48,7 +48,7 @@ class Counting:
 
 @STEP_FUNCTION
 def counting(k, given, out, state, parameters):
-    """The same compiled: the elevator is the parameter times the last of the inputs."""
+    """The same counter, compiled: the elevator is the parameter times the last of the inputs."""
     count, answer = (ctypes.cast(a, ctypes.POINTER(ctypes.c_double)) for a in (state, out))
     if k < 0:
         return 3

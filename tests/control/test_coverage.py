@@ -83,7 +83,7 @@ def test_where_no_tube_is_certified_nothing_is_covered():
 
 
 def test_the_status_tells_of_declared_hardware_alone():
-    """In step 0 every flight is inside the set; a fault is not known to the controller."""
+    """In step 0 the error is inside the set in every flight, and the controller does not know of a fault."""
     lock = [{"channel": "elevator_deflection", "type": "lock_in_place", "start": "0 s"}]
     for changes, status in (
         ({"fault": lock}, TubeStatusCode.OK),

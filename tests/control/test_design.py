@@ -1,4 +1,4 @@
-"""Designs: their files, parameters, bounds and tau."""
+"""Control designs: their files, parameters, bounds and tau."""
 
 import copy
 import dataclasses
@@ -69,7 +69,7 @@ def test_an_array_of_wrong_length_is_named(name):
     for changed in ([*VALUES[name], VALUES[name][-1]], VALUES[name][:-1]):
         with pytest.raises(DesignError) as caught:
             ControlDesign.from_parameters({**VALUES, name: changed})
-        # Breakpoints and their weights, and the columns of the notch filter, belong together.
+        # Breakpoints and weights belong together, as do the columns of the notch filter.
         group = name.rpartition(".")[0]
         assert f"parameter {group}." in str(caught.value)
         assert "expected" in str(caught.value)
@@ -166,7 +166,7 @@ def test_factors_and_filtered_nominal_survive_the_parameter_file_and_are_left_ou
     again = ControlDesign.from_parameters(values)
     assert not again.modified and again.filtered
     assert again.tau.tolist() == tau.tolist() and again.tau_minimum.tolist() == minimum.tolist()
-    # Another certified factor is no modification, another certified range is.
+    # Another tau in the certified range is no modification; another range is.
     assert not ControlDesign.from_parameters(values | {"feedback.tau": minimum.tolist()}).modified
     assert ControlDesign.from_parameters(values | {"feedback.tau_minimum": tau.tolist()}).modified
 

@@ -1,4 +1,4 @@
-"""The estimator of the elevator's effectiveness: what its intervals hold, and what it makes of faults."""
+"""The estimator of the elevator's effectiveness: its intervals contain the truth, and it reacts to faults."""
 
 import core_calls as calls
 import numpy as np
@@ -19,7 +19,7 @@ from hsv.model.plant import FlightStatus
 from hsv.model.vehicle import load_vehicle
 
 FAULT = 5000
-"""Step of the fault of Case 1."""
+"""Step at which Case 1's fault begins."""
 
 
 def active(effectiveness=0.9, **fault):
@@ -28,18 +28,18 @@ def active(effectiveness=0.9, **fault):
 
 
 def known_along(parts, flight):
-    """Return what the estimator of ``parts`` knows after each step of a ``flight``."""
+    """Return the estimates of ``parts`` after each step of a ``flight``."""
     data = parts.controller.kernel.effectiveness
     return calls.effectiveness_along(data, flight.history.estimate, flight.history.command)
 
 
 def effectiveness_step(data, memory, step, x):
-    """Return the effectiveness by which the command of a step is divided."""
+    """Return the effectiveness by which the elevator command of a step is divided."""
     return lib.hsv_effectiveness_step(data.pointer, records("hsv_tube_memory", memory), step, doubles(vector(x)))
 
 
 def effectiveness_bounds(data, *step):
-    """Return the intervals of the effectiveness and of an offset that a step leaves."""
+    """Return the intervals (4 bounds) of effectiveness and offset that are consistent with one step."""
     bounds = np.empty(4)
     lib.hsv_effectiveness_bounds(data.pointer, step, doubles(bounds))
     return bounds
@@ -53,7 +53,7 @@ def test_true_effectiveness_is_in_the_interval_where_the_disturbance_keeps_its_b
         true, g = random.uniform(0.3, 1.0), random.uniform(-data.effect, data.effect)
         i, d, turn = random.uniform(-data.inertia, data.inertia), random.uniform(-1e-3, 1e-3), random.normal(0.0, 5e-3)
         v = random.uniform(-data.bound, data.bound) * abs(e)
-        # (1 + i) D + b = P (1 + g) e + d + v and y = D + b; d is known with g = 0 from the healthy steps.
+        # (1 + i) D + b = P (1 + g) e + d + v and y = D + b; d is known from healthy steps, where g = 0.
         y = true * (1.0 + g) * e + d + v - i * turn
         low, high, _, _ = effectiveness_bounds(data, y, e, turn, d + g * effect, effect)
         assert low <= true <= high
@@ -83,7 +83,7 @@ def test_half_an_elevator_is_survived_by_the_active_law_alone():
 
 @pytest.mark.long
 def test_no_false_alarm_at_any_corner():
-    """A flight in which the estimator never took the elevator for faulty has the bits of the passive one."""
+    """The estimator never reports a fault, so that the flight has the bits of the one with the passive law."""
     passive, watched = (
         assemble_flight(load_scenario(name, {"fault[0].effectiveness": 1.0})) for name in ("case1", "case1_active")
     )

@@ -1,4 +1,4 @@
-"""The estimator against the Riccati equation as scipy solves it, and what it finds in flight."""
+"""The state estimator compared with scipy's Riccati solution, and its estimates in flight."""
 
 import numpy as np
 import pytest
@@ -37,12 +37,12 @@ def test_gain_solves_the_riccati_equation(estimator):
     expected = M @ H.T @ np.linalg.inv(H @ M @ H.T + R)
     scale = np.abs(expected).max(axis=0)
     assert_allclose(estimator.gain / scale, expected / scale, atol=1e-6)
-    # The error of the estimate dies out.
+    # The estimation error decays.
     assert np.abs(np.linalg.eigvals((np.eye(11) - estimator.gain @ H) @ F)).max() < 0.9999
 
 
 def test_an_offset_of_the_elevator_is_found(estimator):
-    """A flight about the trim, its elevator off by a constant that no one knows."""
+    """Fly about the trim with a constant elevator offset that the estimator does not know."""
     rows, sensors, ideal, stepped = (
         fault_rows([SENSOR], [], T),
         sensor_state(),
@@ -52,7 +52,7 @@ def test_an_offset_of_the_elevator_is_found(estimator):
     x, command = START.state.copy(), START.input.copy()
     for k in range(200):
         stepped.step(k, measure(ideal, sensors, rows, k, 3, x), command)
-        # A feedback that holds the unstable vehicle, on the truth.
+        # The feedback of the true state stabilises the vehicle.
         turn = -1.0 * (x[2] - START.state[2]) + 1.5 * (x[3] - START.state[3]) + 0.8 * x[4]
         command = START.input + np.array([0.0, turn])
         x = advance(x, command + np.array([0.0, 0.01]), VEHICLE, T, 2)

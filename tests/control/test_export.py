@@ -37,14 +37,14 @@ each_compiler = pytest.mark.parametrize(
 
 
 def write_source(design, folder):
-    """Write the exported files into ``folder``; return the path of the source."""
+    """Write the exported files into ``folder``; return the path of the C source."""
     for name, text in controller_files(design).items():
         (folder / name).write_text(text, encoding="utf-8")
     return folder / SOURCE
 
 
 def compile_library(design, folder, compiler="cc"):
-    """Return the shared library of the exported ``design``, in ``folder``."""
+    """Compile the exported ``design`` in ``folder`` and return the shared library."""
     source, library = write_source(design, folder), folder / "controller.so"
     subprocess.run([compiler, *FLAGS, "-O3", "-shared", "-fPIC", "-o", library, source], check=True)
     return library
@@ -61,15 +61,15 @@ def built(request, tmp_path_factory):
 def test_it_is_c99_that_calls_nothing_and_keeps_nothing(design, level, compiler, tmp_path):
     code = tmp_path / "controller.o"
     stack = ("-Wstack-usage=4096",) if compiler == "gcc" and level != "-O0" else ()
-    # Ubuntu's compiler adds the stack protector's call unless it is told not to.
+    # By default Ubuntu's compiler adds calls of the stack protector.
     plain = ("-fno-pie", "-fno-stack-protector")
     command = [compiler, *FLAGS, *stack, level, *plain, "-c", "-o", str(code), str(write_source(design, tmp_path))]
     subprocess.run(command, check=True)
     listed = subprocess.run(["nm", "-P", str(code)], check=True, capture_output=True, text=True).stdout
     symbols = [tuple(line.split()[:2]) for line in listed.splitlines()]
-    # No heap and no libm. Compilers may call these two for any code, on machines without a C library, too.
+    # No heap and no libm. Compilers may generate calls of these two for any code, even without a C library.
     assert {name for name, kind in symbols if kind == "U"} <= {"memcpy", "memset"}
-    # Functions and constants: nothing is kept from step to step but in the state.
+    # Only functions and constants: nothing but the state is kept from step to step.
     assert {kind for _, kind in symbols} <= {"T", "t", "R", "r", "U"}
     assert {name for name, kind in symbols if kind in "TR"} == {*BLOCKS}
 

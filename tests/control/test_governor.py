@@ -45,7 +45,7 @@ def step():
 
 SHORT_BLEND = 0.2
 NEAR = tuple(start + 3e-4 * (target - start) for start, target in zip(START, TARGET, strict=True))
-"""So near that half a second is enough: planned in moments, without compilation, too."""
+"""A target so near that half a second is enough and planning takes only moments."""
 TRIM = trim(VEHICLE, *START).input
 NARROW = {"minimum": TRIM - np.array([0.1, 0.01]), "maximum": TRIM + np.array([0.1, 0.01])}
 
@@ -56,13 +56,13 @@ def short_step():
 
 
 def problem(length, minimum=NARROW["minimum"], maximum=NARROW["maximum"], rate=(np.inf, np.inf), target=NEAR):
-    """What is wrong with a ramp to a point near the start, of so many periods."""
+    """Return what is wrong with a ramp of ``length`` periods to a point near the start, or None."""
     corners = (SHORT_BLEND, *START), (SHORT_BLEND + length * PERIOD, *target)
     return governor(minimum, maximum, rate)._problem([Corner(*corner, SHORT_BLEND) for corner in corners], AT_REST)
 
 
 def column(found, name):
-    """Of all corners of a reference, the time, altitude, velocity or blend."""
+    """Return one field of all corners of a reference: time, altitude, velocity or blend."""
     return tuple(getattr(corner, name) for corner in found.corners)
 
 
@@ -93,7 +93,7 @@ def test_a_step_becomes_the_shortest_ramp_whose_plan_is_inside_the_tightened_inp
     assert column(step, "time")[0] == step.blend == BLEND
     assert (column(step, "altitude"), column(step, "velocity")) == tuple(zip(START, TARGET, strict=True))
     room = np.minimum(step.plan.min(axis=0) - LOW, HIGH - step.plan.max(axis=0)) / (HIGH - LOW)
-    # Nothing but the share that is kept free, and what a period's length changes.
+    # Apart from the reserved share of the range, only the effect of one period more or less remains.
     assert KEPT_FREE <= room.min() < KEPT_FREE + 5e-4
 
 
@@ -124,7 +124,7 @@ def test_the_plan_is_that_of_the_reference_it_returns(short_step):
     reference = ReferenceTrajectory(times, altitudes, velocities, PERIOD, VEHICLE, blend=blends).data
     rows = np.clip(np.arange(len(step.plan)) - reference.first, 0, len(reference.state) - 1)
     assert np.all(step.deviation[0] == 0.0)
-    # Step by step, because without its feedback the vehicle is unstable.
+    # Step by step, because the vehicle is unstable without its feedback.
     for k, row in enumerate(rows[:-1]):
         x, u = step.deviation[k], step.plan[k] - reference.input[row]
         A, B = DESIGN.polytope.at(*(reference.state[row] + x)[:2])
@@ -140,9 +140,9 @@ def test_a_ramp_is_never_faster_than_it_was_asked_for(step):
 
 
 IN_FLIGHT = 100
-"""Step at which a command comes."""
+"""Step at which a command is received."""
 SHARP = [Corner(0.0, *START, 0.0), Corner(1.0, *START, 0.0), Corner(1.0, *NEAR, 0.0), Corner(4.0, *START, 0.0)]
-"""A step, and an unblended ramp that is not yet flown."""
+"""A step, followed by a ramp without blending that has not begun."""
 
 
 def test_what_is_flown_stays_as_it_is_when_a_leg_is_added():
@@ -150,7 +150,7 @@ def test_what_is_flown_stays_as_it_is_when_a_leg_is_added():
     deviation = np.array([0.5, 0.01, *np.zeros(7)])
     for known in ([Corner(0.0, *START, 0.0)], SHARP):
         found, first = narrow.continued(known, Leg(0.0, 1.5, *NEAR), SHORT_BLEND, Beginning(IN_FLIGHT, deviation))
-        # It turns with the step that is flown next, or where the last corner before it is over.
+        # The reference turns at the next step, or at the end of the last corner that is already planned.
         assert first == (IN_FLIGHT if len(known) == 1 else 200 + 1 - 10)
         assert list(found.corners[: len(known)]) == known
         assert found.end == pytest.approx((first + 10) * PERIOD + 1.5 + SHORT_BLEND)
@@ -165,7 +165,7 @@ def test_what_is_flown_stays_as_it_is_when_a_leg_is_added():
 
 
 def flying(values=None, design=DESIGN, steps=IN_FLIGHT):
-    """A nominal trajectory in level flight at the start after so many steps, and the function that commands it."""
+    """Return a nominal trajectory after some steps of level flight at the start, and a function that commands it."""
     reference = ReferenceTrajectory([0.0], *([value] for value in START), PERIOD, VEHICLE)
     trajectory = NominalTrajectory(design, reference)
     for _ in range(steps):
@@ -179,7 +179,7 @@ def test_a_command_in_flight_is_flown_and_forgotten_with_the_run():
     notice = round(NOTICE / PERIOD)
     first, plan = command(NEAR, duration=1.5, blend=SHORT_BLEND)
     assert first == IN_FLIGHT + notice
-    # The flight goes on while the command is planned.
+    # The flight continues during planning.
     flown = [trajectory.step(planned.final_state).reference[:2] for _ in range(notice)]
     reference = plan()
     assert reference.end == pytest.approx((first + 10) * PERIOD + 1.5 + SHORT_BLEND)

@@ -1,4 +1,4 @@
-"""The nominal laws: the nested family, and the LMI solved in flight."""
+"""The nominal laws: the nested family of gains, and the LMI that is solved in flight."""
 
 import dataclasses
 
@@ -26,7 +26,7 @@ BOUNDARY = 1.0 + MEMBERSHIP_TOLERANCE
 
 
 def on_boundary(index, rng):
-    """A state on the boundary of an ellipsoid, the elastic ones at rest."""
+    """Return a random state on the boundary of a nominal ellipsoid, with the elastic states at rest."""
     direction = rng.normal(size=5)
     root = np.linalg.cholesky(np.linalg.inv(SMOOTH.nominal_ellipsoids[index]))
     return np.append(root @ (direction / np.linalg.norm(direction)), np.zeros(4)) * np.sqrt(BOUNDARY)
@@ -59,7 +59,7 @@ STEP = START.state - REFERENCE.state
 
 @pytest.fixture(scope="module")
 def flight():
-    """Results of a nominal flight, the nominal state measured."""
+    """Return the results of the nominal law over a flight in which the nominal state is the measured deviation."""
     trajectory = NominalTrajectory(DESIGN, TRAJECTORY, KothareLaw(DESIGN, DATA))
     results, measured = [], START.state
     for _ in range(2 * SOLVE_STEPS + 1):

@@ -66,7 +66,7 @@ def test_tells_when_the_vehicle_is_outside_the_envelope_and_holds_its_edge(compo
     result = law.step(outside)
     assert NominalStatus.OUTSIDE_ENVELOPE in result.status
     assert before.status == NominalStatus.OK
-    # Far outside the model is that of the nearest edge: the next deviation is the same however far it is.
+    # Outside the envelope, the model of the nearest edge holds: the next deviation is the same at any distance.
     outside[component] += 1e3 * math.copysign(1.0, value - START.state[component])
     other = nominal()
     other.step(START.state)

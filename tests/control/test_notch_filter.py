@@ -16,7 +16,7 @@ DEFAULTS = {p.name: p.default for p in NOTCH_PARAMETERS}
 
 
 def printed(section, omega):
-    """Equation (38) at s = j omega."""
+    """Return equation (38), as printed, at s = j omega."""
     s = 1j * omega
     up = s**2 / section.zero_frequency**2 + 2 * section.zero_damping / section.zero_frequency * s + 1
     down = s**2 / section.pole_frequency**2 + 2 * section.pole_damping / section.pole_frequency * s + 1
@@ -24,7 +24,7 @@ def printed(section, omega):
 
 
 def discrete(notch, omega):
-    """Frequency response of the filter as it flies."""
+    """Return the frequency response of the discrete filter."""
     z = cmath.exp(1j * omega * PERIOD)
     response = 1.0
     d = notch.data
@@ -51,7 +51,7 @@ def test_the_whole_filter_in_state_space_is_its_sections_one_after_the_other():
 
 @pytest.mark.parametrize("section", [BASELINE, SECOND, UNEQUAL])
 def test_elsewhere_only_the_frequency_axis_is_warped(section):
-    # The bilinear rule with prewarping: H_d(omega) = H(omega_w), omega_w = omega_c tan(omega T/2) / tan(omega_c T/2).
+    # Bilinear transform with prewarping: H_d(omega) = H(omega_w), omega_w = omega_c tan(omega T/2) / tan(omega_c T/2).
     notch = NotchFilter([section], PERIOD)
     centre = section.zero_frequency
     for omega in np.geomspace(0.01, 150.0, 40):

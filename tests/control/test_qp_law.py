@@ -36,7 +36,7 @@ def rigid():
 
 
 def predicted(law, deviation, plan):
-    """Inputs (1000, 2) of a plan, step by step, by the model at the reference."""
+    """Return the inputs (1000, 2) of a plan, predicted step by step with the model at the reference."""
     A, B = rigid()
     x, inputs = deviation[:5], []
     for k in range(BLOCKS * 25):
@@ -64,7 +64,7 @@ def test_plan_of_the_step_keeps_the_bounds_between_block_ends_too(law):
     excess = np.maximum(lower - inputs, inputs - upper)
     near = 25 * NEAR_BLOCKS
     assert excess[:near, 0].max() < 1e-3 and np.degrees(excess[:near, 1].max()) < 0.1
-    # Farther away the bounds are imposed at fewer points, and all of it is planned anew before it could fly.
+    # Later in the horizon the bounds are imposed at fewer points; this part is planned again before it takes effect.
     assert excess[near:-25, 0].max() < 2e-3 and np.degrees(excess[near:-25, 1].max()) < 0.5
     assert np.isclose(inputs[:near, 0].max(), upper[0], atol=1e-6)
     A, B = rigid()

@@ -14,11 +14,11 @@ VEHICLE, PERIOD = load_vehicle().decoupled, 0.02
 LOW, HIGH = (26060.4, 2407.92), (26243.28, 2484.12)
 NEAR = (LOW[0] + 6.096, LOW[1] + 2.54)
 RAMP = ((1.0, 3.0), (LOW[0], NEAR[0]), (LOW[1], NEAR[1]), PERIOD, VEHICLE)
-"""Two seconds of the ramp of Case 2."""
+"""Two seconds of Case 2's ramp."""
 
 
 def along(trajectory, steps):
-    """States, inputs and defects of every step."""
+    """Return the states, inputs and defects of all steps."""
     data = trajectory.along(steps)
     return data.state, data.input, data.defect
 
@@ -47,7 +47,7 @@ def test_the_defect_is_what_the_nominal_vehicle_does_not_fly_by_itself(kind):
     if kind == "static":
         assert_allclose(defect[:-1], state[:-1] - state[1:], atol=1e-12)
     else:
-        # A sequence of climbing trims is nearly a flight; its corners are jumps of the attitude.
+        # A sequence of climbing trims is nearly a flight, but at its corners the attitude jumps.
         assert np.abs(defect[50:149, 0]).max() < 1e-6 < 0.05 < np.abs(np.diff(state[50:149, 0])).max()
         assert np.abs(defect[49, 2:4]).min() > 1e-4
 
@@ -134,7 +134,7 @@ def test_a_blended_corner_is_a_steady_pull_up():
     assert turn.max() > 1.2e-3
     for k in range(30, 121, 7):
         rates = derivative(state[k], inputs[k], VEHICLE)
-        # The velocity grows, too, which turns the path a little less; and differences round the peak.
+        # The velocity increases, too, so the path turns slightly less; the finite difference rounds the peak.
         assert_allclose(state[k, 4], turn[k], atol=0.02 * turn.max())
         assert rates[3] == state[k, 4]
         assert_allclose(rates[[2, 4]], 0.0, atol=1e-12)

@@ -30,7 +30,7 @@ def step(law, design, error, state=None):
 
 def test_error_at_the_centre_has_level_zero_and_on_the_boundary_one(design):
     law = TubeLaw(design)
-    assert step(law, design, design.tube.centre[:5]).level < 0.03  # the filter's error is zero, its centre not
+    assert step(law, design, design.tube.centre[:5]).level < 0.03  # the filter's error is zero, but not its centre
     boundary = design.tube.centre + design.tube.half_width * np.eye(7)[0]
     assert level(design.tube.shape, boundary - design.tube.centre) == pytest.approx(1.0)
 
@@ -77,7 +77,7 @@ def test_states_of_another_filter_than_that_flown_are_refused(design):
     [section] = design.notch
     for law, sections in ((TubeLaw(design), 1), (TubeLaw(design, notch=(section, section)), 2)):
         due = 2 * sections
-        for size in (0, due):  # none where no filter is in the loop
+        for size in (0, due):  # size 0: no filter in the loop
             assert step(law, design, [0.0] * 5, np.zeros(size)).error.shape == (5 + size,)
         for size in {1, 2, 3, 4, 6} - {due}:
             words = f"filter_state: {size} numbers, expected {due} of the notch filter flown, or none"

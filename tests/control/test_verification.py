@@ -1,4 +1,4 @@
-"""The independent verification: what it holds to its value, what it refuses, and what it only states."""
+"""The independent verification: the fields that it recomputes, those that it rejects, and those that it only lists."""
 
 import copy
 import dataclasses
@@ -35,7 +35,7 @@ def made(subject, parts=PARTS):
 
 
 def failing(subject, parts=PARTS):
-    """Return the name of the first check that fails, or an empty text; parts are made until one fails."""
+    """Return the name of the first failing check, or "". Parts of the verification run until one fails."""
     for name, part in parts.items():
         for check in gathered(name, partial(part, subject)):
             if not check.ok:
@@ -80,7 +80,7 @@ def tampered_design(subject, name, draw):
 
 
 def place(certificate, field):
-    """Return the table that holds a field, and the field's key there, which may have points."""
+    """Return the table or list that contains a field, and the field's key in it; keys may contain dots."""
     if field in certificate:
         return certificate, field
     key, _, inside = field.partition(".")
@@ -88,10 +88,10 @@ def place(certificate, field):
 
 
 def tampered_certificate(subject, field, draw):
-    """Return ``subject`` with one entry of a field of its certificate changed by a thousandth, or another text.
+    """Return ``subject`` with one entry of a field of its certificate changed by 0.1 %, or with another text.
 
-    The accuracy of a model that agrees to rounding has a tolerance of 5 %, and multipliers are right if they prove
-    (27), which others do as well: all of a vertex become nearly zero, with which it holds for no set.
+    Model accuracies near rounding have a tolerance of 5 %, so they are changed by 50 %. Any multipliers that prove (27)
+    are accepted, so all multipliers of a vertex become nearly zero, which proves nothing.
     """
     share = 0.5 if field.startswith("model.accuracy") else -1.0 if field.endswith("multipliers") else 1e-3
     certificate = copy.deepcopy(subject.certificate)
@@ -111,7 +111,7 @@ def tampered_certificate(subject, field, draw):
 
 @pytest.mark.parametrize("name", ["baseline", *map(long, ("adjustable", "realistic", "tight"))])
 def test_seeded_tamperings_are_noticed(name):
-    """25 of each design, 100 together: an entry of the design file, or a field of the certificate that is checked."""
+    """25 changes per design, 100 in total, to entries of the design file or to checked fields of the certificate."""
     subject, draw = load_subject(find_design(name)), np.random.default_rng(5)
     stated = set(unchecked(subject, made(subject), whole=False))
     fields = [field for field in leaves(subject.certificate) if field not in stated]
@@ -122,7 +122,7 @@ def test_seeded_tamperings_are_noticed(name):
             chosen = str(draw.choice(parameters))
             try:
                 changed = tampered_design(subject, chosen, draw)
-            except DesignError:  # refused at once
+            except DesignError:  # the change was refused at once
                 continue
         else:
             chosen = str(draw.choice(fields))
@@ -135,7 +135,7 @@ def test_seeded_tamperings_are_noticed(name):
 @pytest.mark.long
 @pytest.mark.parametrize("name", DESIGNS)
 def test_every_field_is_recomputed_or_stated(name):
-    """Of entries that differ in their number only, as those of nested gains, the last is changed."""
+    """Of fields that differ only in an index, such as those of nested gains, the last is changed."""
     subject, draw = load_subject(find_design(name)), np.random.default_rng(7)
     stated = set(unchecked(subject, made(subject), whole=False))
     kinds = {re.sub(r"\d+", "N", field): field for field in leaves(subject.certificate)}
@@ -178,7 +178,7 @@ def test_a_closed_loop_whose_modes_are_just_unstable_is_refused(baseline):
 def test_what_is_stated_only_is_named(baseline):
     stated = unchecked(baseline, made(baseline))
     assert {"nominal.*.gamma", "inputs.feedback", "tube.disturbance.boxes"} <= set(stated)
-    # The examples of SECURITY.md, which leaves the list to the output of hsv verify.
+    # The examples in SECURITY.md, which refers to the output of hsv verify for the complete list.
     assert {"versions", "feedback.solver.iterations", "nominal.*.solver.iterations"} <= set(stated)
     assert not {"inputs", "feedback", "nominal", "tube"} & set(stated)
 
@@ -212,7 +212,7 @@ def test_a_tuned_gain_flies_with_a_warning(baseline, shipped):
 @pytest.mark.parametrize(
     ("name", "index", "factor", "check"),
     [
-        # Stable at every vertex still, but no longer with the certified Lyapunov function.
+        # The loop is still stable at every vertex, but not with the certified Lyapunov function.
         ("feedback.gain", 13, 0.7, r"\(24\)"),
         ("nominal.gains", 13, 1.5, r"nominal\.0: decrease of the cost"),
         ("tube.centre", 1, 1.01, r"tube\.centre\[1\]"),

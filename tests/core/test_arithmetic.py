@@ -1,4 +1,4 @@
-"""Elementary functions, linear equations and random numbers against published values."""
+"""Elementary functions, linear equations and random numbers compared with published values."""
 
 import math
 
@@ -29,12 +29,12 @@ def both_signs(values):
 
 
 def magnitudes(low, high, count=COUNT):
-    """Return numbers whose logarithms are evenly distributed."""
+    """Return positive numbers whose logarithms are evenly distributed."""
     return 10.0 ** rng.uniform(math.log10(low), math.log10(high), count)
 
 
 def near(points, relative=1e-9):
-    """Return numbers around ``points``, those themselves and their neighbours included."""
+    """Return numbers near ``points``, including the points themselves and their floating-point neighbours."""
     points = np.asarray(points, float)
     noise = points * (1.0 + relative * rng.uniform(-1.0, 1.0, len(points)))
     return np.concatenate((points, noise, np.nextafter(points, -np.inf), np.nextafter(points, np.inf)))
@@ -55,7 +55,7 @@ POSITIVE = np.r_[rng.uniform(0.5, 2.0, COUNT), magnitudes(1e-307, 1e308), ABOUT_
 
 
 def largest_error(function, exact, arguments):
-    """Return the largest error in units of the last place of the exact value, and where it is."""
+    """Return the largest error, in units of the exact value's last place, and the argument where it occurs."""
     worst = 0.0, None
     with mpmath.workprec(160):
         for argument in arguments:
@@ -122,7 +122,7 @@ def test_solution_satisfies_the_equations_to_rounding(n):
     rng = np.random.default_rng(n)
     A, b = rng.normal(size=(n, n)), rng.normal(size=(n, 2))
     X = solve(A, b)
-    # Elimination with pivoting is backward stable: the residual is rounding of |A| |X|, n times.
+    # Elimination with pivoting is backward stable: the residual is about n roundings of |A| |X|.
     assert np.all(np.abs(A @ X - b) <= 4 * n * np.finfo(float).eps * (np.abs(A) @ np.abs(X) + np.abs(b)))
 
 
@@ -143,6 +143,6 @@ def words(text):
     ],
 )
 def test_known_answers_of_the_authors(counter_and_key, expected):
-    # kat_vectors of Random123, the generator's authors' own library.
+    # From kat_vectors of Random123, the library of the generator's authors.
     given = words(counter_and_key)
     assert philox(given[:4], given[4:]) == words(expected)

@@ -1,4 +1,4 @@
-"""Structs of the core: filled by the names of fields, with arrays of the declared shapes, or refused in one line."""
+"""Structs of the core are filled by field name with arrays of the declared shapes, or refused in one line."""
 
 import pickle
 import re

@@ -1,4 +1,4 @@
-"""Other builds of the core: with sanitizers, other compilers and levels of optimisation; golden flights as ever."""
+"""Builds of the core with sanitizers, other compilers and optimisation levels: golden flights keep their bits."""
 
 import os
 import shutil
@@ -24,7 +24,7 @@ print(hsv.core.instruction_set())
 
 
 def build(folder, compiler="", flags=""):
-    """Build the package with its core into a folder, from a copy of its sources; return the folder to import from."""
+    """Build the package with its core from a copy of the sources; return the folder to import it from."""
     copy, library = folder / "hsv", folder / "library"
     shutil.copytree(SOURCES, copy, ignore=shutil.ignore_patterns("*.so", "build", "*.egg-info", "__pycache__"))
     command = [sys.executable, "setup.py", "-q", "build", "--build-base", str(folder / "base"), "--build-lib", library]
@@ -36,7 +36,7 @@ def build(folder, compiler="", flags=""):
 
 
 def fly(library, first, stride, **environment):
-    """Fly golden flights three ways with the core of a build; return the instructions that it used."""
+    """Fly golden flights in three ways with the core of a build; return the instruction set that it used."""
     program = PROGRAM.format(tests=ROOT / "tests", folder=str(library), first=first, stride=stride)
     environment = os.environ | {"PYTHONPATH": str(library)} | environment
     flown = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
@@ -48,7 +48,7 @@ def fly(library, first, stride, **environment):
 def test_all_flights_and_the_binding_under_the_sanitizers(tmp_path):
     library = build(tmp_path, "gcc", "-O1 -fsanitize=address,undefined -fno-sanitize-recover=all")
     runtime = subprocess.run(["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
-    # Python and numpy keep memory to their end.
+    # Python and numpy do not free all memory at exit.
     environment = {"LD_PRELOAD": runtime.stdout.strip(), "ASAN_OPTIONS": "detect_leaks=0"}
     fly(library, 0, 5, **environment)
     words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/core/test_binding.py"]

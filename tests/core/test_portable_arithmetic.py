@@ -1,4 +1,4 @@
-"""What decides a flight is made of exact operations and of our own elementary functions, in Python and in C."""
+"""Code that decides a flight, in Python and in C, uses only exact operations and our own elementary functions."""
 
 import ast
 import re
@@ -12,10 +12,10 @@ from hsv.core import _core
 SOURCES = Path(hsv.__file__).parent
 
 HARMLESS = re.compile(r"sqrt|memcpy|memmove|memset|_?Py\w+|__\w+|_ITM_\w+")
-"""Functions of the C library that leave no choice about their result, and what Python, compiler and linker bring."""
+"""C library functions with a unique result, and functions that Python, the compiler or the linker add."""
 
 MATH = {"isfinite", "isnan", "inf", "nan", "pi", "ceil", "floor", "isqrt", "radians"}
-"""Of :mod:`math`; radians() is a product with pi / 180."""
+"""Permitted names of :mod:`math`; radians() is a product with pi / 180."""
 
 EXACT_NUMPY = {
     *("ndarray", "float64", "int64", "complex128", "uint64", "bool_", "intp", "inf", "nan", "finfo", "pi", "newaxis"),
@@ -25,13 +25,13 @@ EXACT_NUMPY = {
     *("outer", "sort", "split", "void", "iscomplexobj"),
     *("all", "any", "isfinite", "isnan", "where", "flatnonzero", "searchsorted", "array_equal", "count_nonzero"),
 }
-"""Of numpy: what makes and moves arrays, compares, or computes element by element in one exact operation."""
+"""Permitted names of numpy: they create, move or compare arrays, or do one exact operation per element."""
 
 INEXACT_METHODS = {"dot", "sum", "mean", "prod", "std", "var", "cumsum", "cumprod", "trace", "reduce", "accumulate"}
-"""Of arrays and universal functions: what adds or multiplies in an order of its own."""
+"""Methods of arrays and universal functions that add or multiply in an order of their own."""
 
 INEXACT_NAMES = {"sum", "pow", "fsum"}
-"""Functions of Python; sum() of numbers is compensated from 3.12 on."""
+"""Built-in and math functions that are not exact; sum() of numbers is compensated from Python 3.12 on."""
 
 EXEMPT = {
     "flight/metrics.py": "metrics are computed after the flight",
@@ -46,11 +46,11 @@ EXEMPT = {
     "base/units.py": "computes with fractions, which are exact",
     "control/nominal_law.py": "calls the core, or solvers, which are outside the rule",
 }
-"""Files that a flight loads all the same, and why they need not be exact."""
+"""Files that a flight loads but that need not be exact, with the reason."""
 
 
 def problems(source: str) -> list[str]:
-    """Return what in ``source`` is not exact, as "line: what"."""
+    """Return the inexact operations in ``source``, as "line: operation"."""
     found: list[tuple[int, str]] = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.BinOp | ast.AugAssign) and isinstance(node.op, ast.MatMult):
@@ -87,7 +87,7 @@ def _inexact_import(name: str) -> bool:
 
 
 def _whole_power(node: ast.BinOp) -> bool:
-    """Tell whether this is a power of a whole number by a whole number or a counter, which is exact."""
+    """Return whether this is an integer to the power of an integer or a counter, which is exact."""
     try:
         if not float(ast.literal_eval(node.left)).is_integer():
             return False
@@ -126,7 +126,7 @@ def test_sources_of_a_flight_use_exact_operations():
 
 
 def inexact_symbols(library: Path) -> list[str]:
-    """Return the names of functions, not exact, that ``library`` takes from elsewhere."""
+    """Return the names of inexact functions that ``library`` imports."""
     command = ["nm", "--dynamic", "--undefined-only", "--format=posix", str(library)]
     listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     names = [line.split()[0].partition("@")[0] for line in listed.splitlines()]

@@ -1,4 +1,4 @@
-"""The commands of pages run as one script, and the scenarios on pages are scenarios."""
+"""Command blocks of pages run as one script, and scenario blocks of pages are valid scenarios."""
 
 import re
 
@@ -29,13 +29,13 @@ HERE = {
     "docs/vehicle.md": (),
     "offline_design/README.md": (),
 }
-"""Pages whose commands this file runs as one script, with what it needs before."""
+"""Pages whose commands run as one script, with the set-up that they need."""
 
 FEWER = {"--samples 10000 ": "--samples 20 ", "--samples 4096 ": "--samples 16 "}
-"""Campaigns that are flown with fewer flights than on the page, which would take many minutes."""
+"""Reduced numbers of flights for campaigns that would take many minutes with the page's number."""
 
 NEGATIVE = ("hsv run case1_derived_no_notch", "hsv certify")
-"""Commands that end with exit code 1, as their page says: the flight diverges, the design is not certified with all."""
+"""Commands that end with exit code 1, as their page says: the flight diverges, or not all is certified."""
 
 SCENARIOS = {
     ("docs/scenarios.md", 'extends = "case1"'),
@@ -43,19 +43,19 @@ SCENARIOS = {
     ("docs/scenarios.md", "[sensors]"),
     ("docs/montecarlo.md", 'extends = "case1"'),
 }
-"""Blocks that are scenarios, or parts that may be added to Case 1."""
+"""Blocks that are scenarios, or parts that can be added to Case 1."""
 
 PLAYER = "ros2 run hsv_bringup player BAG --rate 5 --topics /hsv/state /hsv/nominal"
-"""Command that is not run here, because it waits for nodes; tests/graph/test_player.py runs the player."""
+"""A command that waits for nodes and is not run here; tests/graph/test_player.py runs the player."""
 
 
 def all_blocks(page):
-    """Return the blocks of a page but those that are directives of the site."""
+    """Return the code blocks of a page, except directives of the site generator."""
     return [block for block in blocks(page) + indented(page) if not block.language.startswith("{")]
 
 
 def is_commands(block):
-    """Tell whether a block without a language is one of commands."""
+    """Return whether a block without a language consists of commands."""
     return (
         block.language in ("", "sh")
         and re.match(r"(cd|cp|hsv|make|mkdir|npm|pip|ros2|source|sudo|python3) ", block.text) is not None
@@ -83,7 +83,7 @@ def test_commands_of_the_page_run(page, tmp_path):
     script = [*HERE[page]]
     script += [block.text for block in all_blocks(page) if is_commands(block) and block.first_line != PLAYER]
     text = "\n".join(script)
-    if page == "docs/hardware.md":  # a fault needs a flight, and a certificate takes minutes
+    if page == "docs/hardware.md":  # fault blocks need a flight, and a certificate takes minutes
         text = re.sub(r"^hsv (fault|certify) .*", "", text, flags=re.MULTILINE)
     for more, fewer in FEWER.items():
         text = text.replace(more, fewer)

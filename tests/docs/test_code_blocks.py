@@ -1,4 +1,4 @@
-"""The Python code on pages of the documentation runs, block after block, as a reader would type it."""
+"""Python blocks on pages of the documentation run one after another, as a reader would type them."""
 
 import json
 import os
@@ -17,7 +17,7 @@ from hsv.model.faults.table import FAULT_KINDS
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = ["python.md", long("vehicle.md"), "hardware.md"]
 MODULES = {"python.md": ("mine", "class Mine")}
-"""Pages that tell to put a block into a module: its name, and what the block has in it."""
+"""Pages that ask the reader to save a block as a module: the module's name, and a text that the block contains."""
 
 
 def blocks(page, language):
@@ -27,7 +27,7 @@ def blocks(page, language):
 
 
 def write_files(page, folder):
-    """Write the blocks of a page that begin with the name of a file."""
+    """Write the blocks of a page that begin with a file name to these files."""
     for block in blocks(page, "toml"):
         name = re.match(r"# (\w+\.toml)\n", block)
         assert name

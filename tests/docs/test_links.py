@@ -1,4 +1,4 @@
-"""Links and pictures of every page of the repository, without a network; the equation map; the site builds."""
+"""Links and pictures of all pages of the repository, checked offline; the equation map; the build of the site."""
 
 import re
 import subprocess

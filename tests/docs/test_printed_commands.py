@@ -1,4 +1,4 @@
-"""The commands that the README and the pages on commands, graph and installations print are run as they stand."""
+"""The commands printed in the README and on the pages on commands, graph and installation run as printed."""
 
 import signal
 
@@ -23,7 +23,7 @@ IN_FLIGHT = {
     "hsv set tau 0.9",
     "hsv topic",
 }
-"""Run by this file on the flight that is printed before them."""
+"""Commands that run on the flight printed before them."""
 
 OTHERS = {
     "hsv run case1 --live",
@@ -33,7 +33,7 @@ OTHERS = {
     "hsv topic /hsv/state --every 50",
     "hsv watch",
 }
-"""Not run as they stand: they wait for a browser or another node, or do not end; tests/graph runs their like."""
+"""Commands that are not run: they wait for a browser or a node, or do not end. tests/graph runs similar ones."""
 
 ELSEWHERE = {
     "hsv run case1 --namespace /veh1",
@@ -43,14 +43,14 @@ ELSEWHERE = {
     "hsv montecarlo case1 --corners",
     "hsv resilience --controllers case1 --faults elevator_loss",
 }
-"""Long commands of which other tests run the like: tests/graph/test_names.py, tests/flight/test_verification.py,
+"""Long commands. Others like them run in tests/graph/test_names.py, tests/flight/test_verification.py,
 tests/design/test_agreement.py, tests/docs/test_blocks.py and tests/cli/test_resilience.py."""
 
 SAME = {f"hsv run case1 --bag bags/{name}": f"cp -r bags/case1_readme bags/{name}" for name in ("first", "case1")}
-"""Flights that have been flown before under another name."""
+"""Flights that have already been flown under another name are copied."""
 
 DIFFERENT = {"hsv diff bags/first bags/second": 1}
-"""Exit codes other than 0."""
+"""Expected exit codes other than 0."""
 
 
 def test_every_printed_command_of_hsv_exists_with_the_options_that_it_is_printed_with():
@@ -59,7 +59,7 @@ def test_every_printed_command_of_hsv_exists_with_the_options_that_it_is_printed
         command, (_, *words) = program, line.split()
         while words and words[0] in getattr(command, "commands", {}):
             command = command.commands[words.pop(0)]
-        # Where no subcommand is named, one of them is meant.
+        # A command without a named subcommand may have the options of any of them.
         meant = [command, *getattr(command, "commands", {}).values()]
         known = {option for each in meant for parameter in each.params for option in parameter.opts}
         assert command is not program, line
@@ -68,7 +68,7 @@ def test_every_printed_command_of_hsv_exists_with_the_options_that_it_is_printed
 
 @pytest.fixture
 def checkout(tmp_path):
-    """Return a folder with what the commands read of the checkout, and room for what they write."""
+    """Return a folder with the files of the checkout that commands read, and space for their output."""
     for name in ("offline_design", "src"):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "docs" / "images").mkdir(parents=True)
@@ -80,7 +80,7 @@ def test_commands_run_as_they_are_printed(checkout):
     every = dict.fromkeys(command for page in PAGES for command in printed(page) if "hsv " in command)
     commands = [each for each in every if each.startswith("hsv ") and each not in OTHERS | IN_FLIGHT | ELSEWHERE]
     assert len(commands) > 25 and {*every} >= OTHERS | ELSEWHERE | {*SAME}
-    # Not everything below bags is a bag: the reference bags have a folder, and so have the flights of studies.
+    # The reference bags and the flights of studies have their own folders below bags.
     (checkout / "bags").mkdir()
     (checkout / "bags" / "reference").symlink_to(ROOT / "bags" / "reference")
     with own_environment() as environment:

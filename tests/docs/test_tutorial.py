@@ -1,4 +1,4 @@
-"""The tutorial's pages, typed from top to bottom as a newcomer does: what they print, save and draw."""
+"""The tutorial's pages, typed from top to bottom as a newcomer would: their output, files and pictures."""
 
 import doctest
 import re
@@ -16,10 +16,10 @@ PAGES = {
     "reading_a_bag": pytest.mark.long,
     "campaign": pytest.mark.long,
 }
-"""Those that fly over DDS, or many flights, take longer than all others together."""
+"""The pages; those that fly over DDS or many flights take longer than all others together."""
 
 READ = ("offline_design", "src")
-"""What the pages read of the checkout."""
+"""Folders of the checkout that the pages read."""
 
 OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 MARK = "=== block "
@@ -35,10 +35,10 @@ def test_the_page_does_what_it_says(page, tmp_path, pictures):
         (tmp_path / name).symlink_to(ROOT / name)
     steps = blocks(f"docs/tutorial/{page}.md")
     assert {step.language for step in steps} <= {"sh", "text", "toml", "python"}
-    script = ["set -m"]  # of a terminal: what runs in the background hears an interrupt
+    script = ["set -m"]  # as in a terminal: background processes receive interrupts
     for number, step in enumerate(steps):
         if step.language == "sh":
-            # A page may be read first, or in a new terminal: the shell has its environment already.
+            # A page may be read first or in a new terminal; here the environment is already set.
             commands = step.text.replace("source env.sh\n", "")
             script.append(f"echo '{MARK}{number}'\n{commands}")
         elif step.language in ("toml", "python"):

@@ -1,4 +1,4 @@
-"""Actuators: published coefficients, the step response of the textbook, sets and fields."""
+"""Actuators: published coefficients, the textbook's step response, sets and fields."""
 
 import math
 
@@ -19,7 +19,7 @@ INF = math.inf
 
 
 def respond(actuator, commands, h, start=0.0, low=-INF, high=INF, rate=INF, acceleration=INF):
-    """Return positions and rates after each command, and the mean positions on the way there.
+    """Return positions and rates after each command, and mean positions over each period.
 
     ``actuator``: order, natural frequency (rad/s) and damping ratio.
     """
@@ -33,7 +33,7 @@ def respond(actuator, commands, h, start=0.0, low=-INF, high=INF, rate=INF, acce
 
 
 def test_coefficients_are_the_published_ones():
-    # Second order, 50 rad/s, 0.7, over 0.02 s; first order, 10 and 20 rad/s.
+    # Second order: 50 rad/s, damping 0.7, over 0.02 s. First order: 10 and 20 rad/s.
     assert_allclose(actuator_map(2, 50.0, 0.7, 0.02), (0.694054, 0.009109, -22.771946, 0.056440), atol=5e-7)
     assert 1.0 - actuator_map(1, 10.0, 1.0, 0.02)[0] == pytest.approx(0.18127, abs=5e-6)
     assert 1.0 - actuator_map(1, 20.0, 1.0, 0.02)[0] == pytest.approx(0.32968, abs=5e-6)
@@ -49,7 +49,7 @@ def test_step_response_of_second_order(frequency, damping):
     decay = np.exp(-damping * frequency * time)
     assert_allclose(position, 1.0 - decay * np.sin(damped * time + phase) / math.sin(phase), atol=1e-12)
     assert_allclose(rate, frequency / math.sin(phase) * decay * np.sin(damped * time), atol=1e-10 * frequency)
-    # The textbook's overshoot, and the largest rate of a unit step at a damping of 0.7.
+    # Overshoot from the textbook, and the largest rate of a unit step at a damping of 0.7.
     fine = respond((2, frequency, damping), np.ones(20000), 1e-4)
     overshoot = math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))
     assert fine[0].max() == pytest.approx(1.0 + overshoot, abs=1e-5)

@@ -1,4 +1,4 @@
-"""The equations of motion against the published ones, their integration, and trims."""
+"""The equations of motion compared with the published ones, their integration, and trims."""
 
 import math
 import warnings
@@ -18,7 +18,7 @@ COUPLINGS = {"derived": published.DERIVED, "paper_like": published.PAPER_LIKE, 0
 
 
 def random_points(count=20, seed=3):
-    """States and inputs all over the envelope, in motion: nothing is zero and no term drops out."""
+    """Return random states and inputs over the envelope, in motion: no state is zero and no term vanishes."""
     rng = np.random.default_rng(seed)
     low = np.array([85000, 7700, -0.1, -0.1, -0.2, -2, -20, -2, -20]) * published.STATE_UNITS
     high = np.array([86500, 8300, 0.2, 0.2, 0.2, 3, 20, 3, 20]) * published.STATE_UNITS
@@ -50,11 +50,11 @@ def test_jacobians_agree_with_extrapolated_differences_of_the_published_model(co
 
 
 STILL = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-"""Conditions of :func:`forces`: wind, density, factors of thrust, lift and drag, increment of the moment."""
+"""Conditions of :func:`forces` in still air: wind, density, factors on thrust, lift, drag, moment increment."""
 
 
 def acceleration(x, d):
-    """Forward and upward acceleration of the inertial velocity."""
+    """Return the forward and the upward acceleration of the inertial velocity."""
     path, turn = x[3] - x[2], d[3] - d[2]
     ahead = np.array([np.cos(path), np.sin(path)])
     return d[1] * ahead + x[1] * turn * np.array([-ahead[1], ahead[0]])
@@ -62,7 +62,7 @@ def acceleration(x, d):
 
 @pytest.mark.parametrize("wind", [(40.0, 0.0), (0.0, 9.0), (-25.0, -7.0)])
 def test_uniform_wind_is_a_moving_frame(wind):
-    # Galileo: over flat ground, forces and accelerations are those that an observer in the air sees in still air.
+    # Galilean invariance: over flat ground, an observer who moves with the air sees the forces of still air.
     p = load_vehicle().coupled("derived")
     for x, u in random_points():
         seen = x.copy()
@@ -77,7 +77,7 @@ def test_uniform_wind_is_a_moving_frame(wind):
 VEHICLE = load_vehicle().coupled("derived")
 START = trim(VEHICLE, 26060.4, 2407.92)
 INPUT = START.input + np.array([0.1, 0.01])
-"""Away from trim, so that everything moves."""
+"""An input away from trim, so that all states change."""
 
 
 @pytest.fixture(scope="module")

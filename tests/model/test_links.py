@@ -1,4 +1,4 @@
-"""Links: exact delays, the time of computation, shares and runs of losses."""
+"""Links: exact delays, computation time, loss rates and lengths of loss bursts."""
 
 import math
 
@@ -18,7 +18,7 @@ SENT = np.array([26000.0, 2400.0, 0.03, 0.04, 0.01, 1.0, 2.0, 0.3, 0.4]) * (
 
 
 def passed(link, sent=SENT, seed=0, before=None):
-    """Return what a receiver has in every step of what is sent."""
+    """Return what the receiver has in every step of the payloads ``sent``."""
     state = link_state(link, sent.shape[1], before)
     return np.array([receive(link, state, k, seed, payload) for k, payload in enumerate(sent)])
 
@@ -56,7 +56,7 @@ def test_losses_in_bursts_have_their_share_and_their_mean_length():
     lost = held(np.vstack([measured(seed=seed, loss=0.1, burst=4.0) for seed in range(10)]))
     edges = np.flatnonzero(np.diff(lost.astype(int)))
     runs = np.count_nonzero(np.diff(lost.astype(int)) == 1)
-    # A chain with these two means; its losses are about seven times as scattered as single ones.
+    # For a Markov chain with these two means, the number of losses has about seven times the independent variance.
     assert lost.mean() == pytest.approx(0.1, abs=4.0 * math.sqrt(7.0 * 0.1 * 0.9 / len(lost)))
     assert lost.sum() / runs == pytest.approx(4.0, rel=0.15)
     assert len(edges) > 1000

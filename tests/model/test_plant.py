@@ -91,7 +91,7 @@ ADDED = [
         ({}, 0.0, 299.1),
         ({"wind__up": 40.0}, 0.0, 299.1),
         ({"wind__forward": 100.0}, 100.0, 299.1),
-        # Its own speed of sound at 110,000 ft, 1004 ft/s; that of the standard atmosphere is 1002.7 ft/s.
+        # The vehicle's own speed of sound at 110,000 ft is 1004 ft/s; that of the standard atmosphere is 1002.7 ft/s.
         ({"vehicle__name": "winged_cone", "initial__altitude": 33528.0, "initial__velocity": 4590.0}, 0.0, 306.025),
     ],
 )
@@ -126,7 +126,7 @@ def test_a_wrong_parameter_is_named(name, value, message):
 
 ANGLE_LIMIT = 0.35
 CRUISE = np.array([85_500.0 * FOOT, 7_900.0 * FOOT, 0.03, 0.03, 0.0, 0.1, 0.0, 0.1, 0.0])
-"""A state of Case 1, SI."""
+"""A state of Case 1 in SI units."""
 
 
 @pytest.mark.parametrize(

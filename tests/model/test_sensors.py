@@ -1,4 +1,4 @@
-"""Sensors: each field does what it says, to its own channel; named sets; faults."""
+"""Sensors: every field affects only its own channel and does so as documented; named sets; faults."""
 
 import math
 
@@ -31,7 +31,7 @@ def measured(values, states=STATES, faults=(), seed=0):
 
 
 def of_pitch_rate(states=STATES, faults=(), seed=0, **fields):
-    """Return the measured pitch rate, of sensors that are ideal but for these fields; the other channels pass."""
+    """Return the pitch rate measured by a sensor with these fields; all other channels must be ideal."""
     values = {f"sensors.pitch_rate.{name}": [float(value)] for name, value in fields.items()}
     result = measured(values, states, faults, seed)
     others = [i for i in range(9) if i != Q]
@@ -62,7 +62,7 @@ def test_drift_begins_with_its_standard_deviation_and_decays_with_its_time():
 def test_lag_latency_quantum_and_range_are_those_of_their_fields():
     states = still(100)
     states[1:, Q] += 0.05
-    # Sampled: the first new sample has had one period.
+    # A sampled lag: at the first sample after the step, one period has passed.
     expected = states[:, Q] - 0.05 * np.exp(-20.0 * T * np.arange(100)) * (np.arange(100) > 0)
     assert_allclose(of_pitch_rate(states, lag=20.0), expected, atol=1e-15)
     assert_array_equal(of_pitch_rate(latency=3), STATES[np.maximum(np.arange(STEPS) - 3, 0), Q])
@@ -86,7 +86,7 @@ def test_inertial_angle_of_attack_shares_the_error_of_the_pitch_angle():
     ],
 )
 def test_named_sets_have_their_noise(name, expected):
-    # GHV: variances of 10 ft^2, 1 (ft/s)^2, 1e-6 rad^2 twice, 1e-5 (rad/s)^2 (Wiese 2013).
+    # GHV: variances of 10 ft^2, 1 (ft/s)^2, 1e-6 rad^2 (both angles) and 1e-5 (rad/s)^2 (Wiese 2013).
     error = measured({"sensors.set": name}, still(20_000)) - STATES[0]
     assert_allclose(error.std(axis=0)[:5], expected, rtol=0.03)
     assert not error[:, 5:].any()

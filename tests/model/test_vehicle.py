@@ -1,4 +1,4 @@
-"""Vehicles: files, parameters, coupling, perturbations, what is refused, and how they come to nodes and back."""
+"""Vehicles: files, parameters, coupling, perturbations, refused values, and conversion to node parameters and back."""
 
 import copy
 import sys
@@ -23,7 +23,7 @@ from hsv.model.vehicle import (
 )
 
 OTHER = str(Path(__file__).parents[1] / "golden" / "stiffened.toml")
-"""A vehicle that extends Parker's."""
+"""A vehicle file that extends Parker's vehicle."""
 
 
 @pytest.mark.parametrize("name", vehicle_names())
@@ -133,7 +133,7 @@ def test_flat_parameters_are_the_whole_vehicle():
     assert again.to_parameters() == values
     assert again.coupled("derived") == vehicle.coupled("derived")
     assert again.digest == vehicle.digest != "" == load_vehicle().digest
-    # What is not given is that of the vehicle by name, and where none is named that of the default one.
+    # Missing values are those of the named vehicle, or of the default vehicle if none is named.
     assert Vehicle.from_parameters({}).to_parameters() == load_vehicle().to_parameters()
     heavier = Vehicle.from_parameters({"vehicle.name": "parker", "vehicle.mass": 5000.0})
     assert heavier.to_parameters() == load_vehicle().to_parameters() | {"vehicle.mass": 5000.0}

@@ -1,4 +1,4 @@
-"""Other structures: the Winged-Cone with the numbers of the literature, and the documented glider, built and flown."""
+"""Other structures: the Winged-Cone with numbers of the literature, and the documented glider, built and flown."""
 
 import os
 import re
@@ -28,7 +28,7 @@ CRUISE = 110_000 * FOOT, 15_060 * FOOT
 
 @pytest.fixture(scope="module")
 def vehicle():
-    """The vehicle's parameters."""
+    """Return the parameters of the vehicle."""
     return load_vehicle("winged_cone").coupled()
 
 
@@ -50,7 +50,7 @@ def test_its_poles_in_cruise_are_those_of_an_unstable_short_period_and_a_slow_ph
 
 
 def test_its_coefficients_at_mach_15_are_the_constant_set_of_the_literature_to_the_printed_digits(vehicle):
-    # Xu, Mirmirani, Ioannou (2004), per dynamic pressure and area. The altitude makes the speed exactly Mach 15.
+    # Xu, Mirmirani, Ioannou (2004), per dynamic pressure and area. At this altitude the speed is exactly Mach 15.
     altitude = CRUISE[0]
     feet = altitude / FOOT
     speed = 15.0 * FOOT * (8.99e-9 * feet**2 - 9.16e-4 * feet + 996.0)
@@ -98,7 +98,7 @@ def test_its_flight_has_no_metric_of_modes_and_stays_in_the_certified_tube():
     assert not any(name.startswith("elastic") for name in flight.metrics)
     limits = load_scenario("winged_cone").limits
     assert all(abs(flight.metrics[name]) <= limit for name, limit in limits.items())
-    # Without a notch filter, the set is one of the five rigid states alone.
+    # Without a notch filter, the set has only the five rigid-body states.
     monitored = [step.diagnostics for step in islice(steps(parts), 1000)]
     assert all(found.status is TubeStatusCode.OK and len(found.error) == 5 for found in monitored)
     assert 0.0 < max(found.level for found in monitored) < 0.02

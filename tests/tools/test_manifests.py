@@ -1,4 +1,4 @@
-"""The manifests of the packages say what the packages import, and changelogs and versions go with them."""
+"""The manifests declare what the packages import, and agree with changelogs and versions."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ ROOT = Path(__file__).parents[2]
 
 
 def manifests(root):
-    """Return the manifest of every package of a checkout."""
+    """Return the manifests of all packages of a checkout."""
     return sorted([*root.glob("src/*/package.xml"), *root.glob("ros_ws/src/hsv_*/package.xml")])
 
 
 MANIFESTS = manifests(ROOT)
 DISTRIBUTION = {"cffi": "1.16.0", "jinja2": "3.1.2", "numpy": "1.26.4", "rich": "13.7.1", "yaml": "6.0.1"}
-"""Versions of Ubuntu 24.04 by imported module; a module that is too old there has no rosdep key in the manifests."""
+"""Versions in Ubuntu 24.04 by imported module. A module that is too old there gets no rosdep key in the manifests."""
 
 KEYS = {name: f"python3-{name}" for name in DISTRIBUTION}
-"""By imported module: its key in rosdep."""
+"""rosdep keys by imported module."""
 
 WITHOUT_KEY = {"clarabel", "control", "cvxpy", "distributed", "fmpy", "foxglove", "gymnasium", "lz4", "markupsafe"}
 WITHOUT_KEY |= {"matplotlib", "mcap", "pandas", "pint", "piqp", "pyarrow", "pydantic", "rosbags", "scipy", "tomli_w"}
 WITHOUT_KEY |= {"typer", "websockets", "zstandard"}
-"""Modules for which rosdep has no key of a Debian package that will do; see docs/installation.md."""
+"""Modules for which no rosdep key names a suitable Debian package; see docs/installation.md."""
 
 
 def imported(folder):
-    """Return the modules outside the standard library that a package imports, without its own."""
+    """Return the modules that a package imports from outside the standard library and itself."""
     found = set()
     for path in folder.rglob("*.py"):
         if path.name == "setup.py" or path.parent == folder / "test":
@@ -112,7 +112,7 @@ def test_all_packages_have_one_version_which_the_library_and_the_citation_say():
 
 @pytest.fixture
 def checkout(tmp_path):
-    """A copy of the files that a release changes, with something in every changelog to release."""
+    """Return a copy of the files that a release changes, with an entry to release in every changelog."""
     for manifest in manifests(ROOT):
         folder = tmp_path / manifest.parent.relative_to(ROOT)
         folder.mkdir(parents=True)

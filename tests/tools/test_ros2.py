@@ -1,4 +1,4 @@
-"""The ros2 replacement against a small installation made by the test."""
+"""The replacement of the ros2 command, with a small installation made by the test."""
 
 import os
 import signal
@@ -13,7 +13,7 @@ ROS2 = Path(__file__).parents[2] / "tools" / "ros2.py"
 
 @pytest.fixture
 def prefix(tmp_path):
-    """An installation prefix with the packages alpha (two executables) and beta (none)."""
+    """Return an installation prefix with the packages alpha (two executables) and beta (none)."""
     root = tmp_path / "install"
     index = root / "share/ament_index/resource_index/packages"
     index.mkdir(parents=True)

@@ -1,4 +1,4 @@
-"""The set-up: what it asks of the machine, when it has something to do; and env.sh in real shells."""
+"""The set-up: its requirements on the machine, when it must act; and env.sh in real shells."""
 
 import os
 import shutil
@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2].resolve()
 
 @pytest.fixture
 def here(tmp_path, monkeypatch):
-    """A checkout with a package of each kind, and its logs."""
+    """Return a checkout with one package of each kind, and the log of the set-up's actions."""
     monkeypatch.setattr(setup, "ROOT", tmp_path)
     monkeypatch.setattr(setup, "LOG", tmp_path / "log")
     for name in ("setup.py", "package.xml", "flyer/__init__.py", "flyer/table.toml", "flyer/core/core.h"):
@@ -136,7 +136,7 @@ def test_what_the_user_has_set_stays(name):
     assert shell(name, script, HOME="/tmp").stdout == f"LOCALHOST {ROOT}/offline_design none\n"
     mine = shell(name, script, HOME="/tmp", ROS_AUTOMATIC_DISCOVERY_RANGE="SUBNET", HSV_DESIGN_PATH="/mine")
     assert mine.stdout == "SUBNET /mine none\n"
-    # Without a home the logs of nodes have a place in the checkout.
+    # Without a home directory, nodes write their logs to a folder of the checkout.
     assert shell(name, f"source '{ROOT}/env.sh'; echo $ROS_LOG_DIR").stdout == f"{ROOT}/ros_ws/log/nodes\n"
 
 

@@ -1,4 +1,4 @@
-"""The documentation's generated reference has every command, message and package."""
+"""The documentation's generated reference lists every command, message and package."""
 
 import pkgutil
 import re
@@ -34,7 +34,7 @@ def test_every_command_has_a_section_with_all_its_options():
 def test_every_package_and_module_of_the_library_is_on_its_page():
     page = (ROOT / "docs" / "reference" / "modules.md").read_text(encoding="utf-8")
     listed = re.findall(r"^   (hsv\.\w+)$", page, re.MULTILINE)
-    # The package's own names have another page.
+    # The package's own names are documented on another page.
     there = {f"hsv.{module.name}" for module in pkgutil.iter_modules(hsv.__path__)} - {"hsv.api"}
     assert {*listed} == there and len(listed) == len(there)
     assert "hsv.design.sets.invariant_set" in site_pages.modules_of("hsv.design")

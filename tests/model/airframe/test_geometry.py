@@ -1,4 +1,4 @@
-"""The airframe: its published geometry, bending modes and frames of the bent body."""
+"""The airframe: published geometry, bending modes, and frames of the deformed body."""
 
 import math
 from collections import Counter
@@ -14,7 +14,7 @@ from hsv.model.vehicle import load_vehicle
 
 
 def composed(sample, root=LEVEL, exaggeration=None):
-    """Return the transforms of all frames below ``root`` relative to it."""
+    """Return the transforms of all frames below ``root`` relative to ``root``."""
     found = {root: Transform(root, root)}
     for own in transforms(sample, exaggeration):
         if outer := found.get(own.parent):
@@ -33,7 +33,7 @@ def test_lengths_add_up_to_the_published_hundred_feet():
 
 
 def test_angles_close_the_body_at_the_tail():
-    # Published as an angle of its own, 14.41 deg, which the other numbers leave no choice of.
+    # The published angle, 14.41 deg, also follows from the other numbers.
     frame = airframe()
     ramp = math.atan2(frame.tail[1] - frame.engine_roof, frame.nozzle_ramp) - frame.upper_surface_angle
     assert math.degrees(ramp) == pytest.approx(14.41, abs=0.005)
@@ -50,7 +50,7 @@ def beam(request):
 def test_eigenvalue_is_that_of_the_tables_and_a_root_to_the_last_digits():
     # Blevins, Formulas for Natural Frequency and Mode Shape, table 8-1.
     assert pytest.approx(1.87510407, abs=5e-9) == EIGENVALUE
-    # The slope there is -4.1: an error of 4e-15, rounding included, is a residual of 1.6e-14.
+    # The slope there is -4.1: an error of 4e-15, including rounding, gives a residual of 1.6e-14.
     assert abs(1.0 + np.cos(EIGENVALUE) * np.cosh(EIGENVALUE)) < 1.6e-14
 
 
@@ -62,7 +62,7 @@ def test_modal_mass_is_one(beam):
 
 @pytest.mark.parametrize("mode", [0, 1])
 def test_its_angular_momentum_is_the_derived_coupling(mode):
-    # I q' = M + psi eta'', and what bends upward has the angular momentum int m x w': psi = -int m x phi, x forward.
+    # I q' = M + psi eta''. Upward bending has the angular momentum int m x w', so psi = -int m x phi, x forward.
     beam = Cantilever(LENGTHS[mode], 3.0 * SLUG / FOOT)
     x, weights = np.polynomial.legendre.leggauss(40)
     distance = 0.5 * beam.length * (x + 1.0)
@@ -89,7 +89,7 @@ LEVEL_FLIGHT = Sample(0.02, 0.03, 1.1, 0.9, 0.5, 0.2)
 
 
 def ends(frames, name):
-    """Return the joints of a chain in the frame of the others: where each segment begins, and where the last ends."""
+    """Return the joints of a chain in the root frame: where each segment begins, and where the last one ends."""
     stations = segments(airframe())[name]
     chain = [frames[f"{name}_{number}"] for number in range(1, len(stations))]
     last, length = chain[-1], stations[-1] - stations[-2]
@@ -113,7 +113,7 @@ def test_pitch_path_and_angle_of_attack_are_the_vehicles():
     assert frames[BODY].pitch == 0.03
     assert frames[BODY].pitch - frames[FLIGHT_PATH].pitch == pytest.approx(0.02, rel=1e-12)
     x, y, z, w = frames[BODY].quaternion
-    # In the frames of ROS, y to the left, nose up turns about -y: the nose, on x, rises.
+    # In ROS frames y points left, so nose up is a rotation about -y: the nose, on x, rises.
     nose = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)])
     np.testing.assert_allclose(nose, [math.cos(0.03), 0.0, math.sin(0.03)], atol=1e-15)
 
@@ -125,6 +125,6 @@ def test_positive_elevator_is_trailing_edge_down(deflection):
     trailing_edge = elevator.z - 0.5 * airframe().elevator_chord * math.sin(elevator.pitch)
     assert np.sign(trailing_edge - elevator.z) == -np.sign(deflection)
     assert (elevator.x, elevator.z) == pytest.approx(airframe().elevator_hinge)
-    # The published lift by elevator is positive and its moment negative: a surface behind, deflected down.
+    # Published lift due to elevator is positive, its moment negative: the surface is aft and deflected down.
     vehicle = load_vehicle().decoupled
     assert vehicle.lift_elevator > 0.0 > vehicle.moment_elevator and elevator.x < 0.0

@@ -1,4 +1,4 @@
-"""Faults of actuators and effectors against their formulas, on every substep."""
+"""Faults of actuators and effectors compared with their formulas on every substep."""
 
 import math
 
@@ -29,7 +29,7 @@ def elevator(kind, **parameters):
 
 
 def flown(faults, commands=WAVE, actuator=None):
-    """Return what the elevator does on every substep, and its actuator's states."""
+    """Return the deflections of the elevator and the states of its actuator on every substep."""
     data = actuator_data(actuator or {}, VEHICLE, T)
     rows = fault_rows([DYNAMICS, EFFECTOR], [row if len(row) == 3 else (*row, NEVER) for row in faults], T)
     effector, state, deflections, states = TRIM.copy(), actuators_at_rest(TRIM), [], []

@@ -37,7 +37,7 @@ def test_every_kind_is_told_from_its_start_with_its_parameters(kind):
     fault = Fault.of(channel, kind, given)
     injector = injector_of((fault, 2, 4))
     flown = [injector.step(step, COMMAND) for step in range(5)]
-    # A sensor is told of its fault with the step before its measurement.
+    # A sensor fault is announced one step before the measurement on which it acts.
     first = 1 if FAULT_KINDS[kind].side == "sensor" else 2
     assert [bool(result.active) for result in flown] == [first <= step < first + 2 for step in range(5)]
     assert flown[2].active == active((fault, 2))

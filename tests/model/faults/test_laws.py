@@ -1,4 +1,4 @@
-"""Faults on the command and on the engine: their formulas, when they act, how they are composed, what is refused."""
+"""Faults of the command and of the engine: formulas, times of action, composition, and refused values."""
 
 import itertools
 import math
@@ -33,7 +33,7 @@ def elevator(kind, **parameters):
 
 
 def flown(faults, commands, seed=0):
-    """Return what becomes of the elevator's commands, of faults with their first step and the one without."""
+    """Return the elevator commands after faults, each given with its first step and perhaps its end."""
     rows = fault_rows([COMMAND], [row if len(row) == 3 else (*row, NEVER) for row in faults], T)
     actuator = np.array([command_faults(rows, k, seed, [0.4, command]) for k, command in enumerate(commands)])
     assert (actuator[:, 0] == 0.4).all()
@@ -75,7 +75,7 @@ def test_composition_does_not_depend_on_the_order_of_the_list():
     results = [flown(order, WAVE) for order in itertools.islice(itertools.permutations(faults), 0, 120, 17)]
     for result in results[1:]:
         assert_array_equal(result, results[0])
-    # One after the other, by hand.
+    # The same faults applied one after another.
     lost = flown([(faults[2][0], 0), (faults[1][0], 10)], WAVE)
     by_hand = flown([faults[0]], flown([faults[4]], flown([faults[3]], lost)))
     assert_array_equal(results[0], by_hand)
@@ -102,7 +102,7 @@ def test_random_fault_comes_and_goes_as_a_markov_chain():
 
 
 def engine(fault, points, start=0):
-    """Return the engine's factors along (angle of attack, Mach number, fuel)."""
+    """Return the engine's factors at ``points`` (angle of attack, Mach number, fuel), one point per step."""
     rows = fault_rows([ENGINE_SIDE], [(fault, start, NEVER)], T)
     return np.array([engine_faults(rows, k, 0, *point) for k, point in enumerate(points)])
 

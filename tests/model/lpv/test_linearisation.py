@@ -1,4 +1,4 @@
-"""Discretisation, extended models, modes and frequency responses; actuators and delays before the vehicle."""
+"""Discretisation, extended models, modes and frequency responses; actuators and delays in front of the vehicle."""
 
 import numpy as np
 import pytest
@@ -169,7 +169,7 @@ def test_ideal_hardware_leaves_the_held_system_as_it_is(plant):
 
 @pytest.mark.parametrize("delay", [0.003, 0.02, 0.047])
 def test_a_delayed_command_acts_when_it_arrives(plant, delay):
-    """A pulse of a period, delayed, is a step at the delay less a step a period later."""
+    """A delayed pulse of one period is a step at the delay minus a step one period later."""
     A, B = held_behind(*plant, PERIOD, delay=delay)
     x = np.zeros(len(A))
     for k in range(6):

@@ -14,7 +14,7 @@ VELOCITIES = np.linspace(10.0, 20.0, 13)
 
 
 def model(h, v, n=3):
-    """Rank 3 in altitude (1, h, h^2), rank 2 in velocity (1, 1/v), any number of states."""
+    """A function of rank 3 in altitude (1, h, h^2) and rank 2 in velocity (1, 1/v), with n states."""
     rng = np.random.default_rng(7)
     c = rng.normal(size=(4, n, n + 2)) * 0.01
     a, b = h / 200.0 - 1.0, 10.0 / v
@@ -38,7 +38,7 @@ def test_ranks_and_exactness(n):
     for h, v in ((117.3, 10.4), (250.1, 19.7), (300.0, 10.0)):
         A, B = polytope.at(h, v)
         expected_A, expected_B = model(h, v, n)
-        assert_allclose(A, expected_A, atol=2e-6)  # 1 / v between 13 samples
+        assert_allclose(A, expected_A, atol=2e-6)  # error of interpolating 1 / v between 13 samples
         assert_allclose(B, expected_B, atol=2e-6)
 
 
@@ -59,7 +59,7 @@ def test_too_few_samples_are_refused():
 
 def test_polynomial_functions_are_exact_where_the_model_is_a_polynomial():
     def at(h, v):
-        return model(h, 1.0 / (v / 100.0))  # b = 10 / v, so linear in what is given
+        return model(h, 1.0 / (v / 100.0))  # b = 10 / v, so linear in the argument
 
     pairs = [[at(h, v) for v in VELOCITIES] for h in ALTITUDES]
     A, B = np.array([[p[0] for p in row] for row in pairs]), np.array([[p[1] for p in row] for row in pairs])
@@ -83,13 +83,13 @@ def test_weights_are_non_negative_and_sum_to_one_between_breakpoints_too(r):
     between = CubicSpline(BREAKPOINTS, weights)(np.linspace(-1.0, 3.0, 50_001))
     assert between.min() >= -1e-12
     assert_allclose(between.sum(axis=1), 1.0, atol=1e-12)
-    # Close to normal: the curve comes near every vertex.
+    # Close to normal: the weights come near every vertex.
     assert weights.max(axis=0).min() > 0.6
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 6])
 def test_weights_are_interpolated_by_splines_that_are_exact_for_polynomials(count):
-    """A line through two points, a parabola through three, and cubics through more."""
+    """The spline is a line through two points, a parabola through three, and cubic through more."""
     breakpoints, between = np.linspace(-1.0, 3.0, count), np.linspace(-1.0, 3.0, 31)
     powers = np.arange(min(count, 4))
     weights = axis_weights(breakpoints, breakpoints[:, None] ** powers, "cubic")
