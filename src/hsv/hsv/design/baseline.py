@@ -141,10 +141,7 @@ def nominal_problem(inputs: DesignInputs, polytope: Polytope, input_bound: np.nd
 
 
 def nominal_family(inputs: DesignInputs, problem: NominalProblem, progress: Progress) -> list[NominalGain]:
-    """Return one nominal gain for each scale of the design's step, the outermost ellipsoid first.
-
-    Errors are those of :func:`hsv.control.nominal_gain.nested_gains`.
-    """
+    """Return one nominal gain for each scale of the design's step, outermost first; errors as :func:`nested_gains`."""
     deviation = initial_deviation(inputs)
     return nested_gains(
         problem,
@@ -188,10 +185,7 @@ def disturbance_columns(inputs: DesignInputs) -> np.ndarray:
 
 
 def _literal(inputs: DesignInputs, bounds: TightenedInputs) -> DesignInputs:
-    """Return ``inputs`` with the largest bound of |u_n| (eq. 35) that fits into ``bounds`` (eq. 30) about the trim.
-
-    The trim input is that of the target.
-    """
+    """Return ``inputs`` with the largest bound of |u_n| (eq. 35) that ``bounds`` (eq. 30) allow about the target trim."""
     target = inputs.nominal.target
     bound = bounds.symmetric(trim(inputs.flown_vehicle.decoupled, target.altitude, target.velocity).input)
     if not bound.min() > 0.0:

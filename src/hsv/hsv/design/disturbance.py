@@ -65,10 +65,7 @@ ACCELERATED, REMAINING = [1, 2, 4], [0, 3]
 
 
 def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
-    """Return the change (5, 3) of the rigid states over ``period`` (s) by a unit of each of the acceleration channels.
-
-    The accelerations are held over the period; the vehicle is linearised at mid-envelope.
-    """
+    """Return the change (5, 3) of the rigid states by unit accelerations held over ``period`` (s), at mid-envelope."""
     A, _ = linearise(vehicle.decoupled, *vehicle.centre)
     unit = np.zeros((N_RIGID, 3))
     unit[ACCELERATED, [0, 1, 2]] = 1.0

@@ -180,10 +180,7 @@ _SEARCHES: dict[str, Callable[..., Found]] = {"guaranteed_cost": _guaranteed_cos
 
 @dataclass(frozen=True)
 class CommonLyapunov:
-    """A Lyapunov function e' N^-1 e of r closed loops: ``N`` (n, n), SI, and its ``residuals`` (r).
-
-    The residuals are those of :func:`lyapunov_residuals`.
-    """
+    """A Lyapunov function e' N^-1 e of r loops: ``N`` (n, n), SI; ``residuals`` (r) from :func:`lyapunov_residuals`."""
 
     N: np.ndarray
     residuals: np.ndarray

@@ -27,7 +27,7 @@ from hsv.model.signals import N_RIGID
 from hsv.model.vehicle import Vehicle, load_vehicle
 
 _SI = "SI"
-"""Validation context of tables that hold plain numbers in SI, as a certificate does."""
+"""Validation context of tables whose quantities are plain numbers in SI, as in a certificate."""
 
 
 def _quantity(unit: str) -> BeforeValidator:
@@ -62,12 +62,12 @@ _Model = TypeVar("_Model", bound=_Table)
 
 class _Sizes(_Table):
     def array(self) -> np.ndarray:
-        """Return the sizes in the order of the fields, SI."""
+        """Return the values in the order of the fields, SI."""
         return np.array(list(self.model_dump().values()), float)
 
 
 class RigidScale(_Sizes):
-    """Sizes of the five rigid states that count as equal."""
+    """Scales of the five rigid states: deviations that weigh equally."""
 
     altitude: Length = Positive
     velocity: Speed = Positive
@@ -77,7 +77,7 @@ class RigidScale(_Sizes):
 
 
 class InputSize(_Sizes):
-    """Sizes of the two inputs."""
+    """Scales or bounds of the two inputs."""
 
     fuel_equivalence_ratio: Number = Positive
     elevator_deflection: Angle = Positive
@@ -91,7 +91,7 @@ class FlightPoint(_Table):
 
 
 class StateScale(RigidScale):
-    """Scales of all nine states."""
+    """Scales of all nine states: deviations that weigh equally."""
 
     elastic_coordinate_1: ElasticCoordinate = Positive
     elastic_rate_1: ElasticRate = Positive
@@ -100,35 +100,38 @@ class StateScale(RigidScale):
 
 
 class FilterScale(_Sizes):
-    """Sizes of the two states of a section of the notch filter that count as equal to those of the vehicle."""
+    """Scales of the two states of each section of the notch filter: deviations that weigh as those of the vehicle."""
 
     state_1: Angle = Positive
     state_2: AngleTime = Positive
 
 
 class GridInputs(_Table):
-    """Vertices at grid points over the envelope, with bilinear weights."""
+    """Numbers of vertices of a model on a grid over the envelope, with bilinear weights."""
 
     altitude_vertices: int = Field(ge=2, le=20)
     velocity_vertices: int = Field(ge=2, le=20)
 
 
 class TensorProductInputs(_Table):
-    """Vertices by the tensor-product model transformation: ranks by ``tolerance``, relative, over the scales."""
+    """Options of the tensor-product model transformation; ``tolerance``: least relative singular value that is kept."""
 
     functions: Literal["singular", "polynomial"] = "singular"
-    """Functions that span the model at these ranks, see :func:`hsv.model.lpv.tensor_product.tensor_product`."""
+    """Basis functions of the weights, see :func:`hsv.model.lpv.tensor_product.tensor_product`."""
     tolerance: Number = Field(gt=0.0, lt=1.0)
     altitude_samples: int = Field(ge=5, le=100)
     velocity_samples: int = Field(ge=5, le=100)
     state_scale: StateScale
     input_scale: InputSize
     filter_scale: FilterScale | None = None
-    """Scales of the model with the notch filter in it."""
+    """Scales of the filter states of the ECM; None for the DM, which has no filter."""
 
 
 class ModelInputs(_Table):
-    """The polytopic model over the envelope: of the decoupled vehicle (paper eq. 12), or with its filter (eq. 45)."""
+    """The polytopic model over the envelope.
+
+    ``system``: "DM", the decoupled vehicle (paper eq. 12), or "ECM", the decoupled vehicle with its filter (eq. 45).
+    """
 
     system: Literal["DM", "ECM"] = "DM"
     period: Duration = Positive
@@ -148,7 +151,7 @@ class FeedbackDisturbance(_Table):
 
 
 class FeedbackInputs(_Table):
-    """The feedback gain F (paper eq. 24)."""
+    """Inputs of the feedback gain F (paper eq. 24)."""
 
     method: Literal["guaranteed_cost", "feasibility"]
     state_scale: RigidScale
@@ -157,10 +160,10 @@ class FeedbackInputs(_Table):
 
 
 class NominalInputs(_Table):
-    """The nominal gains K (paper eq. 32 to eq. 35): one for each of ``scales`` times ``start`` to ``target``."""
+    """Inputs of the nominal gains K (paper eq. 32 to eq. 35): one gain for each of ``scales`` times the design's step."""
 
     interpolated: bool | None = None
-    """Whether the gain is interpolated between two ellipsoids; none: it is switched"""
+    """True: the gain is interpolated between two ellipsoids. False or None: it is switched."""
 
     start: FlightPoint
     target: FlightPoint
@@ -171,7 +174,7 @@ class NominalInputs(_Table):
 
 
 class NotchInputs(_Table):
-    """One section of the notch filter that the design is meant for (paper eq. 38)."""
+    """One section of the notch filter for which the design is made (paper eq. 38)."""
 
     zero_frequency: AngularRate = Positive
     zero_damping: Number = Field(ge=0.0)
@@ -180,9 +183,9 @@ class NotchInputs(_Table):
 
 
 class RampInputs(_Table):
-    """When the commands leave the start, and when they reach the target.
+    """A ramp of the commands, which leave the start at time ``start`` and reach the target at time ``end``.
 
-    ``blend``: half the time in which the rate changes at either corner; none: at once.
+    ``blend``: half the time in which the rate changes at each of the two corners; None: the rate jumps.
     """
 
     start: Duration = Field(ge=0.0)
@@ -199,7 +202,7 @@ class RampInputs(_Table):
 
 
 def _coupling(value: Any) -> Any:
-    """Return a multiple of the derived coupling as text; a name is returned unchanged."""
+    """Return ``value`` as text if it is a number, a multiple of the derived coupling; else return it unchanged."""
     try:
         return value if isinstance(value, bool) else repr(float(value))
     except (TypeError, ValueError):
@@ -207,28 +210,28 @@ def _coupling(value: Any) -> Any:
 
 
 class DisturbanceInputs(_Table):
-    """The region over which disturbances are measured (paper eq. 13 to eq. 19): the nominal step, every corner."""
+    """The flights in which disturbances are measured (paper eq. 13 to eq. 19): the nominal step, with a fault."""
 
     coupling: Annotated[str, BeforeValidator(_coupling)]
-    """A set of inertial coupling of the vehicle, or a multiple of the derived one"""
+    """Name of a set of inertial coupling of the vehicle, or a multiple of the derived coupling."""
     duration: Duration = Positive
     elevator_effectiveness: Number = Field(gt=0.0, lt=1.0)
     fault_start: Duration = Positive
     inflation: Number = Field(ge=1.0)
-    """Factor on everything measured."""
+    """Factor on all measured bounds."""
     share: Number = Field(gt=0.0, le=1.0)
     """Share of the inflated set that the invariant set is certified for."""
     ramp: RampInputs | None = None
-    """The commands go from the nominal start to its target on a ramp; without it, in a step at t = 0."""
+    """Ramp of the commands from the nominal start to the target; None: a step at t = 0."""
 
 
 class InvariantSetInputs(_Table):
-    """Inputs of the invariant set (paper eq. 25 to eq. 28): the weights of its size."""
+    """Inputs of the invariant set (paper eq. 25 to eq. 28); the scales weigh its half-widths and its feedback."""
 
     method: Literal["ellipsoid", "star_norms"]
-    """"star_norms": the ellipsoid, and for half-widths and feedback an ellipsoid for each output and disturbance."""
+    """"ellipsoid": one for all disturbances. "star_norms": in addition one for each output and disturbance channel."""
     contraction: list[Annotated[float, Field(gt=0.0, lt=1.0)]] = Field(min_length=1, max_length=20)
-    """Multipliers of the S-procedure to try."""
+    """Values of the multiplier lam of the S-procedure to try for the ellipsoid."""
     state_scale: RigidScale
     input_scale: InputSize
 
@@ -237,11 +240,11 @@ class TighteningInputs(_Table):
     """Inputs for the bounds of the nominal input (paper eq. 30 and 35)."""
 
     chain: Literal["design_bounds", "literal"]
-    """"literal": the bounds of (35) are those that (30) leaves; "design_bounds": as given, the plan checked by (30)."""
+    """"literal": the bounds in (35) follow from (30). "design_bounds": they are inputs, and (30) checks the plan."""
 
 
 class AdjustableInputs(_Table):
-    """The adjustable factor (paper section 4.3): one value, or one for each of the five rigid states."""
+    """The tube factor tau (paper section 4.3): one value, or one for each of the five rigid states."""
 
     tau: Annotated[list[Number], BeforeValidator(lambda tau: tau if isinstance(tau, list) else [tau])] = Field(
         min_length=1
@@ -255,14 +258,14 @@ class AdjustableInputs(_Table):
         return tau
 
     def array(self) -> np.ndarray:
-        """Return the factors (5)."""
+        """Return the factors (5), one for each rigid state."""
         return np.full(N_RIGID, self.tau[0]) if len(self.tau) == 1 else np.array(self.tau)
 
 
 class ActuatorInputs(_Table):
-    """The actuators of the design by name; a channel without one is ideal.
+    """Names of the actuators that the design includes; None: an ideal actuator.
 
-    Their dynamics become states of the error system. Their stops are taken to be those of the vehicle.
+    Their dynamics add states to the error system. Their position is limited by the stops of the vehicle only.
     """
 
     fuel_equivalence_ratio: str | None = None
@@ -277,7 +280,7 @@ class ActuatorInputs(_Table):
         return name
 
     def names(self) -> tuple[str, ...]:
-        """Return the names of the actuators, in the order of the channels."""
+        """Return the names of the actuators that are not ideal, in the order of the inputs."""
         return tuple(name for name in (self.fuel_equivalence_ratio, self.elevator_deflection) if name)
 
 
@@ -286,7 +289,7 @@ def _vehicle_values(vehicle: Vehicle | None) -> dict[str, Any] | None:
 
 
 def _vehicle(value: Any, info: ValidationInfo) -> Vehicle | None:
-    """Return the vehicle that a file names; nothing for the default one, which old designs do not name."""
+    """Return the vehicle of a name, a path or (SI) a table; None for the default one, which old designs do not name."""
     if info.context == _SI:
         return Vehicle.from_parameters(value)
     if not isinstance(value, str):
@@ -296,14 +299,14 @@ def _vehicle(value: Any, info: ValidationInfo) -> Vehicle | None:
 
 
 class DesignInputs(_Table):
-    """All inputs of a design, SI after reading; with ``adjustable`` it is that of the paper's section 4."""
+    """All inputs of a design, in SI: with ``adjustable`` that of the paper's section 4, else that of section 3."""
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
     description: str
     vehicle: Annotated[Vehicle | None, BeforeValidator(_vehicle), PlainSerializer(_vehicle_values)] = None
-    """Registered name, or the path of a file; none: the default one"""
+    """The vehicle, in a file given by its registered name or a path; None: the default vehicle."""
     model: ModelInputs
     actuator: ActuatorInputs | None = None
     notch: list[NotchInputs] = Field(default=[], max_length=4)
@@ -326,18 +329,19 @@ class DesignInputs(_Table):
 
     @property
     def actuators(self) -> tuple[str, ...]:
-        """Names of the actuators of the design."""
+        """Names of the actuators of the design that are not ideal."""
         return self.actuator.names() if self.actuator else ()
 
     @property
     def flown_vehicle(self) -> Vehicle:
-        """The vehicle that the design is for."""
+        """The vehicle for which the design is made."""
         return self.vehicle or load_vehicle()
 
     def error_scale(self) -> np.ndarray:
-        """Return sizes (5 + 2 s) of the errors of rigid states and s filter sections that count as equal, SI.
+        """Return the scales (5 + 2 s) of the errors of the rigid states and of s filter sections, SI.
 
-        Those that F is found with; a state of the filter counts as much as the pitch rate that excites it at the notch.
+        Those of the rigid states are the scales of F. The two states of a section have the scale of the pitch rate
+        divided by the pole frequency and by its square: the amplitudes that this rate excites there, roughly.
         """
         rigid = self.feedback.state_scale.array()
         filters = [rigid[-1] / section.pole_frequency**power for section in self.notch for power in (1, 2)]
@@ -345,7 +349,7 @@ class DesignInputs(_Table):
 
 
 def parse_inputs(table: dict[str, Any]) -> DesignInputs:
-    """Return the design inputs in a table as TOML gives it, with units.
+    """Return the design inputs in a ``table`` read from TOML, with quantities as texts with units.
 
     Raises:
         DesignError: A field that is missing, unknown or has a wrong value; the message names it.
@@ -354,7 +358,7 @@ def parse_inputs(table: dict[str, Any]) -> DesignInputs:
 
 
 def inputs_from_report(table: dict[str, Any]) -> DesignInputs:
-    """Return the design inputs that ``DesignInputs.model_dump`` wrote: plain numbers, SI; errors as above."""
+    """Return the design inputs in a certificate's ``table``: plain numbers, SI; errors as in :func:`parse_inputs`."""
     return _validated(DesignInputs, table, "inputs: ", _SI)
 
 
@@ -366,10 +370,10 @@ def _validated(model: type[_Model], table: dict[str, Any], prefix: str = "", con
 
 
 def read_inputs(path: Path) -> DesignInputs:
-    """Return the design inputs in a TOML file.
+    """Return the design inputs in a TOML file and the files that it extends.
 
     Raises:
-        DesignError: The file is missing or is not TOML, or a field is wrong.
+        DesignError: A file is missing or is not TOML, or a field is wrong.
     """
     table = follow_extends(str(path), _read, lambda name, why: DesignError(f"{name}: {why}"))
     try:
@@ -391,10 +395,10 @@ def _read(name: str) -> dict[str, Any]:
 
 
 def with_tau(inputs: DesignInputs, tau: list[float]) -> DesignInputs:
-    """Return ``inputs`` with another adjustable factor: one value, or one for each rigid state.
+    """Return ``inputs`` with another tube factor ``tau``: one value, or one for each of the five rigid states.
 
     Raises:
-        DesignError: The design has no adjustable factor, or the value is wrong.
+        DesignError: The design is not adjustable, or the value is wrong.
     """
     if inputs.adjustable is None:
         raise DesignError(f"design {inputs.name!r}: tau = {tau} given, expected a design with an [adjustable] table")
@@ -402,10 +406,10 @@ def with_tau(inputs: DesignInputs, tau: list[float]) -> DesignInputs:
 
 
 def find_inputs(name: str) -> Path:
-    """Return the design TOML given by path, or by name: in ``HSV_DESIGN_PATH``, or a shipped one.
+    """Return the path of a TOML file of design inputs: a path, or a name in ``HSV_DESIGN_PATH`` or of a shipped design.
 
     Raises:
-        DesignError: No such file.
+        DesignError: There is no such file.
     """
     return find_file(name, ".toml")
 
@@ -414,9 +418,9 @@ def _first_line(error: ValidationError, table: dict[str, Any]) -> str:
     first = error.errors()[0]
     cause = first.get("ctx", {}).get("error")
     if not first["loc"]:
-        return str(cause)  # of the inputs as a whole: the field is named
+        return str(cause)  # an error of the inputs as a whole names its field
     *parents, leaf = (str(part) for part in first["loc"])
-    if isinstance(cause, ValueError):  # parse_quantity has named the field, not the tables it is in
+    if isinstance(cause, ValueError):  # the message names the field, but not the tables that contain it
         return ".".join((*(parents[:-1] if leaf.isdigit() else parents), str(cause)))
     field = ".".join((*parents, leaf))
     if first["type"] == "missing":

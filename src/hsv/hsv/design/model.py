@@ -1,11 +1,11 @@
 """The polytopic model of a design (paper eq. 10 to eq. 12, eq. 45) and its accuracy between the samples.
 
-The decoupled vehicle, linearised in its trims over altitude and velocity p and sampled with held inputs, is a convex
-combination of vertices, with weights that are products of those of altitude and of velocity:
+The decoupled vehicle is linearised at its trims over p, altitude and velocity, and discretised with held inputs. The
+model is a convex combination of vertices:
 
     x(k+1) = A(p) x(k) + B(p) u(k),   [A(p), B(p)] = sum_i w_i(p) [A_i, B_i],   w_i >= 0, sum_i w_i = 1       (11), (12)
 
-(45) is the same of the vehicle with its notch filter.
+Each weight is a product of a weight in altitude and one in velocity. (45) is the model of the vehicle with its filter.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from hsv.model.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class DesignModel:
-    """The model as it was found, its vertices as a design file keeps them, and the evidence for it (ready for JSON).
+    """The polytopic model of a design as computed (``found``), and a ``report`` on it, ready for JSON.
 
-    ``polytope``: nine states, as it flies. ``whole``: the same; for the ECM with the filtered pitch rate in place of
-    the true one, and the filter's states after the nine.
+    ``polytope``: the rounded vertices of the design file, for the nine states of the vehicle. ``whole``: the same for
+    the DM; for the ECM the filtered pitch rate takes the place of the true one, and the filter states follow the nine.
     """
 
     found: polytopic.PolytopicModel
@@ -42,7 +42,7 @@ class DesignModel:
 
 
 def state_scale(inputs: ModelInputs, notch: Sequence[NotchSection]) -> np.ndarray:
-    """Return the sizes (n) of the model's states that count as equal, SI.
+    """Return the scales (n) of the states of the model, SI: of the nine states, and for the ECM of the filter states.
 
     Raises:
         DesignError: The scales of the filter are missing.
@@ -56,15 +56,15 @@ def state_scale(inputs: ModelInputs, notch: Sequence[NotchSection]) -> np.ndarra
 
 
 def polytopic_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[NotchSection] = ()) -> DesignModel:
-    """Return the polytopic model of ``vehicle``, decoupled, over the envelope (paper eq. 12, eq. 45).
+    """Return the polytopic model of the decoupled ``vehicle`` over its envelope (paper eq. 12, eq. 45).
 
     Args:
         inputs: Inputs of the model.
-        vehicle: Its inertial coupling is left out.
-        notch: The filter that is a part of the ECM.
+        vehicle: The vehicle; its inertial coupling is ignored.
+        notch: Sections of the notch filter; used for the ECM only.
 
     Raises:
-        DesignError: Too few samples for the tolerance, no hull, or scales that are missing.
+        DesignError: Too few samples for the tolerance, no convex hull of the weights, or missing scales.
     """
     grid, options, extended = inputs.grid, inputs.tensor_product, inputs.system == "ECM"
     scales = state_scale(inputs, notch), options.input_scale.array()
@@ -84,14 +84,14 @@ def polytopic_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[Notch
 
 
 def design_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[NotchSection] = ()) -> DesignModel:
-    """Return :func:`polytopic_model` with its accuracy between the samples in the report."""
+    """Return the result of :func:`polytopic_model`, with the accuracy between the samples added to the report."""
     model = polytopic_model(inputs, vehicle, notch)
     scales = state_scale(inputs, notch), inputs.tensor_product.input_scale.array()
     return replace(model, report=model.report | {"accuracy": model.found.accuracy(model.whole, scales)})
 
 
 def _rounded(polytope: Polytope, state_scale: np.ndarray, input_scale: np.ndarray) -> Polytope:
-    """Return the vertices rounded to the digits on which processors agree; rounding noise becomes zero."""
+    """Return the vertices rounded to :data:`VERTEX_DIGITS` digits below the scales; rounding noise becomes zero."""
     A = rounded(polytope.A, state_scale[:, None] / state_scale, VERTEX_DIGITS)
     B = rounded(polytope.B, state_scale[:, None] / input_scale, VERTEX_DIGITS)
     return Polytope(A, B, polytope.altitude, polytope.velocity)

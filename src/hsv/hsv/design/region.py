@@ -1,9 +1,9 @@
 """The declared region of a design: the flights over which its disturbances are measured (paper eq. 17, eq. 19, eq. 47).
 
-    W = {Delta: lower <= Delta <= upper in all flights},   W'(tau): the same with tau times the fault and the bounds.
+    W = {Delta: lower <= Delta <= upper in all flights},   W'(tau): the same with tau times fault and parameter bounds.
 
-The flights are simulated with the real closed loop: the coupled vehicle, the notch filter, the design's own gains, the
-step from the design's start to its target, the fault; parameters nominal and at every corner of their bounds.
+The flights are simulated with the full closed loop: the coupled vehicle, the notch filter, the gains of the design, its
+step or ramp from start to target, and the fault. The parameters are nominal or at the corners of their bounds.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ Result = TypeVar("Result")
 
 
 def incomplete_share(inputs: DesignInputs) -> float:
-    """Return the fraction of fault and parameter bounds covered by W' (paper eq. 47): tau, or 1 if there is none.
+    """Return the share of the fault and of the parameter bounds that W' covers (paper eq. 47): tau, or 1 without tau.
 
-    Of a diagonal tau it is the largest factor, which gives the largest set.
+    If tau differs between the rigid states, the largest factor is returned, which gives the largest set.
     """
     return float(max(inputs.adjustable.tau)) if inputs.adjustable else 1.0
 
 
 class Region:
-    """The flights of a design at corners of its declared region: bounds of fault and parameters times ``share``.
+    """The flights of a design in its declared region: corners of the parameter bounds times ``share``, with the fault.
 
-    The share is that of paper eq. 47. ``equipment``: flat parameters of hardware and air that are not ideal.
+    The share also multiplies the fault (paper eq. 47). ``equipment``: flat parameters of non-ideal hardware and air.
     """
 
     def __init__(
@@ -51,22 +51,22 @@ class Region:
         self._bounds = inputs.flown_vehicle.uncertainty
 
     def corners(self) -> list[dict[str, float]]:
-        """Return the nominal vehicle and every corner of the region."""
+        """Return the parameter changes of the nominal vehicle (none) and of every corner of the region."""
         return corners(self._bounds, self.share)
 
     def screening(self) -> list[Corner]:
-        """Return the nominal vehicle and 32 corners."""
+        """Return the parameter changes of the nominal vehicle (none) and of 32 corners."""
         return screening_corners(self._bounds, self.share)
 
     def fraction(self) -> list[dict[str, float]]:
-        """Return the nominal vehicle and a quarter of the corners."""
+        """Return those of the nominal vehicle and of a quarter of the corners; of fewer than ten parameters, of all."""
         return fraction(self._bounds, self.share)
 
     def fly(self, corner: Corner) -> Flight:
-        """Fly one corner.
+        """Simulate the flight of one corner.
 
         Raises:
-            DesignError: The flight diverged or saturated; no set can be computed from it.
+            DesignError: The flight diverges or saturates an input; no set can be computed from it.
         """
         return _checked(corner, fly(self._parts.perturbed(corner)))
 
@@ -76,12 +76,12 @@ class Region:
         over: Sequence[Corner],
         progress: Callable[[int], None] = lambda done: None,
     ) -> list[Result]:
-        """Return ``job`` of every flight, in order; flights share the lanes of a register and run in threads."""
+        """Simulate the flights of the corners ``over`` and return ``job`` of each, in order; errors as :meth:`fly`."""
         return fly_perturbed(self._parts, over, lambda corner, flight: job(_checked(corner, flight)), progress)
 
 
 def _checked(corner: Corner, flight: Flight) -> Flight:
-    """Refuse a flight from which no set can be computed."""
+    """Return ``flight``, or raise DesignError if it diverged or saturated an input: no set can be computed from it."""
     saturated = np.count_nonzero(np.any(flight.history.command != flight.history.u_unsaturated, axis=1))
     if flight.status is not FlightStatus.FINISHED or saturated:
         raise DesignError(
@@ -93,9 +93,9 @@ def _checked(corner: Corner, flight: Flight) -> Flight:
 
 @dataclass(frozen=True)
 class RegionResult:
-    """Extremes measured over the region: of the channels (7), of f, w, Delta (9 each), of lag feedback (2).
+    """Extremes over a number of ``flights``, SI: ``channels`` (7); ``remainder`` f, ``fault`` w, ``delta`` (9 each).
 
-    The last is the feedback F to the lag of the plan, zero where actuators are ideal.
+    ``lag_feedback`` (2): feedback due to the actuators' lag behind the plan, zero for ideal actuators.
     """
 
     flights: int
@@ -109,7 +109,7 @@ class RegionResult:
 def measure(
     region: Region, model: ChannelModel, over: Sequence[Corner], progress: Callable[[int], None] = lambda done: None
 ) -> RegionResult:
-    """Fly ``over`` and return the extremes of every disturbance (paper eq. 17, eq. 19)."""
+    """Simulate the flights of the corners ``over``; return the extremes of all disturbances (paper eq. 17, eq. 19)."""
 
     def job(flight: Flight) -> list[np.ndarray]:
         s = model.signals(flight)

@@ -1,10 +1,10 @@
-"""Tightened bounds of the nominal input: U minus F Z, per side, with the trim (paper eq. 30, with F' and Z' eq. 53).
+"""Tightened bounds of the total nominal input: U minus F Z (paper eq. 30, with F' and Z' eq. 53).
 
     u_n + u_r in {u: minimum - min F e <= u <= maximum - max F e over e in c + Z}                                   (30)
 
-U is not symmetric about trim and the tube not about zero, so every side has its own bound. The feedback consists of F e
-over c + Z, of a part from filtering the nominal pitch rate, and of the response to the lag of the plan where the design
-knows its actuators.
+U is not symmetric about trim, and the tube c + Z not about zero, so the two sides of an input have different margins.
+The feedback consists of F e over c + Z, of a part due to filtering the nominal pitch rate, and of a part due to the lag
+of the actuators behind the plan, if the design includes actuators.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from hsv.design.sets.invariant_set import InvariantSet
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS
 
 _KEPT_OFF = 0.05
-"""Share of the input ranges of the certified plans; without it the acceleration channel reaches 1.02 of its bound."""
+"""Distance of other plans from the largest inputs of the certified plans, as a share of the ranges of the latter.
+
+Without this distance the acceleration channel reaches 1.02 of its bound."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +33,11 @@ class TightenedInputs:
     upper: np.ndarray
 
     def margins(self, lowest: np.ndarray, highest: np.ndarray) -> np.ndarray:
-        """Return the room (2 inputs, lower and upper side) that a plan between these inputs leaves."""
+        """Return the margins (2 inputs; lower, upper side) of a plan with inputs from ``lowest`` to ``highest`` (2)."""
         return np.stack((lowest - self.lower, self.upper - highest), axis=1)
 
     def symmetric(self, trim_input: np.ndarray) -> np.ndarray:
-        """Return the largest symmetric bound (2) of |u_n| about the trim input, as (35) takes it."""
+        """Return the largest bound (2) of |u_n| for (35): the distance of ``trim_input`` (2) to the nearer bound."""
         return np.minimum(trim_input - self.lower, self.upper - trim_input)
 
 
@@ -44,10 +46,10 @@ def tighten(
 ) -> TightenedInputs:
     """Return U minus F Z (paper eq. 30, eq. 53) for U between ``minimum`` and ``maximum`` (2).
 
-    ``lag``: least and largest feedback (2 each) to the lag of the plan.
+    ``lag``: minimum and maximum (2 each) of the feedback due to the actuators' lag behind the plan; None: no lag.
 
     Raises:
-        DesignError: Nothing is left of an input.
+        DesignError: The feedback needs the whole range of an input.
     """
     bounds = left_by(found, minimum, maximum, lag)
     for name, unit, low, high in zip(INPUT_NAMES, INPUT_UNITS, bounds.lower, bounds.upper, strict=True):
@@ -62,7 +64,7 @@ def tighten(
 def left_by(
     found: InvariantSet, minimum: np.ndarray, maximum: np.ndarray, lag: tuple[np.ndarray, np.ndarray] | None = None
 ) -> TightenedInputs:
-    """Return U minus F Z, even if it is empty; arguments as for :func:`tighten`."""
+    """Return U minus F Z without checking that it is not empty; the arguments are those of :func:`tighten`."""
     system, disturbance = found.problem.system, found.problem.disturbance
     middle = system.F @ found.centre + system.F_d @ disturbance.centre
     half = found.feedback + np.abs(system.F_d) @ disturbance.half_width
@@ -71,15 +73,16 @@ def left_by(
 
 
 def plan_bounds(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray) -> PlanBounds:
-    """Return bounds for another nominal plan within which the disturbance set should hold; flights have to show it.
+    """Return bounds of other nominal plans, within which the disturbance set should hold; flights have to confirm it.
 
-    Another plan may hold for a long time inputs that the certified plans only touch. It therefore stays below their
-    largest inputs, and may go as far below their smallest ones. The pitch acceleration has their bounds.
+    Another plan may hold an input for a long time that the certified plans reach only briefly. Its input ranges are
+    therefore those of the certified plans, moved down by 5 % of their widths. The pitch acceleration has the range of
+    the certified plans.
 
     Args:
         bounds: The tightened bounds.
-        lowest: (3) least u_n + u_r and pitch acceleration of the certified plans.
-        highest: (3) the largest.
+        lowest: (3) smallest u_n + u_r (2) and nominal pitch acceleration of the certified plans, SI.
+        highest: (3) their largest values.
     """
     shift = _KEPT_OFF * (highest - lowest)
     shift[2] = 0.0
@@ -87,15 +90,15 @@ def plan_bounds(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray
 
 
 def check_plan(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray) -> dict[str, Any]:
-    """Return the room that the nominal plan leaves, for JSON.
+    """Return the range of the nominal plan and its margins to the tightened bounds, for JSON.
 
     Args:
         bounds: The tightened bounds.
-        lowest: (2) least u_n + u_r of the plan over all its steps.
-        highest: (2) the largest.
+        lowest: (2) smallest u_n + u_r of the plan.
+        highest: (2) largest u_n + u_r of the plan.
 
     Raises:
-        DesignError: The plan does not fit; the message says by how much.
+        DesignError: The plan exceeds a bound; the message states by how much.
     """
     margins = bounds.margins(lowest, highest)
     for name, unit, sides in zip(INPUT_NAMES, INPUT_UNITS, margins, strict=True):

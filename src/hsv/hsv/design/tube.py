@@ -24,7 +24,7 @@ from hsv.flight.random_sequences import random_sequences
 from hsv.model.signals import PITCH_RATE
 
 SEQUENCES, STEPS, SEED = 100_000, 600, 1
-"""Size and seed of the sampling evidence."""
+"""Number of random sequences, their steps and their seed."""
 
 _SHOWN = (
     "altitude_end_error",
@@ -37,7 +37,7 @@ _SHOWN = (
 
 @dataclass(frozen=True)
 class Tube:
-    """Invariant set, tightened inputs and bounds of the plan, with the ``report`` (for JSON)."""
+    """The invariant set (``found``), the tightened ``bounds``, the bounds of other plans, and a ``report`` for JSON."""
 
     found: InvariantSet
     bounds: TightenedInputs
@@ -48,10 +48,10 @@ class Tube:
 def invariant_set(
     problem: TubeProblem, inputs: InvariantSetInputs, progress: Progress = lambda *_: None
 ) -> InvariantSet:
-    """Return the ellipsoid, narrowed by star norms where the inputs ask for them.
+    """Return the invariant ellipsoid, with star norms if ``inputs.method`` selects them.
 
     Raises:
-        DesignError: There is none.
+        DesignError: No invariant set was found.
     """
     progress("invariant set", 0, 1)
     found = ellipsoid(problem, inputs.state_scale.array(), inputs.input_scale.array(), inputs.contraction)
@@ -63,7 +63,7 @@ def invariant_set(
 
 @dataclass(frozen=True)
 class MeasuredSet:
-    """The certified invariant set of the disturbances measured over a region, and the remaining range of the inputs."""
+    """The certified invariant set for the disturbances measured over a region, and the tightened bounds."""
 
     measured: RegionResult
     disturbance: DisturbanceSet
@@ -71,10 +71,10 @@ class MeasuredSet:
     certified: dict[str, Any]
     bounds: TightenedInputs
     lag: tuple[np.ndarray, np.ndarray] | None
-    """Minimum and maximum (2 each) of the feedback to the lag of the plan; None for ideal actuators."""
+    """Minimum and maximum (2 each) of the feedback due to the actuators' lag behind the plan; None: ideal actuators."""
 
     def report(self) -> dict[str, Any]:
-        """Return disturbances, set and tightened inputs, for JSON."""
+        """Return the disturbance set, the invariant set and the tightened inputs, for JSON."""
         found = self.found
         lag = {"lag_feedback": {"lower": self.lag[0].tolist(), "upper": self.lag[1].tolist()}} if self.lag else {}
         driven = {"counter_examples": counter_examples(found.problem).as_dict()} if found.star_norms else {}
@@ -86,12 +86,13 @@ class MeasuredSet:
 
 
 def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, progress: Progress) -> MeasuredSet:
-    """Return the invariant set of ``design`` over ``region``.
+    """Return the invariant set of ``design`` for the disturbances measured over ``region``.
 
-    Disturbances are measured at the nominal vehicle and a regular quarter of the corners.
+    The flights are those of :meth:`Region.fraction`: the nominal vehicle and a quarter of the corners.
 
     Raises:
-        DesignError: No invariant set, or one that fails when recomputed, or leaves nothing of an input.
+        DesignError: A flight diverges or saturates; no invariant set was found, or it fails when recomputed; or its
+            feedback needs the whole range of an input.
     """
     seen, vehicle = region.fraction(), inputs.flown_vehicle
     model = ChannelModel(design, vehicle)
@@ -108,12 +109,12 @@ def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, pr
 
 
 def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress) -> Tube:
-    """Return the certified tube of ``design`` over the declared region, with flights at all its corners.
+    """Return the certified tube of ``design`` for its declared region, with evidence from flights at all corners.
 
-    The disturbances are measured at a quarter of the corners, so most of these flights are new.
+    The disturbances are measured at a quarter of the corners, so most of the flights in evidence are new.
 
     Raises:
-        DesignError: No invariant set, a set that fails when recomputed, or a nominal plan that does not fit.
+        DesignError: As for :func:`measured_set`, or if the nominal plan exceeds the tightened bounds.
     """
     region = Region(design, inputs, incomplete_share(inputs))
     tube = measured_set(design, region, inputs, progress)
@@ -139,7 +140,7 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
 def flights_in_tube(
     model: ChannelModel, region: Region, found: InvariantSet, progress: Progress
 ) -> list[FlightEvidence]:
-    """Fly all corners of ``region`` and return the evidence of each flight; ``model`` computes its disturbances."""
+    """Simulate all corners of ``region`` and return the :func:`flight_evidence` of each flight, in order."""
     everyone = region.corners()
     tell = partial(progress, "flights in the tube")
     return region.map(lambda flight: flight_evidence(flight, found, model), everyone, lambda n: tell(n, len(everyone)))
@@ -147,9 +148,10 @@ def flights_in_tube(
 
 @dataclass(frozen=True)
 class FlightEvidence:
-    """Results of one flight: largest ``level``, ratios |e - c| / z (n), membership, extremes of its plan, metrics.
+    """Evidence of one flight: largest ``level`` of its tube errors e, membership of its disturbances in W, metrics.
 
-    ``lowest`` and ``highest`` (3): total nominal inputs, nominal pitch acceleration (rad/s^2).
+    ``ratios`` (n): largest |e - c| of each state over the half-width z of the set with centre c. ``lowest`` and
+    ``highest`` (3): extremes of the total nominal inputs (2) and of the nominal pitch acceleration (rad/s^2).
     """
 
     level: float
@@ -161,7 +163,7 @@ class FlightEvidence:
 
 
 def flight_evidence(flight: Flight, found: InvariantSet, model: ChannelModel) -> FlightEvidence:
-    """Return the evidence of ``flight`` for the tube."""
+    """Return the evidence of ``flight`` for the invariant set ``found``; ``model`` computes its disturbances."""
     (errors, _), plan = model.errors(flight), flight.plan
     pitch_acceleration = np.diff(flight.history.deviation[:, PITCH_RATE]) / flight.period
     metrics = flight_metrics(flight.data())
@@ -187,7 +189,7 @@ def _disturbance_report(measured: RegionResult, disturbance: DisturbanceSet) -> 
 
 
 def flights_report(flown: list[FlightEvidence]) -> dict[str, Any]:
-    """Return the worst of all flights, for JSON."""
+    """Return the number of flights and the worst value over them of each quantity, for JSON."""
     worst = max((f.membership for f in flown), key=lambda membership: membership.ratio)
     return {
         "flights": len(flown),

@@ -1,4 +1,4 @@
-"""The problem whose solution is the invariant set of a design: its error system under its disturbances."""
+"""The problem that an invariant set solves: the error system of a design under its disturbance set."""
 
 from __future__ import annotations
 
@@ -15,46 +15,46 @@ from hsv.model.vehicle import Vehicle
 
 @dataclass(frozen=True)
 class TubeProblem:
-    """Error system and disturbances for which a set is sought.
+    """Error system and disturbance set for which an invariant set is sought.
 
-    Vertices may change arbitrarily from step to step, and so may the disturbances within their bounds.
+    The vertex may change arbitrarily from step to step, and so may the disturbances within their bounds.
     """
 
     system: ErrorSystem
     disturbance: DisturbanceSet
 
     def centre(self) -> np.ndarray:
-        """Return the equilibrium of the mean vertex under the mid-points of the disturbances (n)."""
+        """Return the equilibrium (n) of e at the mean vertex, with all disturbances at their mid-points."""
         A, G = self.system.A.mean(axis=0), self.system.G.mean(axis=0)
         return np.linalg.solve(np.eye(len(A)) - A, G @ self.disturbance.centre)
 
     def columns(self, centre: np.ndarray) -> np.ndarray:
-        """Return (r, n, d + 1) the effect of the disturbances at half their width on e - ``centre``.
+        """Return the columns (r, n, d + 1) by which the disturbances, scaled to at most 1, act on e - ``centre``.
 
-        The last column is what each vertex moves the centre by under the mid-points: no choice of centre makes it
-        vanish at every vertex.
+        The last column is constant: the drift of the centre in one step, with all disturbances at their mid-points. No
+        choice of the centre makes it zero at every vertex.
         """
         A, G = self.system.A, self.system.G
         drift = A @ centre + G @ self.disturbance.centre - centre
         return np.concatenate((G * self.disturbance.half_width, drift[:, :, None]), axis=2)
 
     def output_rows(self) -> np.ndarray:
-        """Return the rows (7, n) of the outputs that are bounded: the rigid states, and F of the two inputs."""
+        """Return the rows (7, n) of the bounded outputs of e: the five rigid states, then F e for both inputs."""
         return np.vstack((np.eye(N_RIGID, len(self.system.names)), self.system.F))
 
 
 def bounding_factors(design: ControlDesign) -> list[np.ndarray]:
-    """Return the tube factors (5 each) that bound all others: the smallest, for which the set is found, and 1.
+    """Return the ends of the certified range of tube factors (5 each): the smallest factors, then 1.
 
-    The closed loop under a factor between the two lies between their closed loops, so that a set that is invariant
-    under both is invariant for any variation of the factor between them.
+    The closed loop for factors between the ends is a convex combination of the closed loops at the ends. A set that is
+    invariant for both is therefore invariant however the factor varies between them.
     """
     one = np.ones(N_RIGID)
     return [one] if np.array_equal(design.tau_minimum, one) else [design.tau_minimum, one]
 
 
 def tube_problem(design: ControlDesign, vehicle: Vehicle, disturbance: DisturbanceSet) -> TubeProblem:
-    """Return the error system of ``design``, for all its factors, under ``disturbance``."""
+    """Return the error system of ``design`` for both :func:`bounding_factors`, under ``disturbance``."""
     model, polytope = ChannelModel(design, vehicle), design.polytope
     gain = design.feedback_gain[:, :N_RIGID]
     systems = [

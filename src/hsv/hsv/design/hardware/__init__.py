@@ -1,1 +1,1 @@
-"""Certification of a design with further hardware and air: ``hsv certify``."""
+"""Certification of a design with additional models of hardware and air: ``hsv certify``."""

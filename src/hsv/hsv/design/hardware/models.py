@@ -1,9 +1,9 @@
 """Models of hardware and air as additions to the disturbance set of a design.
 
-Sensors, wind and density add channels to the structured set, bounded as if they could take any value within at every
-step. Errors of a measurement act through the feedback and the notch filter, and through the scheduling of the nominal
-model. Samples that come late add states. A scenario or the options of ``hsv certify`` declare the models. Noise counts
-:data:`REACH` standard deviations; an effect without a known bound is named, and with it nothing is certified.
+Sensors, wind and density add channels to the structured set; a channel may take any value within its bounds at every
+step. Measurement errors act through the feedback and the notch filter, and through the scheduling of the nominal model.
+Delayed samples add states. A scenario or the options of ``hsv certify`` declare the models. The bound of noise is
+:data:`REACH` standard deviations. Effects without a known bound are listed, and prevent certification.
 """
 
 from __future__ import annotations
@@ -35,27 +35,28 @@ from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
 
 REACH = 3.0
-"""Standard deviations of noise and turbulence that count as their bound: one sample in 370 is beyond."""
+"""Standard deviations that count as the bound of noise and turbulence: one sample in 370 exceeds it."""
 
 LARGEST_REACH = float(np.ceil(1e3 * LARGEST)) / 1e3
-"""Bound of the magnitude of a normal number, rounded up to three decimals."""
+"""Largest magnitude of the generated standard normal numbers, rounded up to three decimals."""
 
 N_SCHEDULING = 2
-"""The nominal model is scheduled by the first states, altitude and velocity."""
+"""Number of states by which the nominal model is scheduled: the first two, altitude and velocity."""
 
 _STILL = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-"""The conditions that :func:`hsv.model.dynamics.forces` takes, in still air."""
+"""The ``conditions`` of :func:`hsv.model.dynamics.forces` in still air, with a working engine."""
 
 _STEP = np.array([1.0, 1.0, 1e-3])
-"""Differences over which the first conditions, wind (m/s, forward and up) and density, are linearised."""
+"""Steps of the central differences in the first three conditions: wind forward and up (m/s), relative density."""
 
 
 @dataclass(frozen=True)
 class Effect:
-    """A model as an addition to the disturbance set.
+    """The effect of a model of hardware or air on the error system: c further channels, wider bounds, and delays.
 
-    ``columns`` (r, n, c) of its channels, ``feedthrough`` (2, c) to the feedback, ``half_width`` (c) of their bounds;
-    ``widening`` (7) of both bounds of the structured set; steps (5) by which each rigid state is seen ``late``.
+    ``columns`` (r, n, c): effect of the channels on e at each vertex; ``feedthrough`` (2, c): their effect on the
+    feedback; ``half_width`` (c): their bounds, about zero. ``widening`` (7): extension of the structured set on both
+    sides. ``late`` (5): delays of the measured rigid states, in steps.
     """
 
     columns: np.ndarray
@@ -66,15 +67,15 @@ class Effect:
 
 
 Model = Callable[[ErrorSystem], Effect]
-"""Function from the error system on which a model acts to the effect of the model."""
+"""A model of hardware or air: a function that returns its effect on a given error system."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Sensors of the rigid states: largest ``error`` (5), SI, and how many steps ``late`` (5) each is.
+    """The model of sensors of the rigid states, with largest errors ``error`` (5, SI) and delays ``late`` (5, steps).
 
-    ``inertial``: the angle of attack has the error of the pitch angle, too. ``plan``: the nominal plan, by
-    whose changes a late measurement is wrong; None: the nominal model is scheduled with the true altitude and velocity.
+    ``inertial``: the angle of attack also has the error of the pitch angle. ``plan``: the plan, whose change during a
+    delay is an error, too; None: no such error, and no errors in the scheduling of the nominal model.
     """
 
     error: np.ndarray
@@ -83,11 +84,11 @@ class Measured:
     plan: Plan | None = None
 
     def __call__(self, system: ErrorSystem) -> Effect:
-        """Return the effect on ``system``; :func:`delayed` adds the delay of the error e."""
+        """Return the effect of the sensors on ``system``; :func:`delayed` adds the delay of the error e itself."""
         columns, seen = entering(system), system.F[:, :N_RIGID].copy()
         error, widening = self.error, np.zeros(len(CHANNELS))
         if self.plan:
-            # A late sample is one of the plan as it was, and of the error as it was, anywhere else in the set.
+            # A late sample contains the plan and the error of an earlier step; that error may be anywhere in the set.
             error = error + self.plan.change(self.late)
             apart = np.where(self.late > 0, 2.0 * self.plan.half_width, 0.0)
             if (error + apart)[:N_SCHEDULING].any():
@@ -99,7 +100,10 @@ class Measured:
 
 
 def entering(system: ErrorSystem) -> np.ndarray:
-    """Return the effect of a measurement of the rigid states (r, n, 5) in a period, by feedback and notch filter."""
+    """Return the effect (r, n, 5) on e over a period of unit measurement errors of the rigid states.
+
+    They act through the feedback and the notch filter.
+    """
     columns = system.B @ system.F[:, :N_RIGID]
     filtered = np.array([name.startswith("filter_") for name in system.names])
     columns[:, filtered, PITCH_RATE] += system.A[:, filtered, PITCH_RATE]
@@ -107,7 +111,7 @@ def entering(system: ErrorSystem) -> np.ndarray:
 
 
 def delayed(system: ErrorSystem, late: np.ndarray) -> ErrorSystem:
-    """Return ``system`` with rigid states measured ``late`` (5) steps later; delayed samples become states."""
+    """Return ``system`` with the rigid states measured ``late`` (5) steps late; delayed samples are appended states."""
     columns, n, extra = entering(system), len(system.names), int(late.sum())
     room = ((0, 0), (0, extra), (0, 0))
     A, B, G = np.pad(system.A, ((0, 0), (0, extra), (0, extra))), np.pad(system.B, room), np.pad(system.G, room)
@@ -125,9 +129,9 @@ def delayed(system: ErrorSystem, late: np.ndarray) -> ErrorSystem:
 
 
 def air(vehicle: Vehicle, period: float, forward: float = 0.0, up: float = 0.0, density: float = 0.0) -> Model:
-    """Return the model of air with bounded velocities (m/s) and a bounded relative error of the density.
+    """Return the model of air with wind up to ``forward`` and ``up`` (m/s) and a relative density error of ``density``.
 
-    Its effect is that at mid-envelope, held over a ``period`` (s).
+    The effect is linearised at mid-envelope, with values held over a ``period`` (s).
     """
     bounds = np.array([forward, up, density])
 
@@ -149,9 +153,9 @@ def air(vehicle: Vehicle, period: float, forward: float = 0.0, up: float = 0.0, 
 
 
 def with_models(problem: TubeProblem, models: Sequence[Model]) -> TubeProblem:
-    """Return ``problem`` with the additional channels of ``models``, except those that are bounded by zero.
+    """Return ``problem`` with the effects of all ``models``; channels with a bound of zero are omitted.
 
-    Samples of a state that several make late are late by the sum.
+    If several models delay the same state, their delays add up.
     """
     system, lower, upper = problem.system, problem.disturbance.lower, problem.disturbance.upper
     late = np.zeros(N_RIGID, int)
@@ -170,10 +174,10 @@ def with_models(problem: TubeProblem, models: Sequence[Model]) -> TubeProblem:
 
 
 def sensors(data: Struct, plan: Plan, reach: float = REACH, of: str = "sensor") -> dict[str, Model]:
-    """Return the sensor models of the rigid states by name; ideal ones are omitted.
+    """Return the models of noise, bias, quantisation and latency of sensors, by name; those of size zero are omitted.
 
     Noise, Gauss-Markov biases, and random biases and scale factors are bounded by ``reach`` standard deviations, and
-    quantisation by half a quantum. Delays are modelled exactly.
+    quantisation by half a quantum. Delays are modelled exactly. ``of``: first word of the names.
     """
     rigid = slice(0, N_RIGID)
     scale = (np.abs(data.scale) + reach * data.scale_sigma)[rigid]
@@ -192,16 +196,16 @@ def sensors(data: Struct, plan: Plan, reach: float = REACH, of: str = "sensor") 
 
 
 Declared = tuple[dict[str, Model], list[str]]
-"""Models by name, and the names of effects without a bound."""
+"""Models by name, and the names of effects without a known bound."""
 
 
 def declared(subject: CertifiedDesign, scenario: Scenario, reach: float = REACH) -> Declared:
-    """Return the models of sensors and air that a scenario declares, by name, and its effects without a bound.
+    """Return the models of the sensors and the air of a scenario, by name, and its effects without a known bound.
 
     Args:
         subject: The design.
-        scenario: Its actuators are for :func:`hsv.design.hardware.verdict.certified_with`.
-        reach: Standard deviations that count as the bound of what is normally distributed.
+        scenario: The scenario; :func:`hsv.design.hardware.verdict.certified_with` takes its actuators.
+        reach: Number of standard deviations that counts as the bound of a normally distributed quantity.
     """
     values, period = scenario.parameters(), subject.design.period
     data, moving, plan = sensor_data(values, period), atmosphere_data(values, period), Plan.of(subject)
@@ -229,19 +233,19 @@ def described(
     density: str = "0 %",
     reach: float = REACH,
 ) -> Declared:
-    """Return the models that options describe, by name, and the effects without a bound; none of size zero.
+    """Return the models described by options, by name, without those of size zero; and the effects without a bound.
 
     Args:
         subject: The design.
-        sensor_set: A published set.
-        bias: Texts "state=quantity" of constant biases of rigid states.
-        gust: Largest wind, from below and from behind.
-        turbulence: Standard deviation, both ways.
-        density: Largest relative difference.
-        reach: Standard deviations that count as the bound of what is normally distributed.
+        sensor_set: Name of a published sensor set.
+        bias: Constant biases of rigid states, each a text "state=quantity".
+        gust: Bound of the wind, with unit, for each of the directions forward and up.
+        turbulence: Standard deviation of the turbulence, with unit, in each of these directions.
+        density: Bound of the relative error of the density.
+        reach: Number of standard deviations that counts as the bound of a normally distributed quantity.
 
     Raises:
-        QuantityError: A value that cannot be read or is below zero, or a name that is unknown.
+        QuantityError: A value is not readable or out of range, or a name is unknown.
     """
     if sensor_set not in SENSOR_SETS:
         raise QuantityError(f"sensors = {sensor_set!r}: expected {one_of(SENSOR_SETS, sensor_set)}")
@@ -277,12 +281,12 @@ def described(
 
 
 def _airs(subject: CertifiedDesign, bounds: Mapping[str, np.ndarray]) -> dict[str, Model]:
-    """Return the models of air by name from ``bounds`` (3) of wind forward and up and of density, if any."""
+    """Return a model of air for each of the ``bounds`` (3: wind forward and up, m/s; relative density) above zero."""
     return {name: air(subject.vehicle, subject.design.period, *of) for name, of in bounds.items() if of.any()}
 
 
 def _without_bound(data: Struct, values: Mapping[str, Any], period: float) -> list[str]:
-    """Return the effects of sensors of the rigid states, estimator, actuators and links for which no bound is known."""
+    """Return the names of the active effects without a known bound: of sensors, estimator, actuators and links."""
     limits = np.isfinite(np.r_[data.minimum[:N_RIGID], data.maximum[:N_RIGID]])
     changed = {p.name: bool(values.get(p.name)) for p in ACTUATOR_PARAMETERS if isinstance(p.default, list)}
     found = {
@@ -299,7 +303,10 @@ def _without_bound(data: Struct, values: Mapping[str, Any], period: float) -> li
 
 
 def _remeasure(models: dict[str, Model], unbounded: list[str], plan: Plan, equipment: Mapping[str, Any]) -> None:
-    """Add the model errors measured in flights with sensors; if a flight fails, they are an unbounded effect."""
+    """Add to ``models`` the widening of the disturbance set that is measured in flights with ``equipment``.
+
+    If such a flight diverges or saturates, it is added to the effects ``unbounded`` instead.
+    """
     try:
         widening = plan.remeasured(equipment)
     except DesignError as failure:
@@ -313,6 +320,6 @@ def _remeasure(models: dict[str, Model], unbounded: list[str], plan: Plan, equip
 
 
 def declared_actuators(scenario: Scenario) -> str:
-    """Return the published actuators that a scenario flies, separated by commas, or that they are ideal."""
+    """Return the names of the published actuators in a scenario, separated by commas, or "ideal"."""
     sets = [scenario.settings.get(f"actuator.{channel}.set", IDEAL) for channel in INPUT_NAMES]
     return ",".join(name for name in sets if name != IDEAL) or IDEAL

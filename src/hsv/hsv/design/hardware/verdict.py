@@ -1,9 +1,9 @@
-"""Verdict: whether a design stays certified if models of hardware and air add to its disturbances.
+"""Verdict: whether a design remains certified with models of hardware and air in addition to its disturbances.
 
-Actuators add states. The invariant set is sought as a design seeks its own, under all vertices, and the nominal plan of
-the certificate has to fit into what it leaves of the inputs. The error system is linear, so a certificate holds for
-actuators whose stops and rate limits no error in the set reaches. Where they are reached it holds for the same
-actuators without them, and says nothing of the limited ones.
+Actuators add states. The invariant set is computed as in the design, for all vertices, and the nominal plan of the
+certificate must fit into the inputs tightened by it. The error system is linear: it knows no stops and rate limits of
+actuators. If no error in the set reaches them, the result also holds with these limits. Otherwise it holds for the same
+actuators without limits only.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_RIGID
 from hsv.model.trim import trim
 
 Lag = tuple[np.ndarray, np.ndarray] | None
-"""Smallest and largest feedback (2 each) to the lag of the plan behind actuators; none where they are ideal."""
+"""Minimum and maximum (2 each) of the feedback due to the actuators' lag behind the plan; None: ideal actuators."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """Range of one actuator: position between ``lowest`` and ``highest``, magnitude of the rate up to ``rate``.
+    """Range of one actuator over the invariant set: positions ``lowest`` to ``highest``, rates up to ``rate``, SI.
 
-    ``stop`` and ``rate_limit`` are its own, infinite where it has none. SI.
+    ``stop`` and ``rate_limit``: the largest magnitudes that the actuator can reach; infinite: no limit.
     """
 
     channel: str
@@ -53,11 +53,11 @@ class Reach:
 
     @property
     def inactive(self) -> bool:
-        """Whether no limit is reached."""
+        """Whether the actuator stays within its limits."""
         return max(-self.lowest, self.highest) <= self.stop and self.rate <= self.rate_limit
 
     def said(self, units: UnitSystem = UnitSystem.metric) -> str:
-        """Return by how much each limit is reached or not, in words."""
+        """Return largest position and rate, compared with their limits, in words."""
         unit = INPUT_UNITS[INPUT_NAMES.index(self.channel)]
         words = []
         for what, value, limit, of in (
@@ -82,10 +82,10 @@ class Reach:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a design is certified with some models: ``half_width`` (5) of the rigid states, ``feedback`` (2), SI.
+    """Verdict on a design with some models; ``half_width`` (5, rigid states) and ``feedback`` (2) of its set, SI.
 
-    ``room`` (2, 2): what the nominal plan leaves of each input, lower and upper side; below zero it does not fit.
-    ``reason``: why there is no invariant set.
+    ``room`` (2, 2): margins of the nominal plan to the tightened bounds of each input, lower and upper side, SI; if one
+    is negative the plan does not fit. ``reason``: explanation in words, if the margins alone do not decide.
     """
 
     name: str
@@ -94,16 +94,16 @@ class Verdict:
     feedback: np.ndarray | None = None
     room: np.ndarray | None = None
     shares: np.ndarray | None = None
-    """The room (2, 2) as a share of the input's range."""
+    """The margins ``room`` (2, 2) as shares of the range of each input."""
     start: float = 0.0
-    """Largest level at which a flight may start: x_n takes errors of the first measurement for the truth"""
+    """Largest level of the tube error at the start: x_n starts at the first measurement, whose errors remain in e."""
     reaches: tuple[Reach, ...] = ()
-    """Ranges of the actuators over the set."""
+    """Ranges of the actuators over the invariant set."""
     without_limits: Verdict | None = None
-    """For a verdict on the limits of actuators: the verdict without them."""
+    """For a verdict on the limits of actuators: the verdict that ignores the limits. Otherwise None."""
 
     def said(self, units: UnitSystem = UnitSystem.metric) -> str:
-        """Return by how much, in words."""
+        """Return the margin, or why the design is not certified, in words."""
         if self.without_limits:
             return "; ".join(reach.said(units) for reach in self.reaches) or self.without_limits.said(units)
         if self.room is None or self.shares is None:
@@ -117,11 +117,11 @@ class Verdict:
 
     @property
     def certified(self) -> bool:
-        """Whether the set is found and the plan fits."""
+        """Whether there is an invariant set in which all flights start, and the plan fits into the tightened bounds."""
         return self.room is not None and bool(self.room.min() > 0.0) and self.start <= 1.0
 
     def limited(self) -> Verdict:
-        """Return the verdict for the actuators with their limits: certified if no limit is reached."""
+        """Return the verdict with the limits of the actuators: certified if this one is and no limit is exceeded."""
         limited = replace(self, name=f"{self.name}, limits of actuators", without_limits=self)
         if not (self.certified and all(reach.inactive for reach in self.reaches)):
             limited = replace(limited, half_width=None, feedback=None, room=None, shares=None)
@@ -142,19 +142,19 @@ def certified_with(
     progress: Progress = lambda *_: None,
     unbounded: Sequence[str] = (),
 ) -> list[Verdict]:
-    """Return verdicts: as certified, with ``actuators``, with each model alone, and with all models.
+    """Return the verdicts: as certified; with ``actuators``, if different; with each model alone; with all models.
 
-    Where actuators are known and all is certified without their limits, a last verdict is on these.
+    If the last of these has actuators and an invariant set, a verdict on the limits of the actuators follows.
 
     Args:
         subject: The design with its certificate.
         models: Models by name.
-        actuators: Names with commas between, or "ideal"; empty: those that the design knows.
-        progress: Called after each verdict.
-        unbounded: Further effects for which no bound is known; with any of them nothing is certified.
+        actuators: Names, separated by commas, or "ideal"; empty: the actuators of the design.
+        progress: Called with the number of verdicts done and their total.
+        unbounded: Names of effects without a known bound; for each of them, a negative verdict is added.
 
     Raises:
-        DesignError: Unknown actuators, or two of one channel.
+        DesignError: Unknown actuators, or two for the same channel.
     """
     design = subject.design
     names = _named(actuators) if actuators else design.actuators
@@ -179,10 +179,10 @@ def certified_with(
 
 
 def _named(actuators: str) -> tuple[str, ...]:
-    """Return the names in a text of ``actuators``, none of ideal ones.
+    """Return the names in the text ``actuators``, separated by commas; for "ideal", an empty tuple.
 
     Raises:
-        DesignError: Unknown actuators, or two of one channel.
+        DesignError: Unknown actuators, or two for the same channel.
     """
     if actuators.strip() == IDEAL:
         return ()
@@ -196,7 +196,10 @@ def _named(actuators: str) -> tuple[str, ...]:
 
 
 def _lag_of_the_plan(subject: CertifiedDesign, design: ControlDesign) -> tuple[np.ndarray, np.ndarray]:
-    """Return the smallest and largest feedback (2 each) to the lag of the nominal vehicle's plan, inflated as W."""
+    """Return minimum and maximum (2 each) of the feedback due to the actuators' lag behind the plan, inflated like W.
+
+    The actuators are those of ``design``, the plan that of the nominal vehicle of ``subject``.
+    """
     inputs = subject.inputs
     flight = Region(subject.design, inputs, incomplete_share(inputs)).fly({})
     feedback = ChannelModel(design, subject.vehicle).lag(flight)[1]
@@ -210,14 +213,14 @@ def verdict(
     models: Sequence[Model] = (),
     lag: Lag = None,
 ) -> Verdict:
-    """Return whether ``design`` stays certified if ``models`` of hardware and air add to its disturbances.
+    """Return the verdict on whether ``design`` remains certified with ``models`` of hardware and air.
 
     Args:
         name: Name of the verdict.
         design: Design of ``subject``, with the actuators to certify.
         subject: The design with its certificate.
-        models: Models that are added.
-        lag: Lag of the nominal input.
+        models: Models in addition to the certified disturbances.
+        lag: Feedback due to the actuators' lag behind the plan.
     """
     tube, inputs = subject.certificate["tube"], subject.inputs.invariant_set
     problem = with_models(tube_problem(design, subject.vehicle, subject.disturbance), models)
@@ -233,7 +236,7 @@ def verdict(
             return Verdict(name, str(failure))
         half_width = found.half_width[:N_RIGID]
         if late.any() and np.any((half_width > Plan.of(subject).half_width)[:N_SCHEDULING][late]):
-            # Measured took them to be as far from the truth as the design's own set is wide.
+            # Measured bounds the error of late samples by the half-widths of the design's own set.
             return Verdict(name, "the set is wider than late samples of altitude and velocity were bounded by")
         bounds = left_by(found, design.input_minimum, design.input_maximum, lag)
         limits = design.input_maximum - design.input_minimum
@@ -243,7 +246,7 @@ def verdict(
 
     own = tube["invariant_set"]["contraction"]
     best = judged([own])
-    # Seldom is another contraction better than the certificate's by much: they are tried where it does not do.
+    # Other contractions are seldom much better than that of the certificate; they are tried only if it fails.
     others = [value for value in inputs.contraction if value != own]
     if best.certified or not others:
         return best
@@ -251,7 +254,7 @@ def verdict(
 
 
 def _start(found: InvariantSet, error: np.ndarray) -> float:
-    """Return the largest level at the start of a flight whose rigid states are measured to within ``error`` (5,)."""
+    """Return the largest level at the start of a flight for measurement errors up to ``error`` (5, rigid states, SI)."""
     corners = np.array(list(product((-1.0, 1.0), repeat=N_RIGID))) * error
     errors = np.pad(corners, ((0, 0), (0, len(found.centre) - N_RIGID)))
     level = float(found.level(errors).max())
@@ -261,9 +264,9 @@ def _start(found: InvariantSet, error: np.ndarray) -> float:
 
 
 def reaches(found: InvariantSet, design: ControlDesign, plan: Plan) -> list[Reach]:
-    """Return the range of positions and rates of each actuator of ``design``, in the set ``found`` along ``plan``.
+    """Return the range of positions and rates of each actuator of ``design`` along ``plan``, for all errors in the set.
 
-    Positions and rates are evaluated at every substep, where the limits act.
+    ``found`` is the invariant set. Positions and rates are evaluated at every substep, where the limits act.
     """
     system, disturbance, known = found.problem.system, found.problem.disturbance, design.actuator_sets
     flown, commands = plan.actuators(design)
@@ -278,7 +281,7 @@ def reaches(found: InvariantSet, design: ControlDesign, plan: Plan) -> list[Reac
             planned = flown @ on_a.T + commands @ on_u.T
             on_e, on_d = on_u @ system.F, on_u @ system.F_d
             on_e[:, states] += on_a
-            on_d[:, 3] += on_u[:, 1]  # the lost elevator goes the way of the command
+            on_d[:, 3] += on_u[:, 1]  # the lost elevator acts like a command
             middle = on_e @ found.centre + on_d @ disturbance.centre
             half = np.sqrt(np.sum((on_e @ found.Q) * on_e, axis=1)) + np.abs(on_d) @ disturbance.half_width
             end.append(plan.inflation * np.minimum(planned.min(axis=0), 0.0) + middle - half)

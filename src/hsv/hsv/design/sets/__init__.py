@@ -1,1 +1,1 @@
-"""Robust invariant sets of the error system (paper eq. 25 to eq. 28): an ellipsoid, which star norms may narrow."""
+"""Robust invariant sets of the error system (for paper eq. 25 to eq. 28): an ellipsoid, and narrower star norms."""

@@ -1,4 +1,4 @@
-"""Counter-examples: sequences of disturbances whose reach is a lower bound of every certificate."""
+"""Counter-examples: disturbance sequences that drive the error far; no certified bound can be below what they reach."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from hsv.control.optimisation import spectral_radii
 from hsv.design.tube_problem import TubeProblem
 
 _NEGLIGIBLE = 1e-6
-"""Share of a row's sum below which the rest of its response, of steps far back, is left out."""
+"""Share of the sum so far: the response of an output is cut off where one more step adds less."""
 
 _LONGEST = 10_000
-"""Steps of the longest sequence. Where a longer one would drive the error farther, this one is still attained."""
+"""Maximum length of a sequence. A longer one may drive the error farther, but the value of this one is attained."""
 
 
 @dataclass(frozen=True)
 class CounterExamples:
-    """For each output row the vertex and the disturbance sequence with the largest reach at a constant vertex.
+    """For each output row, the constant vertex and the disturbance sequence that drive the output farthest.
 
-    ``half_range`` (7): half the distance between what the sequence and its opposite make of zero error, SI; ``vertex``
-    (7); ``steps`` (7) lengths of the sequences. Rows are those of :meth:`TubeProblem.output_rows`.
+    ``half_range`` (7): half the difference of the outputs that the sequence and its mirror image reach from zero error,
+    SI; ``vertex`` (7): index; ``steps`` (7): length of the sequence. Rows as in :meth:`TubeProblem.output_rows`.
     """
 
     half_range: np.ndarray
@@ -36,13 +36,13 @@ class CounterExamples:
 
 
 def counter_examples(problem: TubeProblem) -> CounterExamples:
-    """Return the sequences of all rows, simulated: e(k+1) = A_i e(k) + G_i d(k) from e = 0.
+    """Return the counter-examples of all output rows, from simulations of e(k+1) = A_i e(k) + G_i d(k) with e(0) = 0.
 
-    At a constant vertex i, row e(m) = sum_k row A_i^(m-1-k) G_i d(k) is largest for the bound of each disturbance that
-    has the sign of its factor. What changing vertices add to that is not sought.
+    At a constant vertex i, row e(m) = sum_k row A_i^(m-1-k) G_i d(k) is largest if each disturbance is at the bound
+    with the sign of its factor. Sequences with changing vertices might reach farther; they are not searched.
 
     Raises:
-        DesignError: A vertex that is not stable: there the error has no bound.
+        DesignError: A vertex is not stable: the error has no bound there.
     """
     radius = spectral_radii(problem.system.A).max()
     if not radius < 1.0:
@@ -54,9 +54,10 @@ def counter_examples(problem: TubeProblem) -> CounterExamples:
 
 
 def responses(problem: TubeProblem, row: np.ndarray) -> np.ndarray:
-    """Return the response (steps, r, d) of an output ``row`` (n) to each disturbance, steps ago, at each vertex.
+    """Return the response (steps, r, d) of an output ``row`` (n) to unit disturbances at each vertex.
 
-    As many steps as count, all vertices stable.
+    Entry [m, i, j] is due to disturbance j at vertex i, m + 1 steps earlier. Negligible steps at the end are omitted.
+    All vertices must be stable.
     """
     A, G, half_width = problem.system.A, problem.system.G, problem.disturbance.half_width
     found: list[np.ndarray] = []

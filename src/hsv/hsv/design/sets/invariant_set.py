@@ -1,12 +1,13 @@
 """The invariant set of the tube: an ellipsoid {c + v: v' Q^-1 v <= 1}, which star norms may narrow (for paper eq. 26).
 
-At vertex i, v+ = A_i v + G_i d with |d_j| <= 1 (and one more constant d, the drift of the centre) stays inside if there
-are lam and l_j >= 0, sum l_j <= 1 - lam, with (S-procedure)
+At vertex i, v+ = A_i v + G_i d with |d_j| <= 1; the last d_j is constant, for the drift of the centre. By the
+S-procedure v stays inside if there are lam and l_j >= 0 with sum l_j <= 1 - lam and
 
     [lam Q, 0, Q A_i'; 0, diag(l), G_i'; A_i Q, G_i, Q] >= 0.
 
-Convex combinations of vertices follow, because the set is convex. For fixed lam this is linear in Q, l and c. The
-paper's set is a box (eq. 25 to eq. 28), which does not exist here; see ``hsv_paper.claims.numbers.box``.
+The ellipsoid is then also invariant for convex combinations of the vertices, because it is convex. For fixed lam the
+inequality is linear in Q, l and c. The paper's set is a box (eq. 25 to eq. 28), which does not exist for this system;
+see ``hsv_paper.claims.numbers.box``.
 """
 
 from __future__ import annotations
@@ -35,15 +36,15 @@ from hsv.design.tube_problem import TubeProblem
 from hsv.model.signals import N_RIGID
 
 _INFLATION = 1.002
-"""Factor on Q, so that the set is invariant for gains, too, that are tuned in their sixth digit."""
+"""Factor on Q that keeps the set invariant if the gains change in their sixth digit."""
 
 
 @dataclass(frozen=True)
 class InvariantSet:
-    """A set centre + Z that the error never leaves, with what certifies it; SI.
+    """A set centre + Z that the error never leaves, with its evidence; SI.
 
-    ``centre`` c (n), ``Q`` (n, n), ``contraction`` lam, ``multipliers`` l (r, d + 1). With ``star_norms`` it is the
-    intersection with their sums, and half-widths and feedback are the lesser ones.
+    ``centre`` c (n), ``Q`` (n, n), ``contraction`` lam, ``multipliers`` l (r, d + 1). With ``star_norms`` the set is
+    the intersection of the ellipsoid with the sets of the star norms; half-widths and feedback are the smaller of both.
     """
 
     problem: TubeProblem
@@ -61,7 +62,7 @@ class InvariantSet:
 
     @property
     def feedback(self) -> np.ndarray:
-        """Half-range (2) of F e over Z."""
+        """Half-range (2) of the feedback F e over Z, for each input."""
         F = self.problem.system.F
         return self._bounds(np.sqrt(np.einsum("ij,jk,ik->i", F, self.Q, F)), slice(N_RIGID, None))
 
@@ -72,19 +73,19 @@ class InvariantSet:
         return bounds
 
     def seen(self) -> TubeSet:
-        """Return the set as a controller sees it: its shadow on the states before those of actuators, if it has any."""
+        """Return the ellipsoid projected onto the states that the controller knows, without those of actuators."""
         n = self.problem.system.seen
         return TubeSet(self.centre[:n], inverse(self.Q[:n, :n]), self.half_width[:n])
 
     def level(self, error: np.ndarray) -> np.ndarray:
-        """Return (e - c)' Q^-1 (e - c) of errors (..., n): at most 1 inside the ellipsoid."""
+        """Return the level (e - c)' Q^-1 (e - c) of each error (..., n): at most 1 inside the ellipsoid."""
         v = error - self.centre
         return np.asarray(np.einsum("...i,ij,...j->...", v, inverse(self.Q), v))
 
     def residuals(self) -> np.ndarray:
         """Return the smallest eigenvalue (r) of the inequality at each vertex; above zero: invariant (for eq. 27).
 
-        By its Schur complement, with Q and the diagonal scaled to the identity.
+        It is that of the Schur complement, with Q and the diagonal scaled to the identity.
         """
         columns = self.problem.columns(self.centre) / np.sqrt(self.multipliers)[:, None, :]
         return 1.0 - image(self.Q, "ellipsoid: Q", self.problem.system.A / np.sqrt(self.contraction), columns) ** 2
@@ -93,7 +94,7 @@ class InvariantSet:
         """Recompute that the set is invariant at every vertex and return the evidence, for JSON.
 
         Raises:
-            DesignError: It is not, or zero error, where flights start, lies outside.
+            DesignError: The set is not invariant, or it does not contain e = 0, where flights start.
         """
         sums = self.multipliers.sum(axis=1).max()
         if not (self.multipliers.min() > 0.0 and sums <= (1.0 - self.contraction) * (1.0 + 1e-12)):
@@ -110,7 +111,7 @@ class InvariantSet:
         return evidence
 
     def report(self) -> dict[str, Any]:
-        """Return the set for a certificate."""
+        """Return the set as a part of a certificate, for JSON."""
         star = {"star_norms": self.star_norms.as_dict()} if self.star_norms else {}
         return {
             "kind": "ellipsoid",
@@ -130,7 +131,7 @@ class InvariantSet:
         """Return the set that :meth:`report` wrote.
 
         Raises:
-            DesignError: A set of another kind, or star norms that are not those of such a problem.
+            DesignError: The set is not an ellipsoid, or its star norms do not match ``problem``.
         """
         if report["kind"] != "ellipsoid":
             raise DesignError(f"invariant set of kind {report['kind']!r}: expected an ellipsoid")
@@ -147,12 +148,12 @@ def ellipsoid(
 
     Args:
         problem: Error system and disturbances.
-        state_scale: (5) half-widths of the rigid states that count as equal.
-        input_scale: (2) half-ranges of the feedback that count as much.
+        state_scale: (5) half-widths of the rigid states that weigh equally, SI.
+        input_scale: (2) half-ranges of the feedback that weigh as much, SI.
         contractions: Values of lam to try.
 
     Raises:
-        DesignError: No solution for any lam, or one that fails when recomputed.
+        DesignError: For no lam is there a solution that passes when recomputed.
     """
     weight = np.zeros((len(problem.system.A[0]), len(state_scale) + len(input_scale)))
     weight[: len(state_scale), : len(state_scale)] = np.diag(1.0 / state_scale)

@@ -1,15 +1,15 @@
-"""Bounds of the error row by row and channel by channel: star norms (Abedor, Nagpal and Poolla 1996).
+"""Star norms (Abedor, Nagpal and Poolla 1996): bounds of each output row of the error, as sums over the channels.
 
-One ellipsoid for all disturbances and all outputs has one contraction, although the poles of the error system lie
-decades apart. But the error is the sum of the contributions of the disturbance channels, and each of these stays in an
-ellipsoid of its own: at vertex i, v+ = A_i v + g_i d with |d| <= 1 stays in {v: v' Q^-1 v <= 1} if, for a contraction
-lam,
+One ellipsoid for all disturbances and outputs has one contraction, although the poles of the error system lie decades
+apart. But the error minus its centre is the sum of the responses v_j to the single disturbance channels j, and each
+response stays in a separate ellipsoid. At vertex i, v+ = A_i v + g_i d with |d| <= 1 stays in {v: v' Q^-1 v <= 1} if,
+for a contraction lam,
 
     Q - A_i Q A_i' / lam - g_i g_i' / (1 - lam) >= 0.
 
-So the error less its centre stays in the sum of these ellipsoids over the channels, and an output row is at most
-sum_j sqrt(row Q_j row') there. For each row the sum that minimises its bound is chosen. The intersection of all
-sums is invariant, and the bounds of all rows hold in it at once.
+An output row of the error is then at most sum_j sqrt(row Q_j row') from its centre. Each row has its own ellipsoids,
+which minimise its bound. The intersection, over all rows, of the sums of ellipsoids is invariant, and the bounds of all
+rows hold in it.
 """
 
 from __future__ import annotations
@@ -26,47 +26,47 @@ from hsv.control.optimisation import Unknown, image, minimise, rounded_matrix, s
 from hsv.design.tube_problem import TubeProblem
 
 _INFLATION = 1.002
-"""Factor on Q, so that it is invariant as rounded, too."""
+"""Factor on Q that keeps the ellipsoid invariant after rounding."""
 
 _REGULAR = 1e-9
-"""Share of the unit matrix in the coordinates of the search: a channel that excites few states makes them singular."""
+"""Multiple of the unit matrix added to the scaled Gramian, which is singular if the channel excites few states only."""
 
 _SHARES = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
-"""Values of 1 - lam to try, as shares of 1 - rho^2, rho the largest spectral radius of a vertex; at 1 there is no Q."""
+"""Values of 1 - lam to try, relative to 1 - rho^2, rho the largest spectral radius of a vertex; at 1 no Q exists."""
 
 _CONTRACTION_DIGITS = 8
-"""Decimals of a contraction: processors agree on more."""
+"""Decimals to which a contraction is rounded; processors agree on more."""
 
 _BOUNDED = 1e-5
-"""Weight of the trace of Q against that of the row, so that Q is bounded in directions that the row does not see."""
+"""Weight of the trace of Q relative to row Q row'; it bounds Q in directions that do not affect the row."""
 
 _NEGLIGIBLE = 1e-12
-"""Share of the sum below which further terms of a Gramian are left out."""
+"""Share of the sum below which further terms of a Gramian are omitted."""
 
 
 @dataclass(frozen=True)
 class StarNorms:
-    """Ellipsoids by row and channel: ``Q`` (7, d + 1, n, n) and ``contraction`` (7, d + 1).
+    """Ellipsoids for each output row and disturbance channel: ``Q`` (7, d + 1, n, n) and ``contraction`` (7, d + 1).
 
-    Rows are those of :meth:`TubeProblem.output_rows`; the last channel is the drift of the centre, see
-    :meth:`TubeProblem.columns`. A channel that does nothing has Q = 0.
+    The rows are those of :meth:`TubeProblem.output_rows`, the channels those of :meth:`TubeProblem.columns`; the last
+    channel is the drift of the centre. A channel without effect has Q = 0.
     """
 
     Q: np.ndarray
     contraction: np.ndarray
 
     def bounds(self, problem: TubeProblem) -> np.ndarray:
-        """Return the largest magnitudes (7) of the output rows about the centre, SI."""
+        """Return the bounds (7) of the output rows, as distances from their values at the centre, SI."""
         rows = problem.output_rows()
         return np.asarray(np.sqrt(np.einsum("ki,kjil,kl->kj", rows, self.Q, rows)).sum(axis=1))
 
     def residuals(self, problem: TubeProblem, centre: np.ndarray) -> np.ndarray:
-        """Return the smallest eigenvalue (7, d + 1) of the inequality over the vertices; above zero: invariant.
+        """Return the smallest eigenvalue over the vertices of each inequality (7, d + 1); above zero: invariant.
 
-        Q is scaled to the identity; infinite for a channel that does nothing.
+        Q is scaled to the identity. The value is infinite for a channel without effect.
 
         Raises:
-            DesignError: A Q that is not positive definite.
+            DesignError: A Q is not positive definite.
         """
         A, G = problem.system.A, problem.columns(centre)
         residuals = np.full(self.contraction.shape, np.inf)
@@ -78,12 +78,13 @@ class StarNorms:
         return residuals
 
     def level_at_start(self, problem: TubeProblem, centre: np.ndarray, error: np.ndarray | None = None) -> float:
-        """Return the largest level of terms whose sum is an ``error`` (n), by default zero; at most 1: it is inside.
+        """Return a bound of the level of an initial ``error`` (n; None: zero) in the set of the star norms.
 
-        Zero error is the sum of the steady responses of the mean vertex to the mid-point of each channel, with the
-        opposite sign: no mid-point is farther from zero than the half-width of its channel. The last channel takes the
-        rest, and with it the constant channels, which have no ellipsoid. The error is added to the term of one channel,
-        for each row the best one. Infinite where no channel does anything and the sum is not zero.
+        If it is at most 1 the error is inside: the error minus the centre is then a sum of terms v, one per channel,
+        each in its ellipsoid. The result is the largest v' Q^-1 v over all rows and channels. For zero error, each term
+        is minus the steady response of the mean vertex to the mid-point of the channel; the last channel with an effect
+        takes the remainder. ``error`` is added to one term, for each row to the one that gives the smallest result.
+        If no channel has an effect, the result is zero for an error at the centre, else infinite.
         """
         mean = problem.system.A.mean(axis=0)
         G, acting = problem.system.G.mean(axis=0), np.flatnonzero(problem.columns(centre).any(axis=(0, 1)))
@@ -104,10 +105,10 @@ class StarNorms:
         return worst
 
     def certify(self, problem: TubeProblem, centre: np.ndarray) -> dict[str, Any]:
-        """Recompute that every ellipsoid is invariant, and that zero error lies in their sums; return the evidence.
+        """Check that all ellipsoids are invariant and that e = 0 lies in their sums; return the evidence, for JSON.
 
         Raises:
-            DesignError: One is not, or it does not.
+            DesignError: An ellipsoid is not invariant, or e = 0 lies outside.
         """
         residuals, origin = self.residuals(problem, centre), self.level_at_start(problem, centre)
         if not residuals.min() > 0.0:
@@ -125,10 +126,10 @@ class StarNorms:
 
     @classmethod
     def from_report(cls, report: Mapping[str, Any], problem: TubeProblem) -> StarNorms:
-        """Return the ellipsoids that :meth:`as_dict` wrote, of as many rows, channels and states as ``problem`` has.
+        """Return the ellipsoids that :meth:`as_dict` wrote, for the rows, channels and states of ``problem``.
 
         Raises:
-            DesignError: Something is missing, not a finite number, of another size, or not symmetric.
+            DesignError: Values are missing or not finite, have another shape, or are not symmetric.
         """
         _, n, d = problem.system.G.shape
         found = []
@@ -152,15 +153,15 @@ def _level(Q: np.ndarray, v: np.ndarray) -> float:
 def star_norms(
     problem: TubeProblem, centre: np.ndarray, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> StarNorms:
-    """Return the ellipsoids with the smallest bound of each output row.
+    """Return the star norms: the ellipsoids that minimise the bound of each output row.
 
     Args:
         problem: Error system and disturbances.
         centre: (n) centre of the set.
-        progress: Called with the ellipsoids found and their total.
+        progress: Called with the number of ellipsoids found and their total.
 
     Raises:
-        DesignError: A row and a channel for which there is none.
+        DesignError: A vertex is not stable, or a row and channel have no ellipsoid.
     """
     rows, G = problem.output_rows(), problem.columns(centre)
     A, shape = problem.system.A, (len(rows), G.shape[2])
@@ -179,7 +180,8 @@ def star_norms(
 def _least(A: np.ndarray, g: np.ndarray, row: np.ndarray, contractions: Sequence[float]) -> tuple[np.ndarray, float]:
     """Return the Q with the smallest bound of ``row``, and its contraction.
 
-    At which contraction that is, the vertices tell one by one: the Gramian of each bounds every Q of all from below.
+    The contractions are tried in the order of a lower bound of row Q row', and the first with a solution is taken. The
+    lower bound is the largest value with the Gramian of a single vertex, below which no Q common to all vertices is.
     """
     if not g.any():
         return np.zeros(A.shape[1:]), contractions[0]
@@ -193,10 +195,10 @@ def _least(A: np.ndarray, g: np.ndarray, row: np.ndarray, contractions: Sequence
 
 
 def _solve(A: np.ndarray, g: np.ndarray, row: np.ndarray, contraction: float) -> np.ndarray:
-    """Return the Q that minimises row Q row' at one contraction.
+    """Return the Q that minimises row Q row' for a given contraction.
 
     Raises:
-        DesignError: There is none.
+        DesignError: The inequality has no solution.
     """
     T = _coordinates(A, g, contraction)
     inside, columns, output = np.linalg.solve(T, A @ T), np.linalg.solve(T, g.T).T, row @ T
@@ -218,23 +220,23 @@ def _solve(A: np.ndarray, g: np.ndarray, row: np.ndarray, contraction: float) ->
 
 
 def _coordinates(A: np.ndarray, g: np.ndarray, contraction: float) -> np.ndarray:
-    """Return T (n, n) such that in x = T z the Q of the mean vertex alone would be near the identity."""
+    """Return T (n, n) such that Q of the mean vertex alone would be near the identity in coordinates z, x = T z."""
     held = _outer(g).mean(axis=0, keepdims=True)
     gramian = _gramians(A.mean(axis=0, keepdims=True), held, contraction)[0]
     size = np.sqrt(gramian.diagonal())
-    size = np.where(size > 0.0, size, 1.0)  # of a state that the channel does not excite
+    size = np.where(size > 0.0, size, 1.0)  # zero for a state that the channel does not excite
     scaled = 0.5 * (gramian + gramian.T) / np.outer(size, size)
     return np.asarray(size[:, None] * cholesky(scaled + _REGULAR * np.eye(len(size)), lower=True))
 
 
 def _gramians(A: np.ndarray, held: np.ndarray, contraction: float) -> np.ndarray:
-    """Return the least Q (r, n, n) with Q = A Q A' / lam + ``held`` / (1 - lam), for each A (r, n, n) alone."""
+    """Return the Gramian (r, n, n) of each A (r, n, n): Q with Q = A Q A' / lam + ``held`` / (1 - lam)."""
     power, gramian = A / np.sqrt(contraction), held / (1.0 - contraction)
 
     def diagonals(matrices: np.ndarray) -> np.ndarray:
         return np.asarray(np.diagonal(matrices, axis1=1, axis2=2))
 
-    # By doubling the number of terms of the sum: sizes of the states lie many decades apart, too many for a solver.
+    # Each pass doubles the number of terms of the sum. The sizes of the states are too different for a Lyapunov solver.
     while np.any(diagonals(term := power @ gramian @ np.swapaxes(power, 1, 2)) > _NEGLIGIBLE * diagonals(gramian)):
         gramian, power = gramian + term, power @ power
     return gramian
