@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from recorded_flight import MESSAGES, message_types
 
-from hsv.bags.definitions import definition, type_hash
-from hsv.bags.topic import Topic, usual_qos
-from hsv.bags.typestore import fields_of
+from hsv.bags.definitions import definition, fields_of, type_hash
+from hsv.bags.metadata import Topic, usual_qos
 
 TYPES = [f"hsv_msgs/msg/{path.stem}" for path in sorted(MESSAGES.glob("*.msg"))]
 LATCHED = usual_qos(1, latched=True)

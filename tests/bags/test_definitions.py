@@ -3,7 +3,7 @@
 import pytest
 from recorded_flight import MESSAGES
 
-from hsv.bags.definitions import SEPARATOR, definition, type_hash
+from hsv.bags.definitions import SEPARATOR, definition, message_types, type_hash
 from hsv.base.errors import RecordingError
 
 
@@ -34,3 +34,21 @@ def test_missing_type_is_named(function, name):
     with pytest.raises(RecordingError, match=name) as error:
         function(name)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("float64 2x", "definition of a/msg/B: Could not parse"),
+        ("uint8 X = [1]\nfloat64 y", "definition of a/msg/B: cannot be used (AssertionError)"),
+        ("float64 X = 1e999\nfloat64 y", "definition of a/msg/B: cannot be used (NameError)"),
+        ("c/D d", "definition of a/msg/B: unknown type c/msg/D"),
+        ("B b", "definition of a/msg/B: a/msg/B holds itself"),
+    ],
+)
+def test_a_definition_that_cannot_be_used_is_named(text, why):
+    with pytest.raises(RecordingError) as caught:
+        message_types([("a/msg/B", text)], "bag")
+    assert str(caught.value).startswith(f"bag: {why}")
+    assert "\n" not in str(caught.value)
+    assert "a/msg/B" not in message_types([], "bag", [("a/msg/B", text)]).fielddefs

@@ -1,7 +1,6 @@
 """Every number of our messages tells its unit."""
 
-from hsv.bags.definitions import definition
-from hsv.bags.typestore import fields_of
+from hsv.bags.definitions import definition, fields_of
 from hsv.bags.units import KNOWN, parse_units
 
 

@@ -10,9 +10,9 @@ from recorded_flight import message_types
 
 from hsv.bags import description
 from hsv.bags.columns import Track
+from hsv.bags.definitions import deserialized
 from hsv.bags.description import INTERFACE_VERSION, TOPICS, WIRE_ALIGNMENT
 from hsv.bags.messages import FRAME, MessageError, StepMessages, stamp_in, stamp_of
-from hsv.bags.typestore import deserialized
 from hsv.base.errors import SignalError
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.tube_law import TubeResult, TubeStatusCode

@@ -6,8 +6,8 @@ import re
 import pytest
 from recorded_flight import message_types
 
+from hsv.bags.definitions import fields_of
 from hsv.bags.description import TOPICS, resolved
-from hsv.bags.typestore import fields_of
 from hsv.model.airframe.pose import Sample, transforms
 from hsv.model.airframe.scene import SCENE_TOPIC
 from hsv.pages.layouts import foxglove_layout

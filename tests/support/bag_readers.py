@@ -11,8 +11,8 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from hsv.bags.definitions import as_dict
 from hsv.bags.reader import Bag
-from hsv.bags.typestore import as_dict
 
 NPM = Path(__file__).parents[1] / "viewers" / "npm"
 

@@ -5,13 +5,12 @@ from pathlib import Path
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from hsv.bags.definitions import definition, type_hash
+from hsv.bags.definitions import blank, definition, type_hash
 from hsv.bags.description import STATE, TOPICS, resolved
+from hsv.bags.metadata import Topic, usual_qos
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.replay.engine import fly
-from hsv.bags.topic import Topic, usual_qos
-from hsv.bags.typestore import blank
 from hsv.bags.writer import BagWriter
 from hsv.control.design import find_file
 from hsv.flight.assembly import flight_parameters

@@ -12,9 +12,9 @@ from hsv.bags import description
 from hsv.bags.definitions import definition, type_hash
 from hsv.bags.infrastructure_parameters import PEER_EMULATOR_PARAMETERS
 from hsv.bags.messages import stamp_in
+from hsv.bags.metadata import Topic, usual_qos
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import broken_off, complete_steps
-from hsv.bags.topic import Topic, usual_qos
 from hsv.bags.writer import BagWriter
 from hsv.graph.standstill import Standstill
 from hsv_node.lockstep import LockstepNode

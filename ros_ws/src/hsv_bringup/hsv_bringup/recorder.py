@@ -31,8 +31,8 @@ from hsv.bags.description import (
 )
 from hsv.bags.infrastructure_parameters import RECORDER_PARAMETERS
 from hsv.bags.messages import StepMessages, stamp_in
+from hsv.bags.metadata import Topic, usual_qos
 from hsv.bags.roles import naming
-from hsv.bags.topic import Topic, usual_qos
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import ParameterError
 from hsv.flight.blocks import Signals

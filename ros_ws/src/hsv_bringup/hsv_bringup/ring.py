@@ -20,7 +20,7 @@ from rclpy.node import Node
 
 from hsv.bags import description
 from hsv.bags.definitions import definition, type_hash
-from hsv.bags.topic import Topic, usual_qos
+from hsv.bags.metadata import Topic, usual_qos
 from hsv.bags.writer import BagWriter
 from hsv_node.middleware import STEP, message_class
 

@@ -11,10 +11,9 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import QoSProfile
 
 from hsv.bags.columns import Track
-from hsv.bags.definitions import definition
+from hsv.bags.definitions import definition, message_types
 from hsv.bags.description import TOPICS, graph
 from hsv.bags.export import table
-from hsv.bags.typestore import message_types
 from hsv.bags.units import units_of
 from hsv.base.errors import ParameterError, RunError
 from hsv_bringup.client import GraphClient, answer

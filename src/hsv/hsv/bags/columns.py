@@ -19,9 +19,9 @@ from rosbags.interfaces.typing import Typesdict
 from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
+from hsv.bags.definitions import MAX_SURPLUS, Field, deserialized, fields_of, plain
 from hsv.bags.description import TOPIC_OF
 from hsv.bags.messages import ENCAPSULATION, MessageError, Structure
-from hsv.bags.typestore import MAX_SURPLUS, Field, deserialized, fields_of, plain
 from hsv.base.errors import RecordingError, SignalError
 
 Read = Callable[[str], Sequence[Any] | NDArray[Any]]

@@ -10,7 +10,7 @@ import numpy as np
 from rosbags.serde import SerdeError
 
 from hsv.bags.columns import Columns, Track
-from hsv.bags.typestore import deserialized
+from hsv.bags.definitions import deserialized
 
 
 @dataclass(frozen=True)

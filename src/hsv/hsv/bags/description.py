@@ -91,11 +91,7 @@ or the first of several consecutive numbers."""
 TOPIC_OF = {signal.name: topic for topic, carried in CARRIED.items() for signal in carried}
 """The topic of each signal by name; the last one for a signal that later topics repeat."""
 
-LATCHED_TOPICS = {
-    RUN: "hsv_msgs/msg/Run",
-    READY: "hsv_msgs/msg/Ready",
-    REFERENCE: "hsv_msgs/msg/Reference",
-}
+LATCHED_TOPICS = {RUN: "hsv_msgs/msg/Run", READY: "hsv_msgs/msg/Ready", REFERENCE: "hsv_msgs/msg/Reference"}
 """Types of the latched topics, whose last message late subscribers receive."""
 
 OTHER_TOPICS = {
@@ -167,13 +163,7 @@ class NodeDescription:
 
 
 RECORDER = NodeDescription(
-    "recorder",
-    "hsv_bringup",
-    "recorder",
-    (),
-    tuple(TOPICS),
-    "hsv_msgs/msg/RecorderProgress",
-    (RECORDER_PROGRESS,),
+    "recorder", "hsv_bringup", "recorder", (), tuple(TOPICS), "hsv_msgs/msg/RecorderProgress", (RECORDER_PROGRESS,)
 )
 
 

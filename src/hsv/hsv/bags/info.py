@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -59,7 +60,9 @@ def describe(bag: Bag) -> dict[str, Any]:
         are simulated times in seconds; ``end_s`` is None for an interval that lasts until the end of the bag.
     """
     start, end = bag.span
-    fingerprint, warnings = _fingerprint(bag), bag_warnings(bag)
+    fingerprint, warnings = None, bag_warnings(bag)
+    with suppress(RecordingError):
+        fingerprint = flight_fingerprint(bag)
     topics = [_topic(bag, name) for name in sorted(bag.topics)]
     faults = _faults(bag) if ACTUATOR in bag.roles else None
     return {
@@ -86,13 +89,6 @@ def describe(bag: Bag) -> dict[str, Any]:
         "tube": _tube(bag) if TUBE_STATUS in bag.roles else None,
         "not_covered": _not_covered(bag, faults) if TUBE_STATUS in bag.roles else None,
     }
-
-
-def _fingerprint(bag: Bag) -> str | None:
-    try:
-        return flight_fingerprint(bag)
-    except RecordingError:
-        return None
 
 
 def _scenario(bag: Bag) -> Scenario | None:

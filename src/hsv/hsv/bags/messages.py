@@ -11,7 +11,6 @@ of messages, such as the active faults, is converted by rosbags, and only when i
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
@@ -21,9 +20,8 @@ from rosbags.interfaces.typing import Typesdict
 from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
-from hsv.bags.definitions import definition
+from hsv.bags.definitions import blank, deserialized, fields_of, installed_types
 from hsv.bags.description import CARRIED, CLOCK, TOPICS, TUBE_STATUS, WIRE_ALIGNMENT
-from hsv.bags.typestore import blank, deserialized, fields_of, message_types
 from hsv.base.errors import ParameterError, RunError, SignalError
 from hsv.flight.blocks import LOOP
 from hsv.model import signals as types
@@ -287,7 +285,10 @@ class StepMessages:
             setattr(message, field, np.zeros(length))
         if faults:
             fault_type = self._store.types["hsv_msgs/msg/Fault"]
-            message.active = [fault_type(*fault_fields(active.fault)) for active in faults]
+            message.active = [
+                fault_type(f.channel, f.type, list(f.parameters), np.array([*f.parameters.values()], np.float64))
+                for f, _ in faults
+            ]
             message.since = np.array([active.since for active in faults], np.uint64)
         data = bytes(self._store.serialize_cdr(message, self.type))
         self._buffer = bytearray(data + bytes(-len(data) % WIRE_ALIGNMENT))
@@ -298,17 +299,6 @@ class StepMessages:
 
 def _size(signal: SignalType) -> int:
     return VARYING if signal in _SIZES else signal.size
-
-
-@cache
-def installed_types(message_type: str) -> Typestore:
-    """Return the definitions of an installed type and its dependencies."""
-    return message_types([(message_type, definition(message_type))], message_type)
-
-
-def fault_fields(fault: Fault) -> tuple[str, str, list[str], NDArray[np.float64]]:
-    """Return the fields of a message Fault in their order."""
-    return fault.channel, fault.type, list(fault.parameters), np.array(list(fault.parameters.values()), np.float64)
 
 
 def fault_in(message: Any) -> Fault:

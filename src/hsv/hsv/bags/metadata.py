@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import yaml
-from rosbags.rosbag2.metadata import dump_qos_v9
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.rosbag2.metadata import dump_qos_v9, parse_qos
 
-from hsv.bags.topic import Topic
 from hsv.base.errors import DocumentError
 from hsv.base.files import parse_yaml, read_text
 
@@ -25,6 +26,7 @@ VERSION = 9
 DISTRO = "jazzy"
 EMPTY_SPAN = 2**63 - 1, 0
 """First and last time (ns) of a bag without messages in rosbag2."""
+_INFINITE = QosTime(9223372036, 854775807)
 
 
 class _Quoted(str):
@@ -40,6 +42,44 @@ class _Dumper(yaml.SafeDumper):
 _Dumper.add_representer(
     _Quoted, lambda dumper, text: dumper.represent_scalar("tag:yaml.org,2002:str", str(text), style='"')
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic of a bag."""
+
+    name: str
+    type: str
+    """``package/msg/Type``."""
+    definition: str
+    """Message definition with its dependencies; see :func:`hsv.bags.definitions.definition`."""
+    type_hash: str
+    """``RIHS01_`` and 64 hexadecimal digits; empty if unknown."""
+    qos: Qos
+    count: int = 0
+    """Number of recorded messages."""
+    schema_encoding: str = "ros2msg"
+    encoding: str = "cdr"
+
+
+def usual_qos(depth: int = 10, *, latched: bool = False) -> Qos:
+    """Return a reliable profile; that of a ``latched`` topic keeps messages for late subscribers."""
+    durability = QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE
+    limits = _INFINITE, _INFINITE, QosLiveliness.AUTOMATIC, _INFINITE, False
+    return Qos(QosHistory.KEEP_LAST, depth, QosReliability.RELIABLE, durability, *limits)
+
+
+def recorded_qos(text: str, *, latched: bool) -> Qos:
+    """Return the first profile in the YAML text of an MCAP channel; what it lacks or misspells is as usual."""
+    usual = usual_qos(latched=latched)
+    try:
+        first, *_ = parse_yaml(text)
+        [qos] = parse_qos([dump_qos_v9([usual])[0] | first])
+    except (DocumentError, ValueError, LookupError, TypeError, AttributeError):
+        return usual
+    unknown = {name for name in ("history", "reliability", "durability") if getattr(qos, name).name == "UNKNOWN"}
+    qos = qos._replace(**{name: getattr(usual, name) for name in unknown})
+    return qos if isinstance(qos.depth, int) else usual
 
 
 def information(
@@ -80,9 +120,9 @@ def information(
     }
 
 
-def record(values: Mapping[str, Any]) -> dict[str, str]:
-    """Return the content of the MCAP metadata record of rosbag2."""
-    return {SERIALIZED: _text(values)}
+def as_yaml(values: Mapping[str, Any]) -> str:
+    """Return the metadata as YAML text."""
+    return yaml.dump(dict(values), Dumper=_Dumper, sort_keys=False, width=10**6, allow_unicode=True)
 
 
 def write_metadata(directory: Path, values: Mapping[str, Any]) -> None:
@@ -90,7 +130,7 @@ def write_metadata(directory: Path, values: Mapping[str, Any]) -> None:
     target = directory / FILE_NAME
     part = target.with_suffix(".yaml.part")
     try:
-        part.write_text(_text({ROOT: values}), encoding="utf-8")
+        part.write_text(as_yaml({ROOT: values}), encoding="utf-8")
         part.replace(target)
     finally:
         part.unlink(missing_ok=True)
@@ -99,19 +139,18 @@ def write_metadata(directory: Path, values: Mapping[str, Any]) -> None:
 def read_metadata(directory: Path) -> dict[str, Any]:
     """Return the contents of metadata.yaml below its root; empty if the file is missing or cannot be read."""
     try:
-        return parsed(read_text(directory / FILE_NAME), ROOT)
+        values = parsed(read_text(directory / FILE_NAME)).get(ROOT)
     except DocumentError:
         return {}
+    return values if isinstance(values, dict) else {}
 
 
-def parsed(text: str, root: str = "") -> dict[str, Any]:
-    """Return the mapping in a YAML text, below its ``root`` if one is given; empty if there is no mapping."""
+def parsed(text: str) -> dict[str, Any]:
+    """Return the mapping in a YAML text; empty if the text cannot be parsed or is not a mapping."""
     try:
         values = parse_yaml(text)
     except DocumentError:
         return {}
-    if root:
-        values = values.get(root) if isinstance(values, dict) else None
     return values if isinstance(values, dict) else {}
 
 
@@ -133,7 +172,3 @@ def message_counts(values: Mapping[str, Any]) -> dict[str, int]:
     entries = [entry for entry in files if isinstance(entry, dict)] if isinstance(files, list) else []
     counts = {str(entry.get("path")): entry.get("message_count") for entry in entries}
     return {name: count for name, count in counts.items() if isinstance(count, int)}
-
-
-def _text(values: Mapping[str, Any]) -> str:
-    return yaml.dump(dict(values), Dumper=_Dumper, sort_keys=False, width=10**6, allow_unicode=True)

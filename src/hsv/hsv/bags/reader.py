@@ -16,23 +16,14 @@ from numpy.typing import NDArray
 from rosbags.interfaces.typing import ConstValue
 from rosbags.typesys.store import Typestore
 
+from hsv.bags import metadata
 from hsv.bags.columns import Columns, Track
+from hsv.bags.definitions import message_types
 from hsv.bags.description import INTERFACE_VERSION, LATCHED_TOPICS, ROOT, ROSOUT, RUN, TOPICS, resolved
 from hsv.bags.files import Unpacker, find_files
-from hsv.bags.metadata import (
-    CUSTOM_DATA,
-    DISTRO,
-    ROSBAG2,
-    SERIALIZED,
-    custom_data,
-    message_counts,
-    parsed,
-    read_metadata,
-)
+from hsv.bags.metadata import DISTRO, Topic, recorded_qos
 from hsv.bags.roles import TYPES, namespace_of, roles
 from hsv.bags.scan import Scan
-from hsv.bags.topic import Topic, recorded_qos
-from hsv.bags.typestore import message_types
 from hsv.bags.units import Units, units_of
 from hsv.base.errors import RecordingError
 
@@ -229,9 +220,8 @@ class Bag:
         return received[order], np.maximum.accumulate(stamps[order].astype(np.int64))
 
     def _read(self) -> None:
-        metadata = read_metadata(self.folder)
-        counts = message_counts(metadata)
-        recorded_by: dict[str, Any] = metadata
+        recorded_by = metadata.read_metadata(self.folder)
+        counts = metadata.message_counts(recorded_by)
         for file in self.files:
             unpacker = Unpacker(file)
             scan = Scan(unpacker)
@@ -253,7 +243,7 @@ class Bag:
         for messages in self._messages.values():
             messages.sort(key=lambda message: message.log_time)  # MCAP does not demand it of a file
         self.loss.counted &= not self.loss.files
-        self.custom_data = self.custom_data or custom_data(recorded_by)
+        self.custom_data = self.custom_data or metadata.custom_data(recorded_by)
         self.distro = str(recorded_by.get("ros_distro") or DISTRO)
         self.roles = roles({name: topic.type for name, topic in self.topics.items()}, self.custom_data, str(self.path))
         self.namespace = namespace_of(self.roles)
@@ -279,10 +269,10 @@ class Bag:
                     attachments += 1
                     self.attachments[record.name] = record.data
                     self.media_types[record.name] = record.media_type
-                case Metadata() if record.name == CUSTOM_DATA:
+                case Metadata() if record.name == metadata.CUSTOM_DATA:
                     self.custom_data |= record.metadata
-                case Metadata() if record.name == ROSBAG2:
-                    rosbag2 = parsed(record.metadata.get(SERIALIZED, "")) or rosbag2
+                case Metadata() if record.name == metadata.ROSBAG2:
+                    rosbag2 = metadata.parsed(record.metadata.get(metadata.SERIALIZED, "")) or rosbag2
         for channel in list(channels.values()):
             try:
                 self._declare(channel, schemas.get(channel.schema_id))

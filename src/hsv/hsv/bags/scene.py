@@ -10,10 +10,9 @@ from mcap.writer import CompressionType, Writer
 
 from hsv.bags.description import ACTUATOR, STATE
 from hsv.bags.flight import effectors, equipment_topics, input_columns, state_columns
-from hsv.bags.metadata import CUSTOM_DATA
+from hsv.bags.metadata import CUSTOM_DATA, Topic, usual_qos
 from hsv.bags.reader import Bag
 from hsv.bags.steps import joined
-from hsv.bags.topic import Topic, usual_qos
 from hsv.bags.writer import Schemas, register
 from hsv.base.errors import RecordingError
 from hsv.model.airframe.pose import Sample

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 from rosbags.interfaces.typing import Typesdict
 
-from hsv.bags.definitions import SEPARATOR
-from hsv.bags.typestore import fields_of
+from hsv.bags.definitions import SEPARATOR, fields_of
 
 KNOWN = ("-", "s", "m", "m/s", "rad", "rad/s", "rad s", "kg^0.5 m", "kg^0.5 m/s", "N", "N m", "Pa")
 NANOSECONDS = "ns"

@@ -13,9 +13,9 @@ import yaml
 from mcap.writer import CompressionType, Writer
 from rosbags.rosbag2.metadata import dump_qos_v9
 
+from hsv.bags import metadata
 from hsv.bags.files import locked
-from hsv.bags.metadata import CUSTOM_DATA, DISTRO, EMPTY_SPAN, ROSBAG2, information, record, write_metadata
-from hsv.bags.topic import Topic
+from hsv.bags.metadata import DISTRO, Topic
 from hsv.base.errors import RecordingError
 
 CHUNK_BYTES = 16 * 1024
@@ -27,21 +27,16 @@ Schemas = dict[tuple[str, str, str], int]
 """Ids of the registered schemas by type, encoding and definition."""
 
 
-def mcap_path(directory: Path) -> Path:
-    """Return the MCAP file of a bag directory, named as rosbag2 names the first file."""
-    return directory / f"{directory.name}_0.mcap"
-
-
 def register(writer: Writer, topic: Topic, schemas: Schemas) -> int:
     """Register a topic with an MCAP writer, and its definition unless it is in ``schemas``; return the channel id."""
     key = topic.type, topic.schema_encoding, topic.definition
     if key not in schemas:
         schemas[key] = writer.register_schema(*key[:2], topic.definition.encode(errors="surrogateescape"))
-    metadata = {
+    details = {
         "offered_qos_profiles": yaml.safe_dump(dump_qos_v9([topic.qos]), sort_keys=False),
         "topic_type_hash": topic.type_hash,
     }
-    return writer.register_channel(topic.name, topic.encoding, schemas[key], metadata)
+    return writer.register_channel(topic.name, topic.encoding, schemas[key], details)
 
 
 class BagWriter:
@@ -69,7 +64,7 @@ class BagWriter:
         distro: str = DISTRO,
     ) -> None:
         self.directory = Path(directory).absolute()
-        self.path = mcap_path(self.directory)
+        self.path = self.directory / f"{self.directory.name}_0.mcap"  # as rosbag2 names the first file
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             if any(self.directory.iterdir()):
@@ -87,7 +82,7 @@ class BagWriter:
         self._channels: dict[str, int] = {}
         self._topics: dict[str, Topic] = {}
         self._counts: dict[str, int] = {}
-        self._span = EMPTY_SPAN
+        self._span = metadata.EMPTY_SPAN
         self._distro = distro
         self._custom_data: dict[str, str] = {}
         self._pending = 0
@@ -144,21 +139,21 @@ class BagWriter:
         """Finish the file and write metadata.yaml; ``custom_data`` known only at the end are added."""
         self.add_custom_data(custom_data or {})
         topics = [replace(topic, count=self._counts[name]) for name, topic in self._topics.items()]
-        values = information(self.path.name, topics, self._span, self._custom_data, self._distro)
+        values = metadata.information(self.path.name, topics, self._span, self._custom_data, self._distro)
         with self._writing():
-            self._writer.add_metadata(ROSBAG2, record(values))
+            self._writer.add_metadata(metadata.ROSBAG2, {metadata.SERIALIZED: metadata.as_yaml(values)})
             self._writer.finish()
             self._stream.flush()
             os.fsync(self._stream.fileno())
             self._stream.close()
-            write_metadata(self.directory, values)
+            metadata.write_metadata(self.directory, values)
 
     def add_custom_data(self, custom_data: Mapping[str, str]) -> None:
         """Add custom data of the run, replacing earlier values."""
         if custom_data:
             self._custom_data |= custom_data
             with self._writing():
-                self._writer.add_metadata(CUSTOM_DATA, dict(custom_data))
+                self._writer.add_metadata(metadata.CUSTOM_DATA, dict(custom_data))
                 self._stream.flush()
 
     @contextmanager
