@@ -185,7 +185,7 @@ def disturbance_columns(inputs: DesignInputs) -> np.ndarray:
 
 
 def _literal(inputs: DesignInputs, bounds: TightenedInputs) -> DesignInputs:
-    """Return ``inputs`` with the largest bound of |u_n| (eq. 35) that ``bounds`` (eq. 30) allow about the target trim."""
+    """Return ``inputs`` with the largest bound of |u_n| (35) that ``bounds`` (30) allow about the target's trim."""
     target = inputs.nominal.target
     bound = bounds.symmetric(trim(inputs.flown_vehicle.decoupled, target.altitude, target.velocity).input)
     if not bound.min() > 0.0:

@@ -160,7 +160,7 @@ class FeedbackInputs(_Table):
 
 
 class NominalInputs(_Table):
-    """Inputs of the nominal gains K (paper eq. 32 to eq. 35): one gain for each of ``scales`` times the design's step."""
+    """Inputs of the nominal gains K (paper eq. 32 to eq. 35), one for each of ``scales`` times the step to target."""
 
     interpolated: bool | None = None
     """True: the gain is interpolated between two ellipsoids. False or None: it is switched."""

@@ -254,7 +254,7 @@ def verdict(
 
 
 def _start(found: InvariantSet, error: np.ndarray) -> float:
-    """Return the largest level at the start of a flight for measurement errors up to ``error`` (5, rigid states, SI)."""
+    """Return the largest level at the start of a flight for errors up to ``error`` (5) of the measured rigid states."""
     corners = np.array(list(product((-1.0, 1.0), repeat=N_RIGID))) * error
     errors = np.pad(corners, ((0, 0), (0, len(found.centre) - N_RIGID)))
     level = float(found.level(errors).max())
