@@ -1,6 +1,6 @@
-"""An estimator of the elevator's effectiveness in flight, see ``core/effectiveness.h`` for its equations.
+"""Estimator of the elevator effectiveness in flight, an extension of the paper's tube law that is off by default.
 
-It is a named extension of the paper's tube law, off by default.
+``core/effectiveness.h`` has its equations.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ EFFECTIVENESS_PARAMETERS = (
     EFFECTIVENESS_ENABLED,
     *(replace(parameter, needs=EFFECTIVENESS_ENABLED.name) for parameter in _TUNING),
 )
-"""Parameters of the estimator; it also needs those of the vehicle and of the start of the flight."""
+"""Parameters of the estimator itself; it also needs :data:`WATCHED_PARAMETERS`."""
 
 
 WATCHED_PARAMETERS = (*INITIAL_PARAMETERS, *VEHICLE_PARAMETERS)
 """Parameters of the nominal vehicle and of the initial trim, which the estimator needs."""
 
 _MODE = 7
-"""Index of the mode in ``known``."""
+"""Index of the mode in the field ``known`` of ``hsv_tube_memory``."""
 
 
 class EffectivenessMode(IntEnum):
@@ -53,13 +53,13 @@ class EffectivenessMode(IntEnum):
     LOSS = 1
     """A loss of effectiveness explains all steps since the fault."""
     OTHER = 2
-    """An offset explains them, a loss of effectiveness does not."""
+    """An offset of the elevator explains all steps since the fault, a loss of effectiveness does not."""
     PENDING = 3
-    """A new explanation must first hold for more steps."""
+    """The last explanation has failed, and a new one has not yet held for enough steps to replace it."""
 
 
 class Effectiveness(NamedTuple):
-    """The effectiveness after a step: the value used, the interval that contains it, and the mode."""
+    """The elevator effectiveness after a step: the estimate in use, the interval of possible values, and the mode."""
 
     estimate: float
     low: float
@@ -67,7 +67,7 @@ class Effectiveness(NamedTuple):
     mode: EffectivenessMode
 
     def __str__(self) -> str:
-        """Return a description."""
+        """Return the diagnosis in words."""
         words = {
             EffectivenessMode.HEALTHY: "healthy",
             EffectivenessMode.LOSS: f"effectiveness {self.estimate:.3f}, from {self.low:.3f} to {self.high:.3f}",
@@ -78,7 +78,10 @@ class Effectiveness(NamedTuple):
 
 
 def effectiveness_data(values: Mapping[str, Any], period: float) -> Struct | None:
-    """Return the estimator that the flat parameters ``values`` describe, for a control ``period`` (s), if one does."""
+    """Return the data of the estimator as the struct ``hsv_effectiveness`` of the core, or None if it is not enabled.
+
+    ``values`` are the flat parameters of the flight, ``period`` is the control period (s).
+    """
     v = validate(EFFECTIVENESS_PARAMETERS, values)
     if not v[EFFECTIVENESS_ENABLED.name]:
         return None
@@ -105,6 +108,6 @@ def effectiveness_data(values: Mapping[str, Any], period: float) -> Struct | Non
 
 
 def effectiveness_in(memory: np.ndarray) -> Effectiveness:
-    """Return the effectiveness in the ``memory`` of the tube law, a record ``hsv_tube_memory``."""
+    """Return the estimated effectiveness in the ``memory`` of the tube law, a record ``hsv_tube_memory``."""
     estimate, low, high = memory["known"][:3].tolist()
     return Effectiveness(estimate, low, high, EffectivenessMode(int(memory["known"][_MODE])))

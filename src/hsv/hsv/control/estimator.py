@@ -1,10 +1,10 @@
 """State estimator for noisy sensors: an extended Kalman filter with constant gain, see ``core/estimator.h``.
 
-The filter predicts with the equations of motion of the design's vehicle under the previous command, and corrects with
+The filter predicts with the equations of motion of the nominal vehicle under the previous command, and corrects with
 the steady-state gain at the initial trim of the flight. Besides the nine states it estimates an offset of each input,
-which compensates model errors: a fault, another vehicle, wind. It uses the measured rigid states; elastic states are
-predicted. Controller and notch filter receive the estimate instead of the measurement. The nominal model is scheduled
-by the measured altitude and velocity, because waiting for the estimate would delay every step.
+which compensates model errors: a fault, another vehicle, wind. It uses only the measurements of the rigid states.
+Controller and notch filter receive the estimate instead of the measurement. The nominal model is scheduled by the
+measured altitude and velocity, because waiting for the estimate would delay every step.
 
 The gain is computed by iterating the Riccati equation in arithmetic that is the same on every processor.
 """
@@ -60,31 +60,31 @@ ESTIMATOR_PARAMETERS = (ESTIMATOR_ENABLED, *NOISE_PARAMETERS, *PROCESS_PARAMETER
 
 
 N_ESTIMATED = N_STATES + N_INPUTS
-"""The states and an offset of each input."""
+"""Number of estimated quantities: the nine states and an offset of each input."""
 
 _SENSED = ("sensors.set", *(f"sensors.{name}.noise" for name in STATE_NAMES[:N_RIGID]))
-"""Parameters of the noise of the sensors."""
+"""Names of the parameters from which the noise of the sensors follows."""
 
 _SETTLED = 1e-12
-"""Largest relative change per iteration of a converged gain."""
+"""Largest relative change of the gain in an iteration at which it counts as converged."""
 _MAX_ITERATIONS = 100_000
 
 
 def estimator_data(
     values: Mapping[str, object], noise: np.ndarray, vehicle: VehicleParameters, start: Trim, period: float
 ) -> Struct:
-    """Return the estimator that :data:`hsv.control.estimator.ESTIMATOR_PARAMETERS` describe.
+    """Return the data of the estimator as the struct ``hsv_estimator`` of the core.
 
     Args:
-        values: Parameters.
-        noise: Standard deviations of the sensors' white noise (9), for want of others.
-        vehicle: Nominal vehicle of the design.
-        start: Equilibrium in which the flight starts, which the estimator knows, and about which its gain is found.
-        period: T (s).
+        values: Flat parameters, of which :data:`ESTIMATOR_PARAMETERS` are used.
+        noise: (9) standard deviations of the sensors' white noise, SI; used where ``values`` have none.
+        vehicle: Nominal vehicle, with which the estimator predicts.
+        start: Equilibrium in which the flight and the estimate start, and for which the gain is computed.
+        period: Control period T, s.
 
     Raises:
-        ParameterError: A wrong value, or a sensor without noise.
-        DesignError: No steady gain was found.
+        ParameterError: A value is wrong, or a measured rigid state has no noise.
+        DesignError: The iteration of the gain does not converge.
     """
     v = validate(ESTIMATOR_PARAMETERS, values)
     deviations = np.array([v[p.name] or sensed for p, sensed in zip(NOISE_PARAMETERS, noise[:N_RIGID], strict=True)])
@@ -112,7 +112,7 @@ def estimator_data(
 
 
 class Estimator:
-    """The estimator of a flight, step by step."""
+    """The state estimator of a flight, to be stepped once per control period."""
 
     PARAMETERS = (
         *ESTIMATOR_PARAMETERS,
@@ -127,13 +127,16 @@ class Estimator:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object], period: float) -> Self:
-        """Build from :attr:`PARAMETERS` for a control ``period`` (s)."""
+        """Build from the flat parameters ``values``, of which :attr:`PARAMETERS` are used; ``period`` in s."""
         nominal, start = initial_trim(values)
         sensed = sensor_data({name: values[name] for name in _SENSED if name in values}, period)
         return cls(estimator_data(values, sensed.noise, nominal, start, period))
 
     def step(self, step: int, measurement: np.ndarray, command: np.ndarray) -> np.ndarray:
-        """Return the estimate (9) of the state in ``step``, from the ``command`` (2) of the step before."""
+        """Return the estimate (9) of the state in ``step``.
+
+        ``measurement`` (9) is that of this step, ``command`` (2) that of the step before.
+        """
         estimate = np.empty(N_STATES)
         given = (doubles(vector(measurement), N_STATES), doubles(vector(command), N_INPUTS), doubles(estimate))
         lib.hsv_estimate(self.data.pointer, doubles(self._state), step, *given)

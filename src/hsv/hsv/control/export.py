@@ -1,4 +1,4 @@
-"""Notch filter, nominal trajectory and tube law of a design as blocks of ``hsv_block.h`` in C99."""
+"""Export of a design's notch filter, nominal trajectory and tube law as blocks of ``hsv_block.h`` in C99."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ class StepBound:
     """Maximum number of operations in a step of a block, step 0 included, and the size of its state."""
 
     multiplications: int
-    """And divisions."""
+    """Multiplications and divisions."""
     additions: int
-    """And subtractions."""
+    """Additions and subtractions."""
     comparisons: int
     state_size: int
 
 
 def controller_files(design: ControlDesign) -> dict[str, str]:
-    """Return the texts of the files, by name, that fly ``design`` without this library.
+    """Return the texts, by file name, of the C sources of the controller of ``design``, which need no other files.
 
     Raises:
-        DesignError: The design carries no tube.
+        DesignError: The design has no tube.
     """
     if design.tube is None:
         raise DesignError(f"design {design.name!r}: parameter tube.shape: empty, expected a design with a tube")
@@ -51,7 +51,7 @@ def controller_files(design: ControlDesign) -> dict[str, str]:
 
 
 def core_headers(source: str) -> dict[str, str]:
-    """Return the texts, by name, of the headers of the core that ``source`` includes, directly or not."""
+    """Return the texts, by file name, of the core's headers that ``source`` includes, directly or indirectly."""
     found: dict[str, str] = {}
     for name in re.findall(r'^#include "(.+)"$', source, re.MULTILINE):
         header = files("hsv.core").joinpath(name)
@@ -62,17 +62,17 @@ def core_headers(source: str) -> dict[str, str]:
 
 
 def exported_controller(design: ControlDesign) -> ExportedBlock:
-    """Return the controller that flies ``design``, for an FMU.
+    """Return the controller of ``design`` as a block, for export as an FMU.
 
     Raises:
-        DesignError: The design carries no tube.
+        DesignError: The design has no tube.
     """
     description = f"Notch filter, nominal trajectory and tube law of the design {design.name}"
     return ExportedBlock("controller", description, SOURCE, controller_files(design), design.period)
 
 
 def design_header(design: ControlDesign) -> str:
-    """Return the header with the numbers of ``design``, as structs of core.h."""
+    """Return the text of the C header with the numbers of ``design``, as structs of ``core.h``."""
     about = (
         f"The digest of the design is {design.to_parameters()['design.hash']}. This file is written by "
         '"hsv export-controller"; write it anew instead of changing it.',
@@ -104,7 +104,7 @@ def design_header(design: ControlDesign) -> str:
 
 
 def step_bounds(design: ControlDesign) -> dict[str, StepBound]:
-    """Return the bounds of a step of each block, by its name, counted from the loops of the headers."""
+    """Return the maximum numbers of operations in a step, by block name, counted from the loops of the headers."""
     n, m, rigid, integrated = N_STATES, N_INPUTS, N_RIGID, 2
     sections, gains, polytope = len(design.notch), len(design.nominal_gains), design.polytope.data()
     axes = [axis.coefficients.shape[1:] for axis in (polytope.altitude, polytope.velocity)]
@@ -138,9 +138,9 @@ def step_bounds(design: ControlDesign) -> dict[str, StepBound]:
 
 
 def constant(name: str, struct: Struct) -> list[str]:
-    """Return a struct of core.h in C, after the arrays that it points to.
+    """Return C definitions: the arrays to which ``struct``, a struct of ``core.h``, points, then the struct ``name``.
 
-    The array of a field is called like the path of the field: ``tube_data_notch_A``.
+    An array is named after the path of its field, e.g. ``tube_data_notch_A``.
     """
     arrays: list[str] = []
 
@@ -166,7 +166,7 @@ def constant(name: str, struct: Struct) -> list[str]:
 
 
 def constant_array(name: str, element: str, numbers: np.ndarray) -> str:
-    """Return an array of numbers, or of structs of numbers; C has no empty arrays, so that one has an element."""
+    """Return the C definition of an array of numbers, or of structs of numbers; an empty array gets an element 0."""
     shape = ", ".join(map(str, numbers.shape))
     values = textwrap.fill(
         ", ".join(map(_number, numbers.ravel())) or "0", 120, initial_indent="    ", subsequent_indent="    "
@@ -175,7 +175,7 @@ def constant_array(name: str, element: str, numbers: np.ndarray) -> str:
 
 
 def _number(value: Any) -> str:
-    """Return a number in C, or a struct of numbers; hexadecimal ones are exact."""
+    """Return a number, or a struct of numbers, in C; floating-point numbers are hexadecimal and thus exact."""
     if isinstance(value, np.void | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple):
@@ -186,5 +186,5 @@ def _number(value: Any) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return a name as it can stand in a comment of C: it must not end it."""
+    """Return ``text`` with special characters replaced, so that it cannot end a comment in C."""
     return re.sub(r"[^A-Za-z0-9_. -]", "_", text)

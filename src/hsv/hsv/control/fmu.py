@@ -1,11 +1,11 @@
 """Controllers in FMUs: ``controller = "path/controller.fmu"``, FMI 2.0 or 3.0 for co-simulation.
 
-The child process of controllers in libraries loads the FMU, by FMPy, and steps it as the function of a block of
-``hsv_block.h``, see :mod:`hsv.control.library_process`. Step k sets the inputs, advances the FMU from k T to (k + 1) T
-and reads the outputs, which are u(k).
+A child process loads the FMU with FMPy and steps it like a block of ``hsv_block.h``, see
+:mod:`hsv.control.library_process`. Step k sets the inputs, advances the FMU from k T to (k + 1) T and reads the
+outputs, which are u(k).
 
-Inputs and outputs are found by the names of their numbers, as ``measurement.altitude``; the scenario's table ``[fmu]``
-gives the names of the FMU that differ.
+Variables of the FMU are matched to signals by name, such as ``measurement.altitude``; the scenario's table ``[fmu]``
+contains the names that differ.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _INPUTS = [
     for signal in CONTROLLER_INPUTS[:-1]  # without the state of the notch filter, whose size varies
     for number in numbers_of(MEASUREMENT if signal == ESTIMATE else signal)
 ]
-"""Names and units of what an FMU can receive, in the order of a compiled controller."""
+"""Name and unit of each number that an FMU can receive, in the order of the inputs of a compiled controller."""
 
 _OUTPUTS = [number for signal in CONTROLLER_OUTPUTS for number in numbers_of(signal)]
 
@@ -53,16 +53,16 @@ _FLOATS = ("Real", "Float64")
 
 
 class FmuClass(LibraryClass):
-    """A controller in an FMU, as a :class:`hsv.control.controller.ControllerClass`."""
+    """Class-like object for a controller in an FMU, see :class:`hsv.control.controller.ControllerClass`."""
 
     def _check(self) -> None:
         self.PARAMETERS = _PARAMETERS
 
     def from_parameters(self, values: Mapping[str, Any], design: object) -> LibraryController:
-        """Return the controller.
+        """Return the controller for a flight with the flat parameters ``values``; ``design`` is not used.
 
         Raises:
-            ParameterError: A variable is missing or has another unit.
+            ParameterError: A variable of the FMU is missing or has another unit.
         """
         own = validate(_PARAMETERS, values)
         try:
@@ -75,7 +75,7 @@ class FmuClass(LibraryClass):
         return LibraryController(self._name, self._path, self._symbol, self.block.state_size, numbers, vehicle)
 
     def _routes(self, own: Mapping[str, Any]) -> list[int]:
-        """Return the index in ``_INPUTS`` of every input, -1 for a start value, and the indices of the outputs."""
+        """Return for each FMU input its index in ``_INPUTS``, -1 if unconnected, then for each output its FMU index."""
         sources = {own[f"fmu.{name}"]: (i, name, unit) for i, (name, unit) in enumerate(_INPUTS)}
         if len(sources) < len(_INPUTS):
             raise ParameterError("[fmu]: a name stands twice, expected a variable for each input")
@@ -110,7 +110,7 @@ def _matches(name: str, pattern: str) -> bool:
 
 
 def _check_variable(kind: str, variable: SignalType, unit: str) -> None:
-    """Refuse a variable that is not a scalar of type Float64 in ``unit``; one without a unit is accepted."""
+    """Refuse a ``variable`` that is not a floating-point scalar in ``unit``; a variable without unit is accepted."""
     if variable.size != 1:
         raise ParameterError(f"{kind} {variable.name!r}: expected a scalar of the type Float64 or Real")
     try:
@@ -122,13 +122,13 @@ def _check_variable(kind: str, variable: SignalType, unit: str) -> None:
 
 
 class LoadedFmu:
-    """An FMU in this process; its instance begins anew with every step 0."""
+    """An FMU in this process, instantiated anew in every step 0."""
 
     def __init__(self, path: Path) -> None:
         """Load the FMU at ``path``.
 
         Raises:
-            ParameterError: It cannot be loaded.
+            ParameterError: The FMU cannot be loaded.
         """
         try:
             self._load(path)
@@ -139,7 +139,7 @@ class LoadedFmu:
         except Exception as error:
             raise ParameterError(f"cannot be loaded ({failure_words(error)}), expected an FMU") from error
         self.failure = ""
-        """Why the last step failed"""
+        """Reason why the last step failed, or empty"""
         self._function = STEP_FUNCTION(self._step)
         self.block = CBlock(
             self._description.modelName,
@@ -166,7 +166,7 @@ class LoadedFmu:
         self._outputs = [v for v in found.modelVariables if v.causality == "output"]
         self._folder = extract(str(path), tempfile.mkdtemp())
         self._fmu: Any = None
-        self._instantiate()  # so that one that cannot is refused before the flight
+        self._instantiate()  # so that an FMU that fails here is refused before the flight
 
     def _instantiate(self) -> None:
         if self._fmu:
@@ -196,7 +196,7 @@ class LoadedFmu:
         self._next = 0
 
     def _step(self, k: int, given: int, out: int, state: int, par: int) -> int:
-        """Step the FMU, as a step function of ``hsv_block.h`` with the parameters that :class:`FmuClass` gives."""
+        """Step the FMU: a step function of ``hsv_block.h`` with the parameters that :class:`FmuClass` passes."""
         try:
             count = len(self._inputs)
             period, *routes = (c_double * (1 + count + len(_OUTPUTS))).from_address(par)

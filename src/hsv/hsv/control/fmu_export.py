@@ -1,4 +1,4 @@
-"""Export of blocks as FMUs for co-simulation, FMI 3.0, with the sources and a binary for Linux on x86-64."""
+"""Export of blocks as FMUs for co-simulation (FMI 3.0), with sources and a binary for Linux on x86-64."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ _FLAGS = ("-std=gnu99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-shared"
 
 
 class ExportedBlock(NamedTuple):
-    """A block to export: its symbol, which is the name of the FMU, and the texts of its sources by name."""
+    """A block to export: its symbol, which is also the name of the FMU, and the texts of its sources by file name."""
 
     symbol: str
     description: str
     source: str
-    """Name of the source that defines the block"""
+    """Name of the source file that defines the block"""
     texts: Mapping[str, str]
     period: float
     """Control period T (s)"""
     start: Mapping[str, float] = MappingProxyType({})
-    """Values of inputs before the first step, by the names of :func:`hsv.model.signals.numbers_of`; 0 otherwise"""
+    """Start values of inputs, by the names of :func:`hsv.model.signals.numbers_of`; other inputs start at 0"""
     steps_at_start: bool = False
-    """Whether step 0 is taken at the initialisation, so that there are outputs at the start"""
+    """Whether step 0 is part of the initialisation, so that there are outputs at the start"""
     stop: float | None = None
-    """End of the experiment (s)"""
+    """Default stop time of the simulation (s)"""
 
 
 def write_fmu(path: Path, block: ExportedBlock) -> None:
-    """Compile ``block`` and write it as an FMU.
+    """Compile ``block`` and write it as an FMU to ``path``.
 
     Raises:
-        ParameterError: This is not Linux on x86-64, or there is no C compiler, or it failed.
+        ParameterError: The machine is not Linux on x86-64, there is no C compiler, or the compiler failed.
         OSError: The file cannot be written.
     """
     from fmpy import __file__ as package
@@ -77,7 +77,7 @@ def write_fmu(path: Path, block: ExportedBlock) -> None:
     }
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in contents.items():
-            # Without a time of day the same design gives the same file.
+            # ZipInfo has a fixed date, so that the same design gives the same file.
             archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
 
 
@@ -156,7 +156,7 @@ def _model_description(block: ExportedBlock, described: CBlock, token: str) -> b
     for unit in dict.fromkeys(str(row[1]) for row in named):
         definition = ElementTree.SubElement(units, "Unit", name=unit)
         exponents = base_units(unit)
-        # FMI has integer exponents only, which the units of the elastic states have not.
+        # FMI allows integer exponents only; the units of the elastic states have others.
         if all(float(power).is_integer() for power in exponents.values()):
             ElementTree.SubElement(definition, "BaseUnit", {name: f"{power:g}" for name, power in exponents.items()})
     ElementTree.SubElement(ElementTree.SubElement(root, "LogCategories"), "Category", name="logStatusError")

@@ -1,10 +1,10 @@
 """Command governor: the fastest jerk-limited reference whose nominal plan stays inside U minus F Z at every step.
 
-A command is a list of legs: a point of altitude and velocity, the time of the request, and the least duration. A leg is
-flown as a ramp with blended corners along the climbing, accelerating trims of :mod:`hsv.control.reference_trajectory`.
-Its length is found by bisection, in whole periods: the shortest that keeps u_r + u_n inside U minus F Z (paper eq. 30)
-in every step, with x_n (eq. 20) driven by the defect of the reference, and changes no input faster than its actuator
-can.
+A command is a list of legs. A leg has a target point of altitude and velocity, the time of the request, and a minimum
+duration. It becomes a ramp with blended corners along the climbing, accelerating trims of
+:mod:`hsv.control.reference_trajectory`. Bisection finds the shortest ramp, in integer numbers of periods, that keeps
+u_r + u_n inside U minus F Z (paper eq. 30) in every step, with x_n (eq. 20) driven by the defect of the reference, and
+that moves no input faster than its actuator can.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES
 from hsv.model.vehicle import Vehicle
 
 LONGEST = 600.0
-"""Maximum length of a leg (s): slower ones hardly leave more room."""
+"""Maximum duration of a leg, s; a slower one hardly needs less of the inputs."""
 
 AFTERWARDS = 10.0
-"""Time (s) for which a plan is watched after its last corner; x_n has died out then."""
+"""Time (s) for which a plan is checked after its last blend; x_n has decayed by then."""
 
 USUAL_BLEND = 2.0
-"""Half the time (s) in which the rate changes at a corner, by default."""
+"""Default half-width of the blend at a corner, s: half the time in which the rate changes."""
 
 NOTICE = 2.0
-"""Simulated time (s) between a command in flight and the first step that it changes. A plan takes 0.1 to 2 s of
-processor time, so that a flight at real-time pace does not wait for it."""
+"""Simulated time (s) between a command in flight and the first step that it changes. Planning takes 0.1 to 2 s of
+processor time, so that a flight in real time need not wait for it."""
 
 KEPT_FREE = 1e-3
-"""Share of U minus F Z that is kept free on every side: in flight the plan is scheduled by what is measured."""
+"""Share of U minus F Z that a plan leaves free on every side, because measurements schedule the model in flight."""
 
 
 class Leg(NamedTuple):
-    """A leg to a point: altitude (m), velocity (m/s), time ``start`` (s) of the request, minimum ``duration`` (s)."""
+    """A leg of a command: time ``start`` (s) of the request, minimum ``duration`` (s), target point (m and m/s)."""
 
     start: float
     duration: float
@@ -54,9 +54,9 @@ class Leg(NamedTuple):
 
 @dataclass(frozen=True)
 class GovernedReference:
-    """The ``corners`` of a reference, and its plan from the step at which planning began.
+    """A planned reference: its ``corners``, and from the first planned step on the nominal input and state.
 
-    ``plan`` (k, 2): u_r + u_n of every step; ``deviation`` (k, 9): x_n.
+    ``plan`` (k, 2) is u_r + u_n in each step, ``deviation`` (k, 9) is x_n.
     """
 
     corners: tuple[Corner, ...]
@@ -65,24 +65,24 @@ class GovernedReference:
 
     @property
     def blend(self) -> float:
-        """Half the time in which the rate changes at the last corner, s."""
+        """Half-width of the blend at the last corner, s."""
         return self.corners[-1].blend
 
     @property
     def end(self) -> float:
-        """Time at which the reference has come to rest, s."""
+        """Time from which the reference is constant, s."""
         return self.corners[-1].time + self.blend
 
 
 class Beginning(NamedTuple):
-    """Where a plan begins: the ``step`` that is flown next, and x_n (9) in it."""
+    """The start of a plan: the number of its first step, and the nominal state x_n (9) in that step."""
 
     step: int
     deviation: np.ndarray
 
 
 AT_REST = Beginning(0, np.zeros(N_STATES))
-"""The beginning of a flight in trim."""
+"""The start of a plan for a flight that begins in trim."""
 
 
 def legs_of(
@@ -90,7 +90,8 @@ def legs_of(
 ) -> list[Leg]:
     """Return the legs of piecewise-linear commands from the point ``start``: altitude (m), velocity (m/s).
 
-    Of two equal times the later is a step, as is a first command that is not where the flight starts.
+    A step, given by two equal times, becomes a leg without minimum duration, and so does a first command at time 0 that
+    is not the start. Constant parts become no legs.
     """
     legs, now, there = [], 0.0, start
     for time, *point in zip(times, altitudes, velocities, strict=True):
@@ -101,26 +102,26 @@ def legs_of(
 
 
 class Governor:
-    """Finds references for the nominal system ``nominal`` of a design and the decoupled vehicle ``rigid``."""
+    """Command governor for the nominal system ``nominal`` of a design and the decoupled vehicle ``rigid``."""
 
     def __init__(
         self, nominal: Struct, rigid: VehicleParameters, period: float, bounds: PlanBounds, rate: np.ndarray
     ) -> None:
-        """Plan with ``period`` (s) within the ``bounds`` of a design; actuators move by up to ``rate`` (2) a second."""
+        """Plan with a ``period`` (s), within the ``bounds`` of a design and the rate limits ``rate`` (2, per s)."""
         self._nominal, self._rigid, self._period, self._rate = nominal, rigid, period, rate
         free = KEPT_FREE * (bounds.input_maximum - bounds.input_minimum)
         self._low, self._high = bounds.input_minimum + free, bounds.input_maximum - free
 
     def govern(self, start: tuple[float, float], legs: Sequence[Leg], blend: float) -> GovernedReference:
-        """Return the fastest reference from level flight at ``start``, altitude (m) and velocity (m/s), over ``legs``.
+        """Return the fastest reference from level flight at ``start`` over all ``legs``.
 
         Args:
-            start: Start of the flight, in trim.
-            legs: Legs in order; each begins when requested, or when the previous one has reached its corner.
-            blend: Half the time in which the rate changes at a corner, s; as whole periods.
+            start: Altitude (m) and velocity (m/s) at the start of the flight, in trim.
+            legs: Legs in order; each begins when requested, or at the last corner of the previous one if that is later.
+            blend: Half-width of the blend at each corner, s; rounded up to a multiple of the period.
 
         Raises:
-            GovernorError: No reference fits a leg; the reason is named.
+            GovernorError: No reference fits a leg; the message gives the reason.
         """
         half = self._half(blend)
         if not legs:
@@ -136,13 +137,13 @@ class Governor:
     def continued(
         self, corners: Sequence[Corner], leg: Leg, blend: float, beginning: Beginning
     ) -> tuple[GovernedReference, int]:
-        """Return the fastest reference that continues ``corners`` by one leg, and its first new step.
+        """Return the fastest reference that continues ``corners`` by one ``leg``, and its first new step.
 
-        All steps before are those of ``corners`` in every bit. The leg begins when requested, but not before the last
-        of the corners, nor so early that a step before ``beginning`` would change.
+        All earlier steps equal those of ``corners``, bit for bit. The leg begins when requested, but not before the
+        last of the corners, nor so early that a step before ``beginning`` would change.
 
         Raises:
-            GovernorError: No reference fits; the reason is named.
+            GovernorError: No reference fits; the message gives the reason.
         """
         half = self._half(blend)
         last = corners[-1]
@@ -152,7 +153,7 @@ class Governor:
         return self._reference([*known, self._corner(known, leg, half, "command", beginning)], beginning), first
 
     def first_change(self, corners: Sequence[Corner], start: float, blend: float) -> int:
-        """Return the first step that changes when a leg is requested for ``start`` (s), after the last of ``corners``.
+        """Return the first step that a leg requested for time ``start`` (s) changes in a reference with ``corners``.
 
         Raises:
             GovernorError: The ``blend`` (s) is not above zero.
@@ -160,10 +161,10 @@ class Governor:
         return max(self._steps(start), self._steps(corners[-1].time) + 1 - self._half(blend))
 
     def trajectory(self, corners: Sequence[Corner]) -> ReferenceTrajectory:
-        """Return the trims along ``corners``.
+        """Return the reference trajectory with these ``corners``.
 
         Raises:
-            TrimError: A point without an equilibrium.
+            TrimError: There is no equilibrium at a point of the trajectory.
         """
         times, altitudes, velocities, blends = zip(*corners, strict=True)
         return ReferenceTrajectory(times, altitudes, velocities, self._period, self._rigid, blend=blends)
@@ -173,13 +174,13 @@ class Governor:
         return GovernedReference(tuple(corners), plan, deviation)
 
     def _half(self, blend: float) -> int:
-        """Return a blend in steps."""
+        """Return a ``blend`` (s) in steps, rounded up; a GovernorError refuses a value out of its range."""
         if not 0.0 < blend <= LONGEST or not (half := self._steps(blend)):
             raise GovernorError(f"blend = {blend:g} s: expected above 0 s, up to {LONGEST:g} s")
         return half
 
     def _corner(self, corners: Sequence[Corner], leg: Leg, half: int, name: str, beginning: Beginning) -> Corner:
-        """Return the earliest corner at the end of ``leg`` whose plan fits."""
+        """Return the earliest corner that ends ``leg``, after ``corners``, with a plan that fits; ``half`` in steps."""
         begin = self._steps(corners[-1].time)
 
         def end(length: int) -> Corner:
@@ -232,7 +233,7 @@ class Governor:
         return ""
 
     def _planned(self, corners: Sequence[Corner], beginning: Beginning) -> tuple[np.ndarray, np.ndarray, bool]:
-        """Return u_r + u_n (k, 2), x_n (k, 9), and whether x_n stayed in the ellipsoids of the nominal gains."""
+        """Return u_r + u_n (k, 2), x_n (k, 9), and whether x_n stays in the ellipsoids of the nominal gains."""
         rows = self._steps(corners[-1].time + corners[-1].blend + AFTERWARDS) - beginning.step
         plan, deviation = np.empty((rows, N_INPUTS)), np.empty((rows, N_STATES))
         reference = self.trajectory(corners).data
@@ -261,10 +262,10 @@ def command_in_flight(
     duration: float = 0.0,
     blend: float = 0.0,
 ) -> tuple[int, Callable[[], ReferenceTrajectory]]:
-    """Check a command that adds a leg to a point, as fast as the tightened inputs permit, after all earlier ones.
+    """Check a command in flight: a leg to another point, as fast as the tightened inputs permit, after earlier legs.
 
     Args:
-        values: Flat parameters that ``design`` and ``trajectory`` are made from.
+        values: Flat parameters from which ``design`` and ``trajectory`` were built.
         design: Design with a certified plan.
         trajectory: Nominal trajectory in flight.
         target: Altitude (m) and velocity (m/s) of the point.
@@ -272,12 +273,12 @@ def command_in_flight(
         blend: Half-width of the blend at a corner, s; 0: :data:`USUAL_BLEND`.
 
     Returns:
-        The first step that the command changes, at least :data:`NOTICE` ahead, and the function that plans it. The
-        function takes 0.1 to 2 s and may be called in another thread while the flight goes on up to that step;
-        it returns the new reference, or raises a GovernorError if none fits.
+        The first step that the command changes, at least :data:`NOTICE` ahead, and a function that plans the leg. The
+        function takes 0.1 to 2 s and may run in another thread while the flight goes on up to that step. It returns
+        the new reference, or raises a GovernorError if none fits.
 
     Raises:
-        GovernorError: There is no certified plan to govern, a number out of its range, or a command before the flight.
+        GovernorError: The design has no tightened inputs, a number is out of its range, or no step has been computed.
     """
     if design is None or design.plan_bounds is None:
         name = design.name if design else "none"

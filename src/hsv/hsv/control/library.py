@@ -1,7 +1,6 @@
-"""Controllers in C: ``controller = "path/lib.so:symbol"``, the symbol a block of ``hsv_block.h``.
+"""Controllers in C: ``controller = "path/lib.so:symbol"``, where the symbol is a block of ``hsv_block.h``.
 
-Loading and stepping a library runs code that may crash: a child process does it, see
-:mod:`hsv.control.library_process`.
+A library may crash, so a child process loads and steps it, see :mod:`hsv.control.library_process`.
 """
 
 from __future__ import annotations
@@ -80,26 +79,26 @@ class CBlock:
 
     name: str
     source: str
-    """Path relative to the library's folder, or empty"""
+    """Path of the source relative to the library's folder, or empty"""
     address: int
     """Address of the step function in the process that loaded the library."""
     state_size: int
     inputs: tuple[SignalType, ...]
     outputs: tuple[SignalType, ...]
     parameters: tuple[Parameter, ...]
-    """Named ``block.parameter``, in the order in which the step function has their values"""
+    """Parameters, named ``block.parameter``, in the order in which the step function receives their values"""
 
 
 def include_folder() -> Path:
-    """Return the folder of ``hsv_block.h``."""
+    """Return the folder that contains ``hsv_block.h``."""
     return Path(str(files("hsv.control").joinpath("include")))
 
 
 def load_block(path: Path, symbol: str) -> CBlock:
-    """Load a library and return the block that it exports under a symbol.
+    """Load the library at ``path`` into this process and return the block that it exports as ``symbol``.
 
     Raises:
-        ParameterError: Not a library, no such symbol, or a wrong field of the block, which is named.
+        ParameterError: It is not a library, has no such symbol, or a field of the block, which is named, is wrong.
     """
     try:
         library = ctypes.CDLL(str(path))
@@ -192,7 +191,7 @@ def _text(value: bytes | None, field: str) -> str:
 
 
 def library_place(controller: str) -> tuple[Path, str] | None:
-    """Return path and symbol of a controller in a shared library or, without a symbol, in an FMU; None for others."""
+    """Return path and symbol of a controller in a shared library, or path and "" of one in an FMU; None for others."""
     if controller.endswith(".fmu"):
         return Path(controller), ""
     path, _, symbol = controller.rpartition(":")
@@ -200,7 +199,7 @@ def library_place(controller: str) -> tuple[Path, str] | None:
 
 
 def inside(controller: str, folder: Path) -> str:
-    """Return the ``controller`` of a scenario in ``folder``, the path of a library absolute.
+    """Return the ``controller`` of a scenario file in ``folder``, with the path of a library or FMU made absolute.
 
     Raises:
         ParameterError: The path leads out of the folder of the scenario.
@@ -216,7 +215,7 @@ def inside(controller: str, folder: Path) -> str:
 
 
 def seen_from(controller: str, folder: Path) -> str:
-    """Return the ``controller`` as a scenario in ``folder`` names it; a library elsewhere keeps its absolute path."""
+    """Return the ``controller`` for a scenario file in ``folder``: the path of a library inside it is made relative."""
     place = library_place(controller)
     if place is None or not place[0].is_relative_to(folder.resolve()):
         return controller
@@ -225,17 +224,17 @@ def seen_from(controller: str, folder: Path) -> str:
 
 @dataclass(frozen=True)
 class LibraryRecord:
-    """Data about a controller library that are stored with a recorded flight."""
+    """Data about a controller library or FMU that are stored with a recorded flight."""
 
     sha256: str
-    """SHA-256 of the file, hexadecimal."""
+    """SHA-256 of the library file, hexadecimal."""
     source_name: str
-    """Path of the source, as given by the block, relative to the library's folder; empty if unknown or missing."""
+    """Path of the source relative to the library's folder, as given by the block; empty if unknown or missing."""
     source: bytes
 
 
 def library_record(controller: str) -> LibraryRecord | None:
-    """Return the data to store for a scenario's ``controller``, or None if it is not in a library.
+    """Return the data to store for a scenario's ``controller``, or None if it is not in a library or FMU.
 
     Raises:
         ParameterError: The library cannot be read.
@@ -249,15 +248,15 @@ def library_record(controller: str) -> LibraryRecord | None:
         try:
             source = (path.parent / name).read_bytes()
         except OSError:
-            name = ""  # a library flies without its source
+            name = ""  # a flight does not need the source
     return LibraryRecord(library_digest(controller), name, source)
 
 
 def library_digest(controller: str) -> str:
-    """Return the hexadecimal SHA-256 of the library of a scenario's ``controller``; empty if it is not in a library.
+    """Return the SHA-256, in hexadecimal, of the library or FMU of a scenario's ``controller``; empty for others.
 
     Raises:
-        ParameterError: It cannot be read.
+        ParameterError: The file cannot be read.
     """
     place = library_place(controller)
     if place is None:
@@ -269,13 +268,13 @@ def library_digest(controller: str) -> str:
 
 
 class LibraryClass:
-    """A controller in a shared library, as a :class:`hsv.control.controller.ControllerClass`."""
+    """Class-like object for a controller in a shared library, see :class:`hsv.control.controller.ControllerClass`."""
 
     def __init__(self, name: str, path: Path, symbol: str) -> None:
-        """Describe the controller ``name``, the block under a ``symbol`` of the library.
+        """Read the description of the block ``symbol`` in the library at ``path``; ``name`` is for error messages.
 
         Raises:
-            ParameterError: No such library or block, or the block is not a controller; the field is named.
+            ParameterError: There is no such library or block, or the block is not a controller.
         """
         self._name, self._path, self._symbol = name, path, symbol
         try:
@@ -291,7 +290,7 @@ class LibraryClass:
             raise ParameterError(f"controller = {name!r}: {error}") from error
 
     def _check(self) -> None:
-        """Refuse a block that is not a controller, and take its parameters."""
+        """Refuse a block without the inputs and outputs of a controller; otherwise adopt its parameters."""
         # The size of the last input is that of the notch filter.
         size = self.block.inputs[-1].size if self.block.inputs else 0
         _check_signals("inputs", self.block.inputs, _inputs(size)[: len(self.block.inputs)])
@@ -299,10 +298,10 @@ class LibraryClass:
         self.PARAMETERS = self.block.parameters
 
     def from_parameters(self, values: Mapping[str, Any], design: object) -> LibraryController:
-        """Return the controller.
+        """Return the controller for a flight with the flat parameters ``values``; ``design`` is not used.
 
         Raises:
-            ParameterError: A parameter or the notch filter has another size.
+            ParameterError: A parameter is wrong, or the block expects another number of notch filter states.
         """
         own = validate(self.PARAMETERS, values)
         for parameter in self.PARAMETERS:
@@ -319,7 +318,7 @@ class LibraryClass:
 
 
 def _inputs(filter_states: int) -> tuple[SignalType, ...]:
-    """Return the inputs of a controller that flies with ``filter_states`` states of the notch filter."""
+    """Return the inputs of a controller in a flight whose notch filter has ``filter_states`` states."""
     return (*CONTROLLER_INPUTS[:-1], CONTROLLER_INPUTS[-1]._replace(size=filter_states))
 
 
@@ -336,7 +335,7 @@ def _words(signal: SignalType) -> str:
 
 
 class LibraryController(ExternalController):
-    """A controller in a shared library; the child process calls its function."""
+    """A controller in a shared library or FMU, whose function a child process calls."""
 
     def __init__(
         self,
@@ -353,16 +352,16 @@ class LibraryController(ExternalController):
 
     @property
     def library(self) -> Any:
-        """The process of the library."""
+        """The child process of the library, or the library itself if this process is the child."""
         return library_user(self.path)
 
     def loaded(self, address: int) -> ExternalController:
-        """Return the controller for the process that has loaded the library, with its function at an ``address``."""
+        """Return a controller for the process that has loaded the library, with its step function at ``address``."""
         kernel = StepKernel(address, np.zeros_like(self._state), self.parameters)
         return ExternalController(self.name, SimpleNamespace(kernel=kernel), self.vehicle)
 
     def reset(self) -> None:
-        """Start a new run."""
+        """Set the state of the controller to zero before a new run."""
         self._state = np.zeros_like(self._state)
 
     def _call(self, inputs: ControllerInput) -> Any:

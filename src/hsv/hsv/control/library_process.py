@@ -1,7 +1,7 @@
-"""The child process that loads and steps a shared library, so that a crash of the library is contained.
+"""Child processes that load and step shared libraries or FMUs, so that a crash of a library is contained.
 
-One child serves one library file and many flights; the first request starts it, and a changed file or a crash starts
-a new one. The child runs :mod:`hsv.flight.library_child`, which uses the library directly.
+One child serves one library file and many flights. The first request starts it; after a crash, or when the file has
+changed, the next request starts a new one. The child runs :mod:`hsv.flight.library_child`, which calls the library.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ if TYPE_CHECKING:
     from hsv.control.library import CBlock
 
 NO_PROGRESS = 20.0
-"""Time (s) after which a step, or loading, is given up."""
+"""Time (s) without progress after which a child is ended, while it loads the library or steps it."""
 
 _POLL = 0.5
 """Interval (s) at which progress is checked."""
 
 
 class SharedMemory:
-    """Memory behind a file descriptor that two processes share."""
+    """Memory that two processes share, behind a file descriptor."""
 
     def __init__(self, descriptor: int | None = None) -> None:
-        """Take the memory behind a ``descriptor``, by default new memory."""
+        """Use the memory behind a file ``descriptor``, by default new memory."""
         self.descriptor = os.memfd_create("hsv_library") if descriptor is None else descriptor
         self._mapped = np.empty(0)
 
     def numbers(self, count: int) -> np.ndarray:
-        """Return the first ``count`` numbers; the memory grows as needed."""
+        """Return the first ``count`` numbers of the memory as an array (count); the memory grows as needed."""
         if len(self._mapped) < count:
             if os.fstat(self.descriptor).st_size < 8 * count:
                 os.truncate(self.descriptor, 8 * count)
@@ -54,7 +54,7 @@ class SharedMemory:
 
 
 class LibraryProcess:
-    """The child of one library file; one request at a time."""
+    """The child process of one library file; it answers one request at a time."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -66,11 +66,11 @@ class LibraryProcess:
         self._memory = SharedMemory()
 
     def describe(self, symbol: str) -> CBlock:
-        """Return the block under a symbol of the library.
+        """Return the description of the block ``symbol`` of the library.
 
         Raises:
             OSError: The file cannot be read.
-            ParameterError: There is no such block; what is wrong is named.
+            ParameterError: There is no such block, or it is wrong.
             ProcessError: The child crashed or hangs.
         """
         with self._lock:
@@ -87,8 +87,8 @@ class LibraryProcess:
         Args:
             name: Name of the request.
             arguments: Arguments of the request.
-            kept: Named arguments that the child keeps; an object that was sent before is not sent again.
-            begun: Returns the number of steps begun, 0 before anything could hang.
+            kept: Keyword arguments that the child stores; an object that it already has is not sent again.
+            begun: Returns the number of steps begun; while it is 0, there is no time limit.
 
         Raises:
             ProcessError: The child crashed or hangs.
@@ -99,7 +99,7 @@ class LibraryProcess:
             if self._child is None:
                 self._start()
             while self._connection.poll():
-                self._receive()  # it crashed between requests
+                self._receive()  # the child crashed between requests
             news = None
             if kept is not None:
                 news = {key: value for key, value in kept.items() if value is not self._kept.get(key)}
@@ -109,7 +109,7 @@ class LibraryProcess:
                 self._wait(begun)
                 answer = self._receive()
             except BaseException:
-                # A late answer would be mistaken for that to the next request.
+                # A late reply would be mistaken for the reply to the next request.
                 self.end()
                 raise
         if isinstance(answer, Exception):
@@ -118,12 +118,12 @@ class LibraryProcess:
 
     @contextmanager
     def sharing(self, numbers: int) -> Iterator[np.ndarray]:
-        """Yield memory (numbers) shared with the child; no other request is possible meanwhile."""
+        """Yield the memory shared with the child as an array (numbers); other threads' requests wait meanwhile."""
         with self._lock:
             yield self._memory.numbers(numbers)
 
     def end(self) -> None:
-        """End the child; the next request starts another."""
+        """End the child process; the next request starts another one."""
         if self._child is not None:
             with suppress(ProcessLookupError):
                 os.killpg(self._child.pid, signal.SIGKILL)
@@ -133,7 +133,7 @@ class LibraryProcess:
             self._child = None
 
     def _renew(self) -> None:
-        """End the child of a file that has changed."""
+        """End the child if the library file has changed since it was started."""
         status = self._path.stat()
         file = (status.st_dev, status.st_ino, status.st_mtime_ns, status.st_size)
         if file != self._file:
@@ -143,7 +143,7 @@ class LibraryProcess:
     def _start(self) -> None:
         self._connection, theirs = Pipe()
         descriptors = (theirs.fileno(), self._memory.descriptor)
-        # An FMU is unpacked there; this process removes what a killed child cannot.
+        # The child unpacks FMUs in this folder; this process removes it, as a killed child cannot.
         self._folder = TemporaryDirectory(prefix="hsv_library_")
         # Output of the library goes to stderr, not into the output of a command.
         self._child = subprocess.Popen(
@@ -195,11 +195,11 @@ _in_this_process: Any = None
 
 
 def use_in_this_process(library: Any) -> None:
-    """Use the ``library`` in this process, a child, see :class:`hsv.flight.library_child.LoadedLibrary`."""
+    """Make :func:`library_user` return ``library``, a :class:`hsv.flight.library_child.LoadedLibrary`; for a child."""
     global _in_this_process
     _in_this_process = library
 
 
 def library_user(path: Path) -> Any:
-    """Return the process of the library at ``path``, or the library loaded in this process if it is the child."""
+    """Return the child process of the library at ``path``, or the loaded library if this process is the child."""
     return _in_this_process or _children.get(path) or _children.setdefault(path, LibraryProcess(path))

@@ -1,4 +1,4 @@
-"""The linear model of the vehicle at a trim point, with names and units: coupled, decoupled, or with notch filter."""
+"""Linear models of the vehicle at a trim point, with names and units: coupled, decoupled, or with notch filter."""
 
 from __future__ import annotations
 
@@ -32,43 +32,43 @@ FILTER_UNITS = ("rad", "rad s")
 
 @dataclass(frozen=True)
 class LinearModel:
-    """dx = A x + B u, y = C x + D u: deviations from an operating point, in continuous time.
+    """Linear model dx/dt = A x + B u, y = C x + D u of the deviations from an operating point.
 
     All states are outputs: C is the identity, D is zero.
     """
 
     A: np.ndarray
-    """(n, n)"""
+    """State matrix (n, n)"""
     B: np.ndarray
-    """(n, 2)"""
+    """Input matrix (n, 2)"""
     C: np.ndarray
-    """(n, n)"""
+    """Output matrix (n, n)"""
     D: np.ndarray
-    """(n, 2)"""
+    """Feedthrough matrix (n, 2)"""
     states: Mapping[str, str]
-    """Units of the states, and of the outputs, by name"""
+    """Units of the states, which are also the outputs, by name"""
     inputs: Mapping[str, str]
     """Units of the inputs by name"""
     operating_state: np.ndarray
-    """(n): the state at the operating point"""
+    """State (n) at the operating point"""
     operating_input: np.ndarray
-    """(2): the input at the operating point"""
+    """Input (2) at the operating point"""
     vehicle: str
     """Name or file of the vehicle"""
     coupling: str
-    """Set of inertial coupling, or multiple of the derived one"""
+    """Set of inertial coupling, or multiple of the derived set"""
     model: str
-    """CM, DM or ECM"""
+    """Coupled (CM), decoupled (DM), or extended by the notch filter (ECM)"""
     reading: str = ""
-    """Pitch rate in eq. 40: physical or printed; empty for other models"""
+    """Pitch rate in eq. 40 of an ECM: physical or printed; empty for other models"""
 
     @property
     def poles(self) -> list[Mode]:
-        """The modes, fastest first."""
+        """The modes of A, fastest first."""
         return modes(self.A)
 
     def in_units(self, system: UnitSystem) -> LinearModel:
-        """Return the model of the same signals in other units; ``self`` is in SI."""
+        """Return this model, which must be in SI units, with its signals in the units of ``system``."""
         state, inputs = (
             np.array([in_system(1.0, unit, system)[0] for unit in units.values()])
             for units in (self.states, self.inputs)
@@ -85,7 +85,7 @@ class LinearModel:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return matrices, names, units and operating point by name, for files."""
+        """Return matrices, signal names, units and operating point as a dictionary, for files."""
         states, inputs = (
             {kind: list(units), f"{kind[:-1]}_units": list(units.values())}
             for kind, units in (("states", self.states), ("inputs", self.inputs))
@@ -94,14 +94,14 @@ class LinearModel:
         return vars(self) | states | inputs | outputs
 
     def to_control(self) -> Any:
-        """Return the ``StateSpace`` of python-control, with the names of states, inputs and outputs."""
+        """Return the model as a ``StateSpace`` of python-control, with named states, inputs and outputs."""
         import control
 
         names = {"states": list(self.states), "inputs": list(self.inputs), "outputs": list(self.states)}
         return control.ss(self.A, self.B, self.C, self.D, **names)
 
     def save(self, path: Path) -> None:
-        """Write the model to a file for MATLAB and Octave (``.mat``) or for numpy (``.npz``)."""
+        """Write the model to ``path``, in the format of MATLAB and Octave (``.mat``) or else of numpy (``.npz``)."""
         with path.open("wb") as stream:
             if path.suffix == ".mat":
                 from scipy.io import savemat
@@ -123,20 +123,20 @@ def linearise(
 ) -> LinearModel:
     """Return the linear model at a level trim (paper eq. 6 to eq. 9; for the ECM eq. 40 to eq. 43), SI.
 
-    That of a rigid vehicle has no elastic states.
+    The model of a rigid vehicle has no elastic states.
 
     Args:
-        altitude: m, or a text with its unit; empty: the published one, or the middle of the vehicle's envelope.
-        velocity: m/s, or a text with its unit; likewise.
-        vehicle: Name or path; empty: the paper's.
-        coupling: Set of inertial coupling, or a multiple of the derived one; empty: the vehicle's own.
+        altitude: m, or a text with unit; empty: the published altitude, or the middle of the vehicle's envelope.
+        velocity: m/s, or a text with unit; empty: likewise.
+        vehicle: Name or path of a vehicle; empty: the paper's.
+        coupling: Set of inertial coupling, or a multiple of the derived set; empty: the vehicle's default.
         model: Coupled (CM), decoupled (DM), or extended by the notch filter (ECM).
         reading: Pitch rate in eq. 40, for the ECM only: ``physical`` (q, the default) or ``printed`` (q').
 
     Raises:
-        QuantityError: Names the argument that is wrong.
-        TrimError: No equilibrium there.
-        VehicleError: The vehicle is unknown or wrong.
+        QuantityError: An argument is wrong; the message names it.
+        TrimError: There is no equilibrium at this point.
+        VehicleError: The vehicle is unknown or its data are wrong.
     """
     for name, value, known in (("model", model, (*MODELS, EXTENDED)), ("reading", reading or READINGS[0], READINGS)):
         if value not in known:

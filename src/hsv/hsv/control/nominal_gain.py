@@ -6,13 +6,13 @@ K = Y Q^-1 minimises gamma, a bound of the cost sum x_n' psi x_n + u_n' sigma u_
     [Q, (A_i Q + B_i Y)', (psi^1/2 Q)', (sigma^1/2 Y)'; ., Q, 0, 0; ., ., gamma I, 0; ., ., ., gamma I] >= 0,      (34)
     [X, Y; Y', Q] >= 0,   X_jj <= u_nj,max^2                                                                       (35)
 
-with (34) at every vertex i. Of the co-designed model these are (49) to (52).
+with (34) at every vertex i. For the co-designed model, the paper has them as (49) to (52).
 
-The problem is Kothare, Balakrishnan and Morari's (Automatica 32, 1996); the look-up over nested ellipsoids is Wan and
-Kothare's (Automatica 39, 2003): the smallest ellipsoid that holds the state names the gain, and because each ellipsoid
-is invariant under its own gain and lies in the one before, the state only ever moves inwards. Their second law takes a
-gain between those of two ellipsoids, so that the input is continuous; each ellipsoid must then be invariant under the
-gain of the next one inside, too.
+The problem is that of Kothare, Balakrishnan and Morari (Automatica 32, 1996), the look-up over nested ellipsoids that
+of Wan and Kothare (Automatica 39, 2003). The smallest ellipsoid that contains the state selects the gain. Each
+ellipsoid is invariant under its own gain and lies in the one before, so that the state only moves inwards. The second
+law of Wan and Kothare interpolates between the gains of two ellipsoids, so that the input is continuous; each ellipsoid
+must then also be invariant under the gain of the next one inside.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ from hsv.model.trim import trim
 
 @dataclass(frozen=True)
 class NominalProblem:
-    """The data of (31)-(35).
+    """The data of the nominal problem (31)-(35), SI.
 
-    ``A`` (r, n, n) and ``B`` (r, n, m) the vertices at sampling ``period``; ``state_scale`` (n) and ``input_scale`` (m)
-    the deviations that cost as much as each other: psi = period diag(1 / state_scale^2) and sigma likewise, so that
-    costs are in seconds and do not depend on the period; ``input_bound`` (m) the largest |u_n|. All SI.
+    ``A`` (r, n, n) and ``B`` (r, n, m) are the vertices, discretised with the ``period`` (s). ``state_scale`` (n) and
+    ``input_scale`` (m) are deviations that cost the same: psi = period diag(1 / state_scale^2), sigma likewise. The
+    factor period gives costs in seconds that hardly depend on it. ``input_bound`` (m) is the largest |u_n|.
     """
 
     A: np.ndarray
@@ -59,20 +59,21 @@ class NominalProblem:
 
 
 def step_deviation(vehicle: VehicleParameters, start: tuple[float, float], target: tuple[float, float]) -> np.ndarray:
-    """Return x_n(0) (5) of a step between two flight points (m, m/s): trim at its start less trim at its target, SI."""
+    """Return x_n(0) (5), SI, of a step: trim at ``start`` minus trim at ``target``, both altitude and velocity, SI."""
     return np.asarray((trim(vehicle, *start).state - trim(vehicle, *target).state)[:N_RIGID])
 
 
 def certified_cost(problem: NominalProblem, K: np.ndarray, Q: np.ndarray, name: str) -> tuple[float, np.ndarray]:
-    """Return the cost (paper eq. 31) that no state of the ellipsoid exceeds under K; residuals (r) of eq. 34 with it.
+    """Return the largest cost (paper eq. 31) from any state of the ellipsoid under K, and the residuals (r) of eq. 34.
 
-    The least gamma with gamma (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K at every vertex: (34) for the given matrices.
+    The cost is the smallest gamma that satisfies (34) with the given matrices at every vertex:
+    gamma (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K with A_c = A + B K.
 
     Args:
         problem: Vertices and weights.
         K: (m, n) gain, SI.
-        Q: (n, n) ellipsoid, SI.
-        name: Name of what is verified, for the error message.
+        Q: (n, n) matrix of the ellipsoid x' Q^-1 x <= 1, SI.
+        name: Name of the gain, for the error message.
 
     Raises:
         DesignError: Q is not positive definite, or x' Q^-1 x does not decrease at a vertex.
@@ -99,11 +100,12 @@ def certified_cost(problem: NominalProblem, K: np.ndarray, Q: np.ndarray, name: 
 
 
 def decrease_between(problem: NominalProblem, K: np.ndarray, outside: np.ndarray) -> np.ndarray:
-    """Return by how much the level in the ellipsoid ``outside`` falls under ``K``, the gain of the next one inside.
+    """Return the decrease (r) of the level in the ellipsoid ``outside`` (n, n) under ``K``, at each vertex.
 
-    The smallest eigenvalue of 1 - M' M at each vertex (r), M = A + B K in the coordinates of ``outside`` (n, n). Where
-    all are above zero the level decreases under every gain between the two, at every point of the polytope: it does
-    under the gain of ``outside`` by (34), and M' M is convex in M. So x_n never leaves it, and comes to the next one.
+    It is the smallest eigenvalue of 1 - M' M, with M = A + B K in coordinates in which the ellipsoid is the unit ball;
+    ``K`` (m, n) is the gain of the next ellipsoid inside. If all values are positive, the level decreases under every
+    gain between the two, at every point of the polytope: under the gain of ``outside`` by (34), and between because
+    M' M is convex in M. x_n then never leaves ``outside``, and reaches the next ellipsoid.
     """
     factor = np.linalg.cholesky(outside)
     M = np.linalg.solve(factor, (problem.A + problem.B @ K) @ factor)
@@ -124,16 +126,15 @@ def _decrease_blocks(contraction: np.ndarray, weighted: np.ndarray) -> np.ndarra
 
 @dataclass(frozen=True)
 class NominalGain:
-    """K = Y Q^-1 of one ellipsoid x' Q^-1 x <= 1, with its evidence.
+    """The gain K = Y Q^-1 of one ellipsoid x' Q^-1 x <= 1, with its evidence.
 
-    ``K`` (m, n) and ``Q`` (n, n) in SI, rounded, ``Y`` (m, n) = K Q; ``gamma`` (s) the bound of (32) as solved,
-    ``certified_gamma`` (s) as recomputed: the cost from any state of the ellipsoid is at most this. Residuals are those
-    of the returned matrices: ``decrease`` (r) smallest eigenvalues of (34) with the certified bound, scaled to a unit
-    diagonal;
-    ``state`` 1 minus the level of the design state, (33); ``input`` (m) 1 minus the largest squared input over its
-    squared bound, (35); ``nesting`` smallest eigenvalue of 1 - Q, Q measured in the ellipsoid outside; ``between`` (r)
-    how much the level in that ellipsoid decreases under K, of an interpolated family; ``radii`` (r) closed-loop
-    spectral radii.
+    ``K`` (m, n) and ``Q`` (n, n) are in SI and rounded, ``Y`` (m, n) is K Q. ``gamma`` (s) is the bound of (32) from
+    the solver, ``certified_gamma`` (s) the recomputed bound of the cost from any state of the ellipsoid. The residuals
+    belong to the rounded matrices. ``decrease`` (r): smallest eigenvalues of (34) with the certified bound, scaled to a
+    unit diagonal. ``state``: 1 minus the level of the design state (33). ``input`` (m): 1 minus the largest squared
+    input over its squared bound (35). ``nesting``: smallest eigenvalue of 1 - Q in coordinates in which the next
+    ellipsoid outside is the unit ball. ``between`` (r): for an interpolated family, the decrease of the level in that
+    ellipsoid under K. ``radii`` (r): closed-loop spectral radii.
     """
 
     K: np.ndarray
@@ -150,7 +151,7 @@ class NominalGain:
     solver: SolverReport
 
     def report(self) -> dict[str, Any]:
-        """Return everything a stranger needs to check the gain, for JSON."""
+        """Return the matrices, residuals and solver report with which the gain can be checked, for JSON."""
         between = {} if self.between is None else {"between_smallest_eigenvalues": self.between.tolist()}
         return {
             "solver": self.solver.as_dict(),
@@ -175,23 +176,23 @@ def nominal_gain(
     interpolated: bool = False,
     name: str = "nominal gain K, LMI (32)-(35)",
 ) -> NominalGain:
-    """Return the gain with the smallest worst-case cost from ``state``, verified after solving.
+    """Return the gain with about the smallest worst-case cost from ``state``, verified after solving.
 
-    Paper eq. 32, eq. 33, eq. 34, eq. 35; of the co-designed model eq. 49, eq. 50, eq. 51, eq. 52.
+    Paper eq. 32, eq. 33, eq. 34, eq. 35; for the co-designed model eq. 49, eq. 50, eq. 51, eq. 52.
 
     Args:
         problem: Vertices, weights and input bounds.
-        state: (n) nominal deviation x_n to start from, SI.
-        outside: (n, n) Q of an ellipsoid that the new one must lie in, or None.
-        interpolated: Whether gains between this one and that of ``outside`` are to be certified, too.
+        state: (n) design state x_n(0), SI.
+        outside: (n, n) Q of an ellipsoid that must contain the new one, or None.
+        interpolated: Whether gains between this one and that of ``outside`` must be certified, too.
         name: Name of the result, for error messages.
 
     Raises:
-        DesignError: No solution, or a solution that fails one of its inequalities when recomputed.
+        DesignError: There is no solution, or the rounded solution violates an inequality.
     """
     white = lqr_whitening(problem.A, problem.B, problem.state_scale, problem.input_scale)
     n, m = problem.B.shape[1:]
-    # With the state at unit length and inputs in units of their bounds, everything sought comes out near one.
+    # With the state at unit length and inputs in units of their bounds, all unknowns are near one.
     x = white.to_white @ state
     size = float(np.linalg.norm(x))
     x /= size
@@ -203,7 +204,7 @@ def nominal_gain(
     limit = None if outside is None else white.to_white @ outside @ white.to_white.T / size**2
 
     def inequalities(Q: np.ndarray, Y: np.ndarray, gamma: np.ndarray, *slack: np.ndarray) -> list[np.ndarray]:
-        # K = Y G^-1; with G = Q these are (33), (34) and (35). X of (35) at its bound, which loses nothing.
+        # K = Y G^-1; with G = Q these are (33), (34) and (35). X of (35) is set to its bound without loss.
         G = slack[0] if slack else Q
         inner = G + G.T - Q
         blocks = [
@@ -220,7 +221,7 @@ def nominal_gain(
             ]
             blocks.append(np.block(rows))
             if slack:
-                # The level in the ellipsoid outside decreases, too; its size is free.
+                # The level in the ellipsoid outside decreases, too; the size of that ellipsoid is free.
                 sized = slack[1] * limit
                 blocks.append(np.block([[G + G.T - sized, S.T], [S, sized]]))
         return blocks if limit is None else [*blocks, limit - Q]
@@ -274,17 +275,17 @@ def nested_gains(
     interpolated: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[NominalGain]:
-    """Return one gain for each of ``scales`` times ``state``, ellipsoids nested, outermost first.
+    """Return gains with nested ellipsoids, outermost first: one for each of ``scales``, for ``state`` times the scale.
 
     Args:
         problem: Vertices, weights and input bounds.
         state: (n) the largest nominal deviation x_n, SI.
         scales: Decreasing factors, the first usually 1.
-        interpolated: Whether gains between those of two ellipsoids are to be certified, too.
-        progress: Called with (solved, total).
+        interpolated: Whether gains between those of two ellipsoids must be certified, too.
+        progress: Called after each gain with the number solved and the total number.
 
     Raises:
-        DesignError: Scales that do not decrease, no solution, or one that fails an inequality when recomputed.
+        DesignError: The scales do not decrease, there is no solution, or a rounded solution violates an inequality.
     """
     if not scales or min(scales) <= 0.0 or any(b >= a for a, b in pairwise(scales)):
         raise DesignError(f"nominal.scales = {list(scales)}: expected decreasing factors above zero")

@@ -1,4 +1,4 @@
-"""Notch filter of the pitch rate (paper eq. 38, eq. 39), discretised by the bilinear rule with prewarping."""
+"""Notch filter of the pitch rate (paper eq. 38, eq. 39), discretised by the bilinear transform with prewarping."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DESIGN_NOTCH_PARAMETERS = (
     Parameter("notch.pole_frequency", [15.0], "natural frequency of the poles", "rad/s", 0.1, 1e3),
     Parameter("notch.pole_damping", [0.5], "damping ratio of the poles: larger is wider", "", 1e-3, 10.0),
 )
-"""Parameters of the notch filter for which a design is made."""
+"""Parameters of the notch filter of a design."""
 
 FLOWN_NOTCH_PARAMETERS = tuple(
     Parameter(p.name.replace("notch.", "notch.flown."), [], f"flown instead of {p.name}", p.unit, p.minimum, p.maximum)
@@ -64,15 +64,15 @@ class NotchSection:
 
 
 def default_sections() -> tuple[NotchSection, ...]:
-    """Return the sections of the default parameters."""
+    """Return the sections of the filter with default parameters."""
     return flown_sections({})
 
 
 def discretise(sections: Sequence[NotchSection], period: float) -> Struct:
-    """Return the sections discretised at ``period`` (s), each prewarped to keep its centre frequency.
+    """Return the sections in discrete time as the struct ``hsv_notch``, each prewarped to keep its centre frequency.
 
     Raises:
-        ParameterError: A centre frequency at or above the Nyquist frequency.
+        ParameterError: A centre frequency is not below the Nyquist frequency.
     """
     found = []
     for i, section in enumerate(sections):
@@ -83,7 +83,7 @@ def discretise(sections: Sequence[NotchSection], period: float) -> Struct:
                 f"expected less than the Nyquist frequency {math.pi / period:.6g} rad/s"
             )
         A, _, C, D = section.state_space()
-        # Bilinear rule s = (1 / half) (z - 1) / (z + 1); this value of half maps the centre frequency onto itself.
+        # Bilinear transform s = (1 / half) (z - 1) / (z + 1); this "half" maps the centre frequency onto itself.
         half = tangent(angle) / section.zero_frequency
         identity = np.eye(2)
         inverse = solve(identity - half * A, identity)
@@ -94,12 +94,15 @@ def discretise(sections: Sequence[NotchSection], period: float) -> Struct:
 
 
 def continuous(sections: Sequence[NotchSection]) -> Struct:
-    """Return the sections in continuous time (paper eq. 39)."""
+    """Return the sections in continuous time (paper eq. 39) as the struct ``hsv_notch`` of the core."""
     return _in_series(sections, [section.state_space() for section in sections])
 
 
 def _in_series(sections: Sequence[NotchSection], found: Sequence[tuple[Any, ...]]) -> Struct:
-    """Return sections A, B, C, D with their equilibria for unit input, which the bilinear rule does not change."""
+    """Return the struct ``hsv_notch`` with the matrices A, B, C, D of each section in ``found``.
+
+    It also contains the equilibrium of each section for unit input, which the bilinear transform does not change.
+    """
     n = len(sections)
     A, B, C, D = (np.array([row[k] for row in found], float) for k in range(4))
     G = np.array([[0.0, 1.0 / (section.pole_frequency * section.pole_frequency)] for section in sections])
@@ -107,11 +110,11 @@ def _in_series(sections: Sequence[NotchSection], found: Sequence[tuple[Any, ...]
 
 
 def notch_response(sections: Sequence[NotchSection], frequencies: np.ndarray) -> np.ndarray:
-    """Return the response H(j omega) (f) of continuous sections in series (paper eq. 37, eq. 38).
+    """Return the frequency response H(j omega), complex (f), of continuous sections in series (paper eq. 37, eq. 38).
 
     Args:
         sections: Sections of the filter.
-        frequencies: (f) rad/s.
+        frequencies: (f) frequencies omega, rad/s.
     """
     total = np.ones(len(frequencies), complex)
     for n in sections:
@@ -123,7 +126,7 @@ def notch_response(sections: Sequence[NotchSection], frequencies: np.ndarray) ->
 def with_notch(
     A: np.ndarray, B: np.ndarray, gain: np.ndarray, notch: Struct
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the open loop of vehicle and notch filter, in discrete time, and the gain of its state.
+    """Return the open loop of vehicle and notch filter in discrete time, and the gain on its extended state.
 
     Args:
         A: (..., n, n) state matrices of the vehicle, discrete time, with the pitch rate among the states.
@@ -132,7 +135,7 @@ def with_notch(
         notch: Discrete filter with s states.
 
     Returns:
-        A (..., n + s, n + s), B (..., n + s, m) and gain (m, n + s) of vehicle and filter.
+        A (..., n + s, n + s), B (..., n + s, m) and gain (m, n + s), with the filter's states last.
     """
     A_s, B_s, C_s, D_s = series(notch)
     n, s = A.shape[-1], len(A_s)
@@ -145,7 +148,7 @@ def with_notch(
 
 
 def series(data: Struct) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return A (2 n, 2 n), B (2 n), C (2 n), D of all n sections in series, with the states in section order."""
+    """Return A (2 n, 2 n), B (2 n), C (2 n), D of the n sections in ``data`` in series; states in section order."""
     size = 2 * len(data.D)
     A, B, C, D = np.zeros((size, size)), np.zeros(size), np.zeros(size), 1.0
     for i in range(len(data.D)):
@@ -160,12 +163,16 @@ def series(data: Struct) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
 
 
 def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
-    """Return the sections of the filter in flight: the values of the flight where given, else those of the design."""
+    """Return the sections of the filter in flight: parameters ``notch.flown.*`` if given, else those of the design.
+
+    Raises:
+        ParameterError: Arrays have different lengths, or there are too many sections.
+    """
     v = validate((*DESIGN_NOTCH_PARAMETERS, *FLOWN_NOTCH_PARAMETERS), values)
     pairs = zip(DESIGN_NOTCH_PARAMETERS[1:], FLOWN_NOTCH_PARAMETERS, strict=True)
     chosen = [flown if v[flown.name] else designed for designed, flown in pairs]
     columns = [v[parameter.name] for parameter in chosen]
-    # The values of the design have the right length: an error names a value of the flight.
+    # The values of the design have the right length, so that an error names a parameter of the flight.
     standard = next((p for p in chosen if p in DESIGN_NOTCH_PARAMETERS), chosen[0])
     n = len(v[standard.name])
     for parameter, column in zip(chosen, columns, strict=True):
@@ -178,24 +185,21 @@ def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
 
 
 class NotchResult(NamedTuple):
-    """Result of a step: ``filtered_pitch_rate`` (rad/s) and the ``filter_state`` (2 n) before the step."""
+    """Result of a step: ``filtered_pitch_rate`` (rad/s), and ``filter_state`` (2 per section) before the step."""
 
     filtered_pitch_rate: float
     filter_state: np.ndarray
 
 
 class NotchFilter:
-    """Notch filter of the pitch rate: sections in series, optionally behind a state estimator.
-
-    Without sections the pitch rate passes unchanged.
-    """
+    """Notch filter of the pitch rate: sections in series; without sections the pitch rate passes unchanged."""
 
     PARAMETERS = (*NOTCH_PARAMETERS, *Estimator.PARAMETERS)
 
     def __init__(self, sections: Sequence[NotchSection], period: float, estimator: Estimator | None = None) -> None:
         self.sections = tuple(sections)
         self.estimator = estimator
-        """Estimator whose pitch rate is filtered; None: the measured pitch rate is filtered."""
+        """State estimator whose pitch rate the caller passes to :meth:`step`; None: that of the measurement."""
         self.data = discretise(sections, period)
         self._state = np.zeros(2 * len(sections))
         self._started = False
@@ -205,8 +209,8 @@ class NotchFilter:
         """Build the filter from :data:`NOTCH_PARAMETERS` and, if the estimator is enabled, its parameters.
 
         Raises:
-            ParameterError: A wrong value, or arrays of different lengths.
-            DesignError, TrimError: As :meth:`hsv.control.estimator.Estimator.from_parameters`.
+            ParameterError: A value is wrong, or arrays have different lengths.
+            DesignError, TrimError: The estimator has no steady gain, or the flight has no initial trim.
         """
         v = validate((*NOTCH_PARAMETERS, ESTIMATOR_ENABLED), values)
         sections = flown_sections(values)
@@ -219,7 +223,7 @@ class NotchFilter:
         self._started = False
 
     def step(self, pitch_rate: float) -> NotchResult:
-        """Filter the next value of ``pitch_rate`` (rad/s)."""
+        """Filter the next value of ``pitch_rate`` (rad/s); the first one after a reset starts at equilibrium."""
         if not self._started:
             lib.hsv_notch_rest(self.data.pointer, pitch_rate, doubles(self._state))
             self._started = True

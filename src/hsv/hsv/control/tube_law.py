@@ -1,9 +1,9 @@
 """Tube-MPC law (paper eq. 36, eq. 48, eq. 54): u = F diag(tau) (x - x_r - x_n) + u_n + u_r within the limits.
 
-The pitch rate in x is the filtered one; that of x_r + x_n is filtered too if ``design.filtered`` (eq. 48). Integral
-action on the altitude and velocity errors is a named extension of the paper's law, off by default: it removes the
-offset that a wrong mass or a lost elevator leaves, and adds two states that the invariant set does not know. Another
-one, off by default as well, divides the elevator command by its estimated effectiveness
+The pitch rate in x is the filtered one; that of x_r + x_n is filtered, too, if ``design.filtered`` (eq. 48). Two
+extensions of the paper's law are off by default. Integral action on the errors of altitude and velocity removes the
+offset that a wrong mass or a loss of elevator effectiveness leaves; it adds two states that the invariant set does not
+include. The other extension divides the elevator command by its estimated effectiveness
 (:mod:`hsv.control.effectiveness`).
 """
 
@@ -43,7 +43,7 @@ from hsv.model.vehicle import COUPLING_PARAMETER
 
 
 class TubeStatusCode(IntEnum):
-    """State of the tube in a step; values of TubeStatus.status."""
+    """State of the tube in a step; values of ``status`` in the message TubeStatus, which describes them."""
 
     OK = 0
     NO_SET = 1
@@ -63,22 +63,22 @@ TUBE_PARAMETERS = (
     *FLOWN_NOTCH_PARAMETERS,
     *HARDWARE_PARAMETERS,
 )
-"""Parameters of the tube law in addition to those of the design; declared hardware affects the status only."""
+"""Parameters of the tube law besides those of the design; those of the hardware affect only the status."""
 
 
 def tube_data(
     gains: np.ndarray, minimum: np.ndarray, maximum: np.ndarray, period: float = 1.0, **others: Any
 ) -> Struct:
-    """Return the law for the core, ``hsv_tube``, by default a feedback on x - x_r without memory.
+    """Return the data of the law as the struct ``hsv_tube`` of the core, by default a feedback on x - x_r alone.
 
     Args:
-        gains: F diag(tau) (c, 2, 9).
-        minimum: Limits of the input (2).
-        maximum: (2)
-        period: T (s).
-        others: ``starts`` (c), the first step of each gain; ``planned``, whether the error is taken from the plan
-            x_r + x_n; ``filtered``, whether the pitch rate of the plan passes the ``notch`` filter; ``integral_rate``
-            (1/s); ``effectiveness``, the estimator.
+        gains: (c, 2, 9) gains F diag(tau), one for each change of tau.
+        minimum: (2) smallest inputs.
+        maximum: (2) largest inputs.
+        period: Control period T, s.
+        others: ``starts`` (c), the first step of each gain; ``planned``, whether the error is that from the plan
+            x_r + x_n, and not from x_r; ``filtered``, whether the pitch rate of the plan passes the ``notch`` filter;
+            ``integral_rate`` (1/s); ``effectiveness``, the data of its estimator.
     """
     values: dict[str, Any] = {
         "starts": np.zeros(1, np.int64),
@@ -92,12 +92,12 @@ def tube_data(
 
 
 def no_tube(vehicle: VehicleParameters) -> Struct:
-    """Return the data that replace a tube law if another controller flies: the input limits of ``vehicle``."""
+    """Return data for flights with another controller than the tube law: zero gains and the limits of ``vehicle``."""
     return tube_data(np.zeros((1, N_INPUTS, N_STATES)), vehicle.input_minimum, vehicle.input_maximum)
 
 
 def tube_memory() -> np.ndarray:
-    """Return the memory of the law, a record that step 0 initialises."""
+    """Return memory for the states of the law, a record ``hsv_tube_memory``; step 0 initialises it."""
     return np.zeros((), dtype("hsv_tube_memory"))
 
 
@@ -107,10 +107,10 @@ def tube_step(
     """Return feedback, unsaturated and limited input (2 each) of a step, and the index of its gain (eq. 21, eq. 36).
 
     Args:
-        data: The law.
-        memory: See :func:`tube_memory`, updated.
-        inputs: Those of the controller.
-        monitored: Whether to step the filter of the plan even if the law does not need it.
+        data: Data of the law, see :func:`tube_data`.
+        memory: States of the law, see :func:`tube_memory`; updated.
+        inputs: Inputs of the controller.
+        monitored: Whether to step the notch filter of the plan even if the law itself does not need it.
     """
     k, feedback_state, q_f, *others = inputs
     sizes = (N_STATES, N_INPUTS, N_STATES, N_INPUTS, len(inputs.filter_state))
@@ -131,18 +131,18 @@ def tube_step(
 
 
 def active_gain(data: Struct, step: int) -> int:
-    """Return the index of the active gain in ``step``."""
+    """Return the index of the gain in ``data`` that is active in ``step``."""
     return max(int(np.searchsorted(data.starts, step, side="right")) - 1, 0)
 
 
 @dataclass(frozen=True)
 class TubeResult(ControllerResult):
-    """The input (2) to apply and how it came about; see the message TubeStatus for the fields.
+    """Result of a step of the tube law with diagnostics; the message TubeStatus describes the fields.
 
-    ``error`` (n) of the rigid states and, with the filter in the loop, of its states; ``tube_centre`` and
-    ``tube_half_width`` (n) are empty, ``level`` is not a number and ``inside`` false where there is no set;
-    ``component`` names the largest component of e - c for its half-width, outside the set; ``tau`` holds one factor, or
-    that of each rigid state (5); ``effectiveness`` is None where it is not estimated.
+    ``error`` e (n) is that of the rigid states and, if the loop has a notch filter, of its states. Without an invariant
+    set, ``tube_centre`` c and ``tube_half_width`` (n) are empty, ``level`` is NaN and ``inside`` is false. Outside the
+    set, ``component`` names the component of e - c that is largest relative to its half-width. ``tau`` holds one factor
+    for all rigid states or one for each (5). ``effectiveness`` is None if it is not estimated.
     """
 
     error: np.ndarray
@@ -159,7 +159,7 @@ class TubeResult(ControllerResult):
 
 
 class TubeLaw(Controller):
-    """The Tube-MPC law with its monitor: where the error is in the invariant set."""
+    """The Tube-MPC law, with a monitor of whether the error is in the invariant set."""
 
     PARAMETERS = (*TUBE_PARAMETERS, *(p for p in WATCHED_PARAMETERS if p is not COUPLING_PARAMETER))
     in_core = True
@@ -179,12 +179,17 @@ class TubeLaw(Controller):
         hardware_covered: bool = True,
         effectiveness: Struct | None = None,
     ) -> None:
-        """Fly ``design`` on a ``vehicle``, by its digest, with this set of inertial coupling.
+        """Set up the law for a flight with ``design``.
 
-        ``None``: those that it is certified for. ``hardware_covered``: whether it is for the hardware flown, too. The
-        tube's set is one of the error with the design's notch filter: with another ``notch`` there is none. ``changes``
-        of tau: first step and factors (5), in order.
-        ``integral_rate``: k (1/s) of K_i = k F(:, [h V]). ``effectiveness``: the estimator of that of the elevator.
+        Args:
+            design: Design of the law.
+            coupling: Set of inertial coupling of the vehicle; ``None``: that for which the design is certified.
+            notch: Notch filter of the flight, by default the design's. The invariant set does not hold for another one.
+            changes: First step and factors (5) of each change of tau, in order.
+            integral_rate: k (1/s) of the integral gain K_i = k F(:, [h V]); 0: no integral action.
+            vehicle: Digest of the vehicle; ``None``: the vehicle for which the design is certified.
+            hardware_covered: Whether the design is certified for the hardware of the flight.
+            effectiveness: Estimator of the elevator effectiveness, if any.
         """
         self.design = design
         self._certified = coupling in (None, design.coupling) and vehicle in (None, design.vehicle)
@@ -200,9 +205,9 @@ class TubeLaw(Controller):
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign | None = None) -> Self:
-        """Build from the design's parameters and :data:`TUBE_PARAMETERS`; a wrong one is named in the error.
+        """Build from the flat parameters ``values``: those of the design and :data:`TUBE_PARAMETERS`.
 
-        ``design``: the one in ``values``, where it is known already.
+        ``design`` is the design in ``values``, if it is already built.
         """
         v = validate(TUBE_PARAMETERS, values)
         design = design or ControlDesign.from_parameters(values)
@@ -219,15 +224,15 @@ class TubeLaw(Controller):
         return np.asarray(self.kernel.gains[active_gain(self.kernel, self._next)])
 
     def reset(self) -> None:
-        """Reset for a new run: the current factor stays, and the scheduled changes will be applied."""
+        """Prepare a new run from step 0: the current factors tau stay, and all scheduled changes apply again."""
         self._next = 0
         self._arrange([(0, self._tau), *self._scheduled])
 
     def change_tau(self, values: Sequence[float]) -> int:
-        """Use the factors ``values``, one or five, from the next step on; return that step.
+        """Use the factors tau in ``values``, one or five, from the next step on; return the number of that step.
 
         Raises:
-            ParameterError: They are not certified.
+            ParameterError: The factors are not certified.
         """
         self._tau = certified(values, self.design.tau_minimum)
         past = [entry for entry in self.factors if entry[0] < self._next]
@@ -236,6 +241,7 @@ class TubeLaw(Controller):
         return self._next
 
     def _arrange(self, factors: list[tuple[int, np.ndarray]]) -> None:
+        """Rebuild the data of the law for these ``factors``: first step and tau (5) of each gain."""
         self.factors = factors
         self._compact = [compact(tau) for _, tau in factors]
         design = self.design
@@ -253,10 +259,10 @@ class TubeLaw(Controller):
         )
 
     def step(self, inputs: ControllerInput) -> TubeResult:
-        """Return the input of this step; the first of a run is step 0.
+        """Return the input of this step with diagnostics; the first step of a run has number 0.
 
         Raises:
-            SignalError: The filter's states are neither those of the notch filter flown nor none.
+            SignalError: ``inputs.filter_state`` is not empty, and its size does not fit the notch filter of the flight.
         """
         k, filter_state = inputs.step, inputs.filter_state
         size, due = len(filter_state), 2 * len(self._notch.D)
