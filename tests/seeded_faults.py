@@ -1,8 +1,8 @@
-"""Seed small faults, each alone, and report which test of their room detects them; half of them are in C.
+"""Seed small faults one at a time and report which test detects each; half of the faults are in C.
 
-The page of parameters belongs to every module that declares some.
+The tests of the parameter page belong to every module that declares parameters.
 
-python3 tests/seeded_faults.py REPORT.jsonl [COUNT]: a report that exists is continued.
+python3 tests/seeded_faults.py REPORT.jsonl [COUNT] continues a report that exists.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ GROUPS = {
     "faults": ("faults", "model/faults/*.py", "model/faults"),
     "flight": ("loop links metrics", "flight/*.py", "flight"),
 }
-"""Headers of the core, sources in Python, and the folder of the tests; for C, tests/core and golden flights as well."""
+"""Headers of the core, Python sources, folder of their tests; C faults also run tests/core and golden flights."""
 OPERATORS = {"+": "-", "*": "/", "<": "<=", ">": ">=", "==": "!=", "&&": "||", "and": "or"}
 OPERATORS |= {new: old for old, new in OPERATORS.items()}
 TOKEN = re.compile(r"(?<= )(?:[-+*/<>]|[<>=!]=|&&|\|\||and|or)(?= )|(?<![\w.])\d+(?:\.\d*(?:e[-+]?\d+)?)?(?![\w.])")
@@ -35,7 +35,7 @@ HIDDEN = {
     ".h": r'(?ms)/\*.*?\*/|"[^"\n]*"|^#[^\n]*',
     ".py": r'''(?s)""".*?"""|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'|#[^\n]*''',
 }
-"""Comments, strings and directives; the same for every version of Python, whose tokens of f-strings differ."""
+"""Comments, strings and directives, found alike in every Python version, whose tokens of f-strings differ."""
 
 
 @cache
@@ -48,14 +48,14 @@ def places(path: Path) -> list[tuple[Path, int, str]]:
 
 
 def changed(token: str) -> str:
-    """Return another operator, the next integer, or a number that is off by 1 %."""
+    """Return the opposite operator, the next integer, or a number that is off by 1 %."""
     if token in OPERATORS:
         return OPERATORS[token]
     return str(int(token) + 1) if token.isdigit() else repr(float(token) * 1.01 or 0.01)
 
 
 def faults(count: int) -> list[tuple[str, Path, int, str]]:
-    """Draw the faults: group, file, place in its text, and the token there."""
+    """Draw the faults: group, file, position in its text, and the token there."""
     draw, found = random.Random(1), []
     for number in range(count):
         group = [*GROUPS][number // 2 % len(GROUPS)]

@@ -1,4 +1,4 @@
-"""The names of the package itself, as a notebook uses them."""
+"""The public names of the package, as a notebook uses them."""
 
 import subprocess
 import sys

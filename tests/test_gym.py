@@ -1,4 +1,4 @@
-"""The environments of Gymnasium: their interface, and the bits of their flights."""
+"""The Gymnasium environments: their interface, and the bits of their flights."""
 
 import os
 import subprocess
@@ -60,7 +60,7 @@ def test_rows_of_the_vector_have_the_bits_of_single_environments(options):
     for _ in range(300):
         actions = random.uniform(-0.3, 0.3, (count, 2))
         observations, rewards, terminated, truncated, infos = vector.step(actions)
-        # A flight that shares its register may end that of a row: then the single one is begun anew with it, too.
+        # Another flight in its vector register may truncate a row; then its single environment is reset, too.
         alone = [singles[i].reset() if over[i] else singles[i].step(actions[i]) for i in range(count)]
         alike = np.flatnonzero(~truncated)
         assert np.array_equal(observations[alike], [alone[i][0] for i in alike])

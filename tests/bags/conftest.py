@@ -1,4 +1,4 @@
-"""Messages with random contents, of the definitions that are installed, serialized without ROS."""
+"""Messages of the installed definitions with random contents, serialised without ROS."""
 
 from types import SimpleNamespace
 
@@ -23,7 +23,7 @@ def topic(name, message_type, qos=None):
 
 
 class Messages:
-    """Makes messages with random contents and serializes them."""
+    """Makes messages with random contents and serialises them."""
 
     def __init__(self, store):
         self.store = store
@@ -33,7 +33,7 @@ class Messages:
         return bytes(self.store.serialize_cdr(message, message.__msgtype__))
 
     def make(self, message_type, length=None, **given):
-        """Make a message; ``length`` fixes that of sequences and text."""
+        """Return a message; ``length`` fixes the length of its sequences and text."""
         values = {
             field.name: given.get(field.name, self._value(field, length))
             for field in fields_of(self.store.fielddefs, message_type)
@@ -49,7 +49,7 @@ class Messages:
         return self.serialize(self.make(message_type, header=header, step=step, **given))
 
     def fault(self, effectiveness, channel="elevator_deflection"):
-        """Make a loss of effectiveness."""
+        """Return the message of an elevator fault, a loss of effectiveness."""
         return self.store.types["hsv_msgs/msg/Fault"](
             channel=channel,
             type="loss_of_effectiveness",
@@ -87,5 +87,5 @@ def messages(store):
 
 @pytest.fixture
 def kit(messages):
-    """What the tests here share, by name, because test folders are no packages."""
+    """Return the helpers that the tests here share; test folders are no packages, so they cannot be imported."""
     return SimpleNamespace(messages=messages, topic=topic, latched=LATCHED, types=TYPES)

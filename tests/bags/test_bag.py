@@ -1,4 +1,4 @@
-"""What is written is read back: by us, and by what others use."""
+"""Written bags are read back, by our reader and by those of other tools."""
 
 import pytest
 import yaml
@@ -17,7 +17,7 @@ STEPS = 120
 
 @pytest.fixture
 def written(kit, tmp_path):
-    """A bag of all our message types, a latched topic and one first seen in flight, and what was written to it."""
+    """Return a bag with all our message types, a latched topic and one first seen in flight, and its contents."""
     names = {f"/hsv/any_{name.rpartition('/')[2].lower()}": name for name in kit.types}
     topics = [kit.topic(name, kind, kit.latched if kind.endswith("/Ready") else None) for name, kind in names.items()]
     writer = BagWriter(tmp_path / "run", topics, {"run_id": "17e5", "commit": "0123"})
@@ -175,7 +175,7 @@ def test_message_that_does_not_fit_its_definition_is_named(kit, tmp_path):
 
 
 def _two_channels(path, kit, kinds):
-    """A bag whose topic has two channels."""
+    """Write a bag in which one topic has two channels."""
     with path.open("wb") as stream:
         writer = Writer(stream)
         writer.start(profile="ros2")

@@ -1,4 +1,4 @@
-"""Decoding at once equals decoding one by one, for all our messages."""
+"""Decoding all messages of a topic at once gives the same columns as decoding them one by one, for all our types."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_at_once_equals_one_by_one(kit, length):
         slow = columns_of(store.fielddefs, name, read)
         fast = columns_at_once(store.fielddefs, name, raw)
         if fast is None:
-            # Text and messages in sequences are the only ones that are left to the other way.
+            # Only types with sequences of text or of messages are left to decoding one by one.
             assert length and name.rpartition("/")[2] in ("Actuator", "Fault", "JointState"), name
         else:
             assert_same(fast, slow)
@@ -66,7 +66,7 @@ def test_bag_columns_of_varying_layout_and_of_no_message(kit, tmp_path, surplus)
     writer = BagWriter(tmp_path / "bag", topics)
     for k in range(4):
         data = messages.stamped("hsv_msgs/msg/Actuator", k * 10, k, active=[fault] * (k // 2))
-        # serialize_message leaves up to eight bytes for every empty sequence of doubles.
+        # serialize_message leaves up to eight surplus bytes for every empty sequence of doubles.
         writer.write("/hsv/actuator", k * 10, data + surplus * (k // 2))
     writer.close()
     bag = Bag(tmp_path / "bag")

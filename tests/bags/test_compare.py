@@ -1,4 +1,4 @@
-"""What counts as equal, and how a difference is named."""
+"""Comparison of bags: equality within a tolerance, and the names of differences."""
 
 import math
 

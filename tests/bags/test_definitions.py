@@ -1,4 +1,4 @@
-"""Definitions come complete, from the ament index, and say so when they cannot."""
+"""Complete message definitions come from the ament index; a missing one is named."""
 
 import pytest
 from recorded_flight import MESSAGES
@@ -22,7 +22,7 @@ def test_text_is_root_then_dependencies_once():
 
 def test_hash_is_that_of_the_type(store):
     assert type_hash("hsv_msgs/msg/TubeStatus") == store.hash_rihs01("hsv_msgs/msg/TubeStatus")
-    # As published by ROS 2 Jazzy.
+    # Hash as published by ROS 2 Jazzy.
     assert type_hash("rosgraph_msgs/msg/Clock") == (
         "RIHS01_692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564"
     )

@@ -1,4 +1,4 @@
-"""Bags of flights whose sensors, links, actuators and air are not ideal: what information and report say of them."""
+"""Bags of flights with imperfect sensors, links, actuators and air: their description and their report."""
 
 import math
 
@@ -47,7 +47,7 @@ def test_what_is_not_ideal_is_described(equipped):
     assert rms == pytest.approx(math.radians(0.01), rel=0.25)
     [(effector, largest)] = described["effector_largest_difference"].items()
     assert effector == "elevator_deflection"
-    # The oscillation, and what the actuator lags behind.
+    # The difference is the oscillation plus the lag of the actuator.
     assert math.radians(0.4) < largest < math.radians(10.0)
     assert described["air_range"] == {"wind_up": [pytest.approx(0.9144)] * 2}
 
@@ -57,7 +57,7 @@ def test_steps_in_which_a_link_held_are_counted(tmp_path):
         'extends = "case1"\n[link.measurement]\nloss = 0.2\n[link.command]\nloss = 0.1\ndelay = 1\n'
     )
     bag = record_flight(tmp_path / "bag", str(tmp_path / "linked.toml"), duration=4.0, fault=1.0)
-    # In step 1 the command of step 0 is due; all others differ from those before.
+    # In step 1 the command of step 0 is due; all other commands differ from the ones before them.
     assert describe(bag)["equipment"]["held_steps"] == {
         name: sum(
             written(lib.hsv_uniforms, 2, 0, step, lib.LINK_LOSS + channel, 0)[0] < share for step in range(1, 201)
@@ -73,7 +73,7 @@ def test_the_report_plots_measured_less_true_effector_and_wind(equipped):
     truth, measured = equipped.columns("/hsv/state"), equipped.columns("/hsv/measurement")
     np.testing.assert_array_equal(errors, measured["state.pitch_rate"] - truth["pitch_rate"])
     [effector] = [curve.y for curve in curves["elevator_deflection"] if curve.kind == "effector"]
-    # Over the period that begins with step 10 it is what step 11 tells.
+    # The value over the period that begins with step 10 is reported in step 11.
     assert effector[10] == equipped.columns("/hsv/forces")["effector.elevator_deflection"][11]
     assert np.isnan(effector[-1]) and np.isfinite(effector[:-1]).all()
     np.testing.assert_allclose(curves["wind_up"][0].y[:-1], 0.9144)
@@ -86,7 +86,7 @@ def test_faults_have_all_parameters_with_units(equipped, capsys):
     assert 'paper">0.5&nbsp;deg</span>' in text and "frequency 2&nbsp;Hz" in text
     info([equipped.path], UnitSystem.paper, False)
     out = capsys.readouterr().out
-    said = " ".join(out.split())  # on a terminal it is folded
+    said = " ".join(out.split())  # on a terminal the text is folded
     assert "oscillation amplitude 0.5 deg, frequency 2 Hz of elevator_deflection, from 2 s to 3 s" in said
     assert "sensors      rms error pitch_rate 0.0" in out and " deg/s\n" in out
     assert "air          wind_up 3 ft/s to 3 ft/s" in out

@@ -1,4 +1,4 @@
-"""Exported tables hold what the bag holds, with units in the header."""
+"""Exported tables have the values of the bag, with units in the header."""
 
 import csv
 import shutil
@@ -40,7 +40,7 @@ def test_what_does_not_fit_into_a_table(bag, tmp_path):
     assert [file.name for file in files] == names
     assert "no topic /clock, /hsv/measurement, /hsv/forces" in files[3].read_text()
     rows = list(csv.DictReader(files[1].open()))
-    # Of sequences that grow, what is not there is not a number.
+    # Where a sequence grows, missing entries of earlier rows are NaN.
     assert rows[2]["error[6] [rad s]"] == "nan" and float(rows[3]["error[6] [rad s]"]) == 6.0
     assert float(rows[0]["error[1] [m/s]"]) == 1.0 and "tau[0]" in rows[0]
     rows = list(csv.DictReader(files[2].open()))

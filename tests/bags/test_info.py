@@ -1,4 +1,4 @@
-"""The description of a bag tells what happened in it."""
+"""The description of a bag reports the events in it."""
 
 import json
 import math

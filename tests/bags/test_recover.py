@@ -1,4 +1,4 @@
-"""A killed writer leaves all but its last chunk, and recovery makes a proper bag of that."""
+"""A killed writer loses only its last chunk, and recovery completes the bag."""
 
 import pytest
 import yaml
@@ -23,7 +23,7 @@ def whole(kit, tmp_path):
 
 @pytest.fixture
 def killed(whole):
-    """The bag of a writer that was killed: the end of its file is missing, and metadata.yaml."""
+    """Return the bag of a killed writer, without the end of its file and without metadata.yaml."""
     (whole / "metadata.yaml").unlink()
     file = whole.rename(whole.with_name("killed")) / "whole_0.mcap"
     data = file.read_bytes()

@@ -1,4 +1,4 @@
-"""Topics of a bag are known by their role, whatever namespace and remappings gave them for names."""
+"""Topics of a bag are identified by their role under any namespace and remapping."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ def flown(tmp_path_factory):
 
 
 def moved(source, target, names):
-    """Return a copy of a bag whose topics have other names, and which says nothing of that, as ros2 bag record's."""
+    """Return a copy of a bag with renamed topics and without a record of the renaming, as from ros2 bag record."""
     return changed_bag(source, target, lambda topic: replace(topic, name=names(topic.name)))
 
 
@@ -58,7 +58,7 @@ def test_a_remapped_topic_is_told_by_its_type_where_no_other_has_it(flown, tmp_p
     renamed = {resolved(COMMAND): "/a", resolved(ACTUATOR): "/b"}
     bag = Bag(moved(flown, tmp_path / "renamed", lambda name: renamed.get(name, name)))
     assert (bag.name_of(COMMAND), bag.name_of(ACTUATOR)) == ("/a", "/b")
-    # With two topics of its type, neither can be told.
+    # If two topics have its type, neither is identified.
     kinds = {name: topic.type for name, topic in bag.topics.items()}
     assert COMMAND not in roles(kinds | {"/c": TOPICS[COMMAND]}, {}, "two.mcap")
 
@@ -67,7 +67,7 @@ def test_topics_of_two_graphs_are_refused(flown, tmp_path):
     kinds = {resolved(role, space): kind for space in ("/veh1", "/veh2") for role, kind in TOPICS.items()}
     with pytest.raises(RecordingError, match=r"two\.mcap: holds the topics of 2 graphs, in /veh1, /veh2"):
         roles(kinds, {}, "two.mcap")
-    # A controller that only looks on makes no second graph.
+    # A shadow controller, which only publishes a command, does not make a second graph.
     shadow = {resolved(role): kind for role, kind in TOPICS.items()} | {"/shadow/hsv/command": TOPICS[COMMAND]}
     assert roles(shadow, {}, "one.mcap") == {role: resolved(role) for role in TOPICS}
 

@@ -1,4 +1,4 @@
-"""The copy of a bag with pictures: what was recorded, a scene and the frames it moves in."""
+"""The copy of a bag for 3-D viewers: the recorded messages, a scene, and the frames in which it moves."""
 
 import numpy as np
 import pytest

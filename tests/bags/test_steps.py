@@ -1,4 +1,4 @@
-"""Rows of the same step, and what is said of bags that lack steps."""
+"""Rows of the same step, and warnings about bags that lack steps."""
 
 import tracemalloc
 
@@ -40,7 +40,7 @@ def test_a_whole_bag_is_joined_as_it_is(kit, tmp_path):
     [
         ([0, 1, 2, 3, 4], [0, 1, 3, 4], [0, 1, 3, 4], [f"{FORCES} lacks 1 of 5 steps, the first at t = 0.04 s"]),
         ([0, 1, 2, 3, 4], [0, 1, 2], [0, 1, 2], [f"{FORCES} lacks 2 of 5 steps, the first at t = 0.06 s"]),
-        ([0, 1, 2, 3], [0, 2, 1, 3], [0, 1, 2, 3], []),  # MCAP does not demand an order
+        ([0, 1, 2, 3], [0, 2, 1, 3], [0, 1, 2, 3], []),  # MCAP does not require an order
         ([0, 1, 1, 2], [0, 1, 2], [0, 1, 2], [f"{STATE} is out of order at t = 0.02 s"]),
         ([0, 1], [1, 2], [1], [f"{STATE}{LACKS} 0.04 s", f"{FORCES}{LACKS} 0.00 s"]),
     ],
@@ -64,7 +64,7 @@ def test_no_common_step_is_refused(kit, tmp_path):
 
 
 def announced_bag(kit, folder, **announced):
-    """Return a bag of three steps of a run that announces others."""
+    """Return a bag of three steps whose run announces more."""
     kinds = {STATE: KINDS[STATE], "/hsv/run": "hsv_msgs/msg/Run"}
     writer = BagWriter(folder / "bag", [kit.topic(name, kind) for name, kind in kinds.items()])
     values = {"last_step": 2, "period": 0.02, "interface_version": INTERFACE_VERSION, **announced}

@@ -1,11 +1,11 @@
-"""Every number of our messages tells its unit."""
+"""Every number in our messages has a unit."""
 
 from hsv.bags.definitions import definition, fields_of
 from hsv.bags.units import KNOWN, parse_units
 
 
 def test_every_double_of_our_messages_names_its_unit(kit, store):
-    """Except a gain, whose elements are of many units, and a fault's parameters, whose units are its type's."""
+    """Except gains, whose elements have many units, and parameters of faults, whose units depend on the type."""
     for kind in kit.types:
         text = definition(kind)
         lines = {line.split()[1]: line for line in text.splitlines() if line.startswith("float64")}

@@ -7,7 +7,7 @@ from hsv.cli.main import run as run_command_line
 
 @pytest.fixture
 def hsv(monkeypatch, capsys, tmp_path):
-    """Run the command as the console script does, in an empty folder and in this process."""
+    """Return a function that runs the command in this process, as the console script does, in an empty folder."""
     monkeypatch.chdir(tmp_path)
 
     def run(*words):

@@ -1,4 +1,4 @@
-"""The commands on bags: what they print, their exit codes, and one line for what a bag lacks."""
+"""The commands on bags: output, exit codes, and a one-line message if a bag lacks something."""
 
 import shutil
 from dataclasses import replace
@@ -22,7 +22,7 @@ RESULTS = {
     "report": ["--out", "out.html"],
     "plot": ["--out", "out.png"],
 }
-"""Commands that need most of a bag, with what they write."""
+"""Commands that need most parts of a bag, with the files that they write."""
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def bag(tmp_path_factory):
 
 @pytest.fixture
 def without(bag, tmp_path):
-    """Return the bag without one of its topics."""
+    """Return a function that copies the bag without one of its topics."""
     return lambda topic: changed_bag(bag, tmp_path / "partial", lambda kind: None if kind.name == topic else kind)
 
 

@@ -1,4 +1,4 @@
-"""The ratios of the bench, and a run held against a recorded one."""
+"""The ratios of the bench, and the comparison of a run with a recorded one."""
 
 import json
 
@@ -17,7 +17,7 @@ def test_the_groups_that_were_asked_for_are_measured_and_held_against_a_recorded
     assert figure["name"] == "in_process" and figure["limit"] == 1.3 and figure["ratio"] > 0.5
     assert figure["note"] == "the same bits" and len(figure["ours"]) == len(figure["theirs"]) == 2
     assert [each["name"] for each in startup] == ["startup_help", "startup_simulate"]
-    # Of a machine on which the loop was twice as fast beside C.
+    # A recorded run in which the loop, compared with C, was twice as fast.
     figure["ratio"], figure["spread"] = figure["ratio"] / 2.0, [value / 2.0 for value in figure["spread"]]
     path = tmp_path / "before.json"
     path.write_text(json.dumps(kept))

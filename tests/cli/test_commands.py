@@ -74,9 +74,9 @@ def test_linearise_in_paper_units_has_the_same_poles(hsv):
     si, paper = hsv("linearise", "--json").json, hsv("linearise", "--units", "paper", "--json").json
     eigenvalues = [np.sort_complex(np.linalg.eigvals(np.array(m))) for m in (si["A_si"], paper["A_paper"])]
     np.testing.assert_allclose(*eigenvalues, atol=1e-6)
-    # ft/s of climb per degree of pitch angle: V pi / 180.
+    # Rate of climb in ft/s per degree of pitch angle: V pi / 180.
     assert paper["A_paper"][0][3] == pytest.approx(7702.0808 * math.pi / 180, rel=1e-6)
-    # Fuel has no unit: ft/s^2 of acceleration per unit.
+    # Fuel has no unit, so this is acceleration in ft/s^2 per unit.
     assert paper["B_paper"][1][0] == pytest.approx(si["B_si"][1][0] / 0.3048, rel=1e-9)
 
 
@@ -196,7 +196,7 @@ def test_a_bad_scenario_or_design_is_refused_before_anything_is_written(hsv, tmp
         ("run case9", "scenario 'case9': expected a path or one of case1"),
         ("info absent", "absent: does not exist, expected a bag directory"),
         ("verify nope.yaml", "design = 'nope.yaml': no such file, expected the path of a .yaml file, a name in "),
-        # Words and options.
+        # Wrong words and options.
         ("trim --units imperial", "Invalid value for '--units': 'imperial' is not one of"),
         ("trim --wings", "No such option: --wings"),
         ("simulat case1", "command 'simulat': unknown (did you mean 'simulate'?)"),
@@ -212,7 +212,7 @@ def test_a_bad_scenario_or_design_is_refused_before_anything_is_written(hsv, tmp
         ("trim --altitude 1 --units si --altitude 2", "--altitude: given twice, expected once"),
         ("montecarlo case1 --samples 3 --samples 4", "--samples: given twice, expected once"),
         ("simulate case1 --out x.csv", "out = 'x.csv': expected a file that ends in .npz"),
-        # An option without effect.
+        # Options without effect.
         ("run case1 --live-port 9000", "live-port = 9000: expected with --live"),
         ("verify baseline --corners", "corners: expected with --scenario"),
         ("linearise --reading printed", "reading = 'printed': expected with model ECM"),

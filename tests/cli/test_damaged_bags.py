@@ -1,4 +1,4 @@
-"""Bags damaged at random: every whole chunk is read, what is lost is said, and nothing is changed in place."""
+"""Bags with random damage: every intact chunk is read, losses are reported, and no file is changed in place."""
 
 import json
 from collections.abc import Callable
@@ -81,7 +81,7 @@ def test_every_whole_chunk_is_read_and_what_is_lost_is_said(hsv, tmp_path, origi
 
 
 def _is_whole(bag, messages, read_through):
-    """Other people's readers take it; read through, checksums and all, which takes a while."""
+    """Assert that other readers accept the bag; ``read_through`` also reads all messages with checksums, slowly."""
     with Reader(bag) as reader:
         assert reader.message_count == messages
     if read_through:

@@ -22,7 +22,7 @@ from hsv.flight.verification import verify
 
 @pytest.fixture
 def small(tmp_path):
-    """An input that takes seconds: four vertices on a grid, one nominal gain, short flights."""
+    """Return design inputs that take seconds: four vertices on a grid, one nominal gain, short flights."""
     (tmp_path / "inputs").mkdir()
     path = tmp_path / "inputs" / "small.toml"
     path.write_text(
@@ -49,7 +49,7 @@ def test_a_design_is_written_here_and_comes_out_alike_on_another_processor(hsv, 
     assert [path.name for path in small.parent.iterdir()] == ["small.toml"]
     assert all(claim.ok for made in verify(load_subject(here / "small.yaml"), quick=True).values() for claim in made)
 
-    # Shipped, but for one entry: the check names that one, all others agree.
+    # The shipped file with one entry changed: the check names this entry, and all others agree.
     certificate.rename(small.parent / certificate.name)
     shipped = read_parameters(here / "small.yaml")
     entry = repr(shipped["feedback.gain"][12])

@@ -1,4 +1,4 @@
-"""Wrong tables of faults, actuators, air, sensors, links, wrong seeds: one line that says what was expected."""
+"""Wrong tables of faults, actuators, air, sensors and links, and wrong seeds: one line with the expected value."""
 
 import pytest
 
@@ -67,7 +67,7 @@ WRONG = [
 
 
 def flight(text):
-    """Return a scenario with tables, or with a line before all tables."""
+    """Return a scenario with these tables, or with a line before all tables."""
     own = {"tables": text, "seed": ""} if text.startswith("[") else {"tables": "", "seed": text}
     return FLIGHT.format(**own)
 

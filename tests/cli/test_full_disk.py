@@ -1,4 +1,4 @@
-"""A disk that is full, and output that no process reads: one line, exit code 2, and no half of a file."""
+"""A full disk, or output that no process reads: a one-line message, exit code 2, and no partial file."""
 
 import os
 import subprocess
@@ -14,7 +14,7 @@ FULL = Path("/dev/full")
 
 
 def command(*words, out, buffered=True):
-    """Run the command as a process of its own: what matters is also what Python does at its end."""
+    """Run the command in its own process, because what Python does at exit matters, too."""
     environment = os.environ | {"PYTHONUNBUFFERED": "" if buffered else "1"}
     ran = subprocess.run(
         [sys.executable, "-m", "hsv.cli.entry", *words], stdout=out, stderr=subprocess.PIPE, text=True, env=environment

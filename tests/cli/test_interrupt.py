@@ -1,4 +1,4 @@
-"""Ctrl-C, which a terminal sends to all processes of a command, is one line and exit code 130; nothing runs on."""
+"""Ctrl-C, which a terminal sends to all processes of a command: one line, exit code 130, no process left."""
 
 import os
 import signal
@@ -30,7 +30,7 @@ COMMANDS = [
 
 
 def ignores_ctrl_c(process):
-    """Return whether a process, one that has not been waited for, has come to the end of Python, or is over."""
+    """Return whether a child process ignores Ctrl-C, as at the end of Python, or has ended as a zombie."""
     lines = Path(f"/proc/{process}/status").read_text().splitlines()
     fields = dict(line.split(":", 1) for line in lines)
     return fields["State"].split()[0] == "Z" or bool(int(fields["SigIgn"], 16) & 1 << signal.SIGINT - 1)
@@ -60,7 +60,7 @@ def test_ctrl_c_is_one_line_and_leaves_no_process(tmp_path, words, delay):
         said = popen.communicate()[1].splitlines()
         if done and popen.returncode == 0:
             pytest.skip("done before it was interrupted")
-        # What was said before, as how long it is going to take, stands above. Python's own start says nothing.
+        # Earlier lines may have been printed, such as the estimated time. Python may print nothing of its own.
         assert popen.returncode == INTERRUPTED
         assert said[-1].startswith("hsv: error: interrupted")
         assert not [line for line in said if "Traceback" in line or "KeyboardInterrupt" in line]

@@ -1,4 +1,4 @@
-"""What ``hsv list`` prints can be used as it is printed."""
+"""The names that ``hsv list`` prints can be used as printed."""
 
 import pytest
 

@@ -10,7 +10,7 @@ from hsv.control.design import find_design
 
 @pytest.fixture
 def campaign(hsv, tmp_path):
-    """Fly a small campaign by the command."""
+    """Fly a small campaign with the command."""
     short_scenario(tmp_path, duration=3, fault=2)
 
     def fly(*words):
@@ -68,7 +68,7 @@ rate = { normal = ["0.05 / s", "0.01 / s"] }
 
 @pytest.fixture
 def drawn(hsv, tmp_path):
-    """Fly a small campaign over distributions by the command."""
+    """Fly a small campaign over distributions with the command."""
     short_scenario(tmp_path, duration=3, fault=2)
     (tmp_path / "drawn.toml").write_text(DRAWN)
     words = ("--samples", "5", "--scale", "0", "--workers", "1", "--out", "drawn.parquet", "--no-page")
@@ -107,7 +107,7 @@ def test_a_distribution_is_shown_but_not_flown_alone(drawn, hsv):
 
 
 class Failing:
-    """Holds the trim, and fails where the flight starts above an altitude."""
+    """A controller that holds the trim and fails if the flight starts above an altitude."""
 
     PARAMETERS = (Parameter("failing.above", 0.0, "altitude", "m", 0.0, 1e5),)
 

@@ -1,4 +1,4 @@
-"""What other launchers than hsv run call before and after a flight."""
+"""The commands that launchers other than hsv run call before and after a flight."""
 
 import tempfile
 from pathlib import Path
@@ -14,7 +14,7 @@ from hsv.bags.recover import recover
 
 @pytest.fixture
 def temporary(tmp_path, monkeypatch):
-    """Return the folder in which temporary ones are made."""
+    """Return the folder in which temporary folders are created."""
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))

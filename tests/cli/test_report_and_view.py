@@ -27,7 +27,7 @@ def test_view_says_how_to_get_a_viewer_where_there_is_none(hsv, bag, monkeypatch
 
 @pytest.fixture
 def asked(monkeypatch, tmp_path):
-    """Return what installs a program that writes down its arguments, and reads them once it was started."""
+    """Return a function that installs a program which records its arguments, and returns them after its start."""
 
     def install(name):
         program = tmp_path / name
@@ -58,7 +58,7 @@ def test_view_with_3d_opens_a_copy_with_pictures_that_is_made_once(hsv, bag, ask
     assert ran.code == 0 and arguments() == f"{scene}\n" and "foxglove.json" in ran.out
     made = scene.stat().st_mtime_ns
     assert hsv("view", str(bag.path.parent)).code == 0 and scene.stat().st_mtime_ns == made
-    # It is no bag, and does no harm.
+    # The folder of the copy is not a bag, and hsv info still works.
     assert hsv("info", str(bag.path.parent)).code == 0
 
 

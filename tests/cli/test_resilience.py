@@ -1,4 +1,4 @@
-"""The command that flies faults of rising severity."""
+"""The command that flies faults of increasing severity."""
 
 import json
 import re
@@ -11,7 +11,7 @@ FAULTS = "elevator_loss,pitch_rate_drop_out"
 
 @pytest.fixture
 def resilience(hsv, tmp_path):
-    """Fly two controllers with two faults in short flights by the command."""
+    """Fly two controllers with two faults in short flights with the command."""
     short_scenario(tmp_path, duration=6, fault=2)
     (tmp_path / "rigid.toml").write_text('extends = "short.toml"\n[notch]\nenabled = false\n')
 

@@ -1,4 +1,4 @@
-"""Bags that the tools of rosbag2 have recorded, split, compressed or converted give what the original gives."""
+"""Bags recorded, split, compressed or converted by rosbag2's tools give the same results as the original."""
 
 import shutil
 from pathlib import Path
@@ -16,11 +16,11 @@ from hsv.bags.reader import Bag
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference" / "case1"
 TIMELESS = ("custom_data", "ending", "faults", "saturation", "tube", "messages", "metrics", "metrics_complete")
-"""What ``hsv info`` says that does not depend on when messages without a stamp were received."""
+"""Output of ``hsv info`` that does not depend on the reception times of messages without a stamp."""
 
 
 def _reindexed(path):
-    """The original without its metadata.yaml: what reindex makes anew comes from the MCAP file."""
+    """Copy the original without its metadata.yaml; reindex makes a new one from the MCAP file."""
     shutil.copytree(REFERENCE, path)
     (path / "metadata.yaml").unlink()
     return path
@@ -39,7 +39,7 @@ FORMS = {
 
 
 QUICK = ("split, zstd by file", "lz4 by message")
-"""The forms that make test reads; the long run reads all."""
+"""The forms that are read in make test; the long run reads all."""
 
 
 @pytest.mark.parametrize("form", [form if form in QUICK else long(form) for form in FORMS])
@@ -59,8 +59,8 @@ def test_every_form_gives_what_the_original_gives(hsv, tmp_path, form):
         for name in ("path", "folder", *(() if attached else ("attachments", "not_covered"))):
             del said[name]
     if not original.custom_data.items() <= bag.custom_data.items():
-        assert form.startswith(("converted", "zstd by"))  # rosbags keeps none
-        for name in ("custom_data", "as_published"):  # the scenario is told by the custom data
+        assert form.startswith(("converted", "zstd by"))  # rosbags keeps no custom data
+        for name in ("custom_data", "as_published"):  # the scenario is in the custom data
             ours[name] = theirs[name]
     assert ours == theirs
 
@@ -89,7 +89,7 @@ def test_wall_clock_log_times_change_nothing(hsv, tmp_path, form):
     for topic in original.topics:
         latched = topic in map(resolved, TRANSIENT_LOCAL)
         assert (bag.topics[topic].qos.durability is QosDurability.TRANSIENT_LOCAL) == latched or topic == ROSOUT, topic
-        # What has no stamp of its own counts for the step before, which may be one of another topic of that step.
+        # Messages without a stamp get the time of the previous message, whose step may be the one before.
         assert np.abs(bag.times(topic) - original.times(topic)).max(initial=0) <= 20_000_000, topic
 
 

@@ -1,4 +1,4 @@
-"""What a command prints for people: metrics in words and groups, one verdict, units, at most 80 columns, no markup."""
+"""Printed summaries: metrics in words and groups, one verdict, units, at most 80 columns, no markup."""
 
 import io
 import re
@@ -44,7 +44,7 @@ def test_what_is_printed_fits_80_columns_in_whole_words(hsv, monkeypatch, words,
     narrow = texts[0].splitlines()
     assert max(len(line.rstrip()) for line in narrow) <= 80
     assert any(line.strip().startswith(printed) for line in narrow)
-    # Numbers are those of two runs: of how long each took, too.
+    # The two texts come from two runs, whose durations differ, so words with digits are left out.
     broken = set(texts[0].split()) - set(texts[1].split())
     assert [word for word in broken if not any(map(str.isdigit, word))] == []
 

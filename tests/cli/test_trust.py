@@ -1,4 +1,4 @@
-"""Bags and campaigns are data: what they name does not run, and no path is followed, unless they are trusted."""
+"""Bags and campaigns are data: no code that they name runs and no path leaves the folder, unless they are trusted."""
 
 import json
 import sys
@@ -32,7 +32,7 @@ class Own:
 
 @pytest.fixture
 def loaded(tmp_path, monkeypatch):
-    """Make a module with a controller; tell whether it has been imported since the last time one asked."""
+    """Write a module with a controller; return a function that tells whether it was imported since the last call."""
     folder = tmp_path / "modules"
     folder.mkdir()
     (folder / "marked.py").write_text(MODULE)
@@ -50,7 +50,7 @@ def loaded(tmp_path, monkeypatch):
 
 @pytest.fixture
 def campaign(hsv, loaded, tmp_path):
-    """Fly a campaign of a scenario that names its controller's code, which the user's own scenario may."""
+    """Fly a campaign whose scenario names its controller's code, as a user's own scenario may."""
     text = 'extends = "case1"\ncontroller = "marked:Own"\ndesign = ""\nduration = "1 s"\nfault = []\n[limits]\n'
     (tmp_path / "own.toml").write_text(text)
     words = ("--samples", "4", "--workers", "1", "--out", "own.parquet", "--no-page")
@@ -99,7 +99,7 @@ def test_no_path_of_a_campaign_leads_out_of_the_folder(hsv, tmp_path, path):
     )
     metadata[DIGEST] = result_digest(metadata)
     parquet.write_table(table.replace_schema_metadata(metadata), "own.parquet")
-    # The design is kept in the result: a flight in process needs no file.
+    # The result contains the design, so a flight in process needs no file.
     assert hsv("montecarlo", "replay", "own.parquet", "--flight", "1").code == 0
     refused = hsv("montecarlo", "replay", "own.parquet", "--flight", "1", "--over-dds")
     assert refused.code == 2
@@ -113,7 +113,7 @@ def flown(tmp_path_factory):
 
 @pytest.fixture
 def crafted(flown, tmp_path):
-    """Return a copy of a bag whose attachments name a controller by its code, for one section of the nodes."""
+    """Return a copy of a bag whose attachments name a controller's code in one section of the nodes."""
 
     def make(section):
         parameters = yaml.safe_load(flown.text("scenario.yaml"))
@@ -138,7 +138,7 @@ def test_no_reader_of_bags_loads_what_a_bag_names(hsv, loaded, crafted, tmp_path
         assert refused.error == f"{bag}: controller = 'marked:Own': code that this file names, run only with --trust"
     assert hsv("replay", bag, "--node", "notch_filter").code == 0
     assert not loaded()
-    assert hsv("replay", bag, "--node", "controller", "--trust").code == 1  # it does not answer as the tube law did
+    assert hsv("replay", bag, "--node", "controller", "--trust").code == 1  # it is not the tube law
     assert loaded()
 
 

@@ -24,12 +24,12 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 class Installed:
-    """Runs commands where an example is installed as the package that it is, into a folder of its own."""
+    """An example, installed as a package into its own folder, and the commands that use it."""
 
     def __init__(self, folder, example):
         self.folder = folder
         source = folder / example
-        # A copy: building leaves traces beside the sources.
+        # Install from a copy, because building leaves files next to the sources.
         for path in (EXAMPLES / example).rglob("*"):
             if path.suffix in (".py", ".toml"):
                 target = source / path.relative_to(EXAMPLES / example)
@@ -54,7 +54,7 @@ class Installed:
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
-    """Return a function that installs an example and, for the one that is compiled, numba."""
+    """Return a function that installs an example, with numba for the compiled one."""
 
     @cache
     def install(example):
@@ -71,7 +71,7 @@ def installed(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("example", "scenario", "altitude", "velocity"),
-    # Integral action takes the error that the fault leaves away, if it is fast; feedback alone does not.
+    # Fast integral action removes the error that the fault leaves; proportional feedback does not.
     [long("lqr", "lqr", 1.0, 0.1), long("lqr", "lqr_winged_cone", 10.0, 0.5), long("compiled", "compiled", 30.0, 5.0)],
 )
 def test_it_flies_without_a_design_and_holds_the_commands(installed, example, scenario, altitude, velocity):
@@ -102,7 +102,7 @@ def test_its_page_is_true_to_the_last_command(installed, tmp_path, example):
 
 @pytest.fixture(scope="module")
 def checkout(tmp_path_factory):
-    """Return a folder with the example in C as in the checkout, built, flown and in a campaign as printed."""
+    """Return a folder with the C example, built, flown and used in a campaign as its page prints."""
     folder = tmp_path_factory.mktemp("checkout")
     example = Path("examples", "c_gain_scheduled")
     shutil.copytree(EXAMPLES.parent / example, folder / example, ignore=shutil.ignore_patterns("*.so"))
@@ -126,7 +126,7 @@ def test_the_example_in_c_is_built_flown_and_compared_as_its_page_says(checkout,
     assert abs(ours.metrics["altitude_end_error"]) < 30.0 and abs(ours.metrics["velocity_end_error"]) < 5.0
     assert ours.fingerprint != theirs.fingerprint
     assert Path("scheduled_and_tube.png").exists()
-    # An example's campaigns, bags and pages are called by its scenario's file: no two examples' are alike.
+    # An example's campaigns, bags and pages are named after its scenario file, so no two examples' names agree.
     [result] = Path("campaigns").glob("c_gain_scheduled_*.parquet")
     assert len(parquet.read_table(result)) == 100
 
@@ -139,7 +139,7 @@ MISSING = [tool for tool in TOOLS if shutil.which(tool) is None]
 
 @pytest.fixture
 def board(tmp_path):
-    """A folder with the example as in the checkout, not built."""
+    """Return a folder with the example as in the checkout, not built."""
     shutil.copytree(Path(__file__).parents[2] / EXAMPLE, tmp_path / EXAMPLE, ignore=shutil.ignore_patterns("build"))
     return tmp_path
 
@@ -159,13 +159,13 @@ def test_the_page_of_the_board_is_true_to_the_last_command(board):
     [shown] = blocks(PAGE, "text")
     fingerprint = shown.text.splitlines()[0]
     assert fingerprint in done.stdout
-    # Another compiler gives other counts; those of the page are of the same size.
+    # Another compiler gives other counts; they must be of the same order as those of the page.
     for found, printed_number in zip(counts(done.stdout), counts(shown.text), strict=True):
         assert 0.5 < found / printed_number < 2.0
 
 
 def counts(text):
-    """Return instructions, stack and code in the report of a flight."""
+    """Return instructions, stack and code size in the report of a flight."""
     lines = re.findall(r"^(?:instructions per step|stack|code and constants): .*", text, re.MULTILINE)
     return [int(number) for line in lines for number in re.findall(r"[1-9]\d*", line)]
 

@@ -1,4 +1,4 @@
-"""Every reader of files on mutated ones: values, or an error of one line; never anything else, and no partial file."""
+"""Every reader of files, given mutated files, returns values or a one-line error, and never writes a partial file."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Fuzz = Callable[[st.SearchStrategy[Mutated], Callable[[Mutated], object]], None]
 
 @pytest.fixture(params=[pytest.param(QUICK, id="short"), pytest.param(LONG, id="long", marks=[pytest.mark.fuzz])])
 def fuzz(request: pytest.FixtureRequest) -> Fuzz:
-    """Return what gives mutated files to a reader, in an order that is the same every time in the short form."""
+    """Return a function that passes mutated files to a reader; in the short form their order is always the same."""
     examples = request.config.getoption("--fuzz-inputs") if request.param == LONG else QUICK
 
     def run(files: st.SearchStrategy[Mutated], read: Callable[[Mutated], object]) -> None:
@@ -72,7 +72,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def small_bag(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the same without the parameters, which take most of its space."""
+    """Return the same bag without the parameters, which take most of its space."""
     return changed_bag(bag, tmp_path_factory.mktemp("small") / "bag", attachments=None)
 
 
@@ -150,7 +150,7 @@ def test_a_bag(fuzz: Fuzz, small_bag: Path, tmp_path: Path, request: pytest.Fixt
         found = Bag(folder)
         bag_warnings(found)
         if not long and crc32(given.data) % 5:
-            return  # what follows takes most of the time
+            return  # the rest takes most of the time
         describe(found)
         try:
             recover(folder, out)

@@ -6,7 +6,7 @@ from hsv_paper.cli import main
 
 @pytest.fixture
 def hsv_paper(monkeypatch, capsys, tmp_path):
-    """Run the command as the console script does, in an empty folder and in this process."""
+    """Return a function that runs the command in this process, as the console script does, in an empty folder."""
     monkeypatch.chdir(tmp_path)
 
     def run(*words):

@@ -20,14 +20,14 @@ from hsv_paper.designs import design
 CLAIMS = [claim for claims in GROUPS.values() for claim in claims]
 PUBLISHED = (Path(__file__).parents[2] / "docs" / "claims.md").read_text(encoding="utf-8")
 OVER_VEHICLES = re.compile(r"corner|vehicles|flights")
-"""What is read of all vehicles, of which the tests fly few: what is published is at least as bad."""
+"""Readings over all vehicles. The tests fly only a few, so the published numbers are at least as unfavourable."""
 SLOW = ("the set grows with the disturbances", "the co-designed model conforms")
 NOISE = 1e-8
-"""In the page's units: smaller numbers are rounding, and differ between processors."""
+"""Smaller numbers, in the page's units, are rounding errors and differ between processors."""
 
 
 class Row(NamedTuple):
-    """A reading as the page has it: whether it is of the statement itself, numbers in the page's units, its yes."""
+    """A reading on the page: whether it leads, its numbers in the page's units, and whether it holds."""
 
     what: str
     leads: bool
@@ -37,13 +37,13 @@ class Row(NamedTuple):
 
 
 def number(text):
-    """Return the number in a cell: 'at most 0.5 deg', 'unbounded'."""
+    """Return the number in a cell such as 'at most 0.5 deg'; infinite without a number, as in 'unbounded'."""
     found = re.search(r"-?\d[\d.]*(e[-+]?\d+)?", text)
     return float(found[0]) if found else math.inf
 
 
 def published(claim, text=PUBLISHED):
-    """Return the verdict that a page prints of a claim, and its rows."""
+    """Return the verdict on a claim that a page prints, and its rows."""
     section = text.split(f"\n### {claim.name[0].upper()}{claim.name[1:]}\n")[1].split("\n## ")[0].split("\n### ")[0]
     verdict = re.search(r"\. \*\*(.*?)\.\*\*", section)[1].lower()
     cells = [re.split(r"(?<!\\) \| ", line.strip("| ")) for line in section.splitlines() if line.startswith("| ")][2:]
@@ -56,7 +56,7 @@ def published(claim, text=PUBLISHED):
 
 @pytest.fixture(scope="module")
 def evidence():
-    """On the nominal vehicle and two corners: one at which robust MPC is lost with each gain beyond the fourth."""
+    """Return evidence on the nominal vehicle and two corners; one is lost with RMPC gains beyond the fourth."""
     over = corners(load_vehicle().uncertainty)
     return Evidence(over=[over[0], over[36], over[-1]])
 
@@ -103,7 +103,7 @@ def test_every_claim_is_measured_and_says_why(claim, evidence):
     assert len(claim.why) > 20
     assert len({(r.what, r.threshold(), r.actuators) for r in result.readings}) == len(result.readings)
     for reading in result.readings:
-        # Infinite is what grows without bound or has not decayed by the end, and is shown as that.
+        # A value that is unbounded, or has not decayed by the end, is infinite and printed as such.
         assert not math.isnan(reading.value), reading.what
     verdict, rows = published(claim)
     assert [row.leads for row in rows] == [i < result.leading for i in range(len(result.readings))]
@@ -114,7 +114,7 @@ def test_every_claim_is_measured_and_says_why(claim, evidence):
             assert row.measured == pytest.approx(measured, rel=2e-3, abs=NOISE), row.what
             assert row.threshold == pytest.approx(threshold, rel=2e-3, abs=NOISE), row.what
         elif "with notch relative to without" in row.what:
-            continue  # a quotient of two worst vehicles: with more of them it may grow or fall
+            continue  # a ratio of two worst vehicles, which may change either way with more vehicles
         elif reading.at_most is not None:
             assert row.measured >= measured * (1.0 - math.copysign(2e-3, measured)) - NOISE, row.what
         else:

@@ -19,7 +19,7 @@ PAGES = Path(__file__).parents[2] / "docs/figures"
 
 @pytest.fixture(scope="module")
 def draw():
-    """Each figure is drawn once; the flights in process are those of the graph, bit for bit."""
+    """Return a function that draws each figure once."""
 
     @cache
     def drawn(number):

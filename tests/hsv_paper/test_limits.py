@@ -1,4 +1,4 @@
-"""Fastest transfer and deepest fault by optimal control; the page has the numbers that the long tests recompute."""
+"""Fastest transfer and deepest fault by optimal control; the long tests recompute the page's numbers."""
 
 from pathlib import Path
 
@@ -36,7 +36,7 @@ LEAST_TIME = 10.01
 
 
 def disturbed(count, seed=1):
-    """States (count, 9) and inputs (count, 2) about the trim, and periods (s) with their substeps."""
+    """Return random states (count, 9) and inputs (count, 2) about the trim, periods (s) and numbers of substeps."""
     random = np.random.default_rng(seed)
     point = trim(VEHICLE, *TARGET)
     state = point.state + random.uniform(-1.0, 1.0, (count, 9)) * STATE_SCALE
@@ -45,7 +45,7 @@ def disturbed(count, seed=1):
 
 
 def slope_along(j, reach, part, state, inputs, period, substeps):
-    """Return the central difference of what ``transitions`` returns along state, input or period ``j``."""
+    """Return the central difference of a part of ``transitions`` along state, input or period ``j``."""
     change = np.zeros(12)
     change[j] = reach
     above, below = (
@@ -83,7 +83,7 @@ def test_curvature_is_the_change_of_the_derivatives():
 
 @pytest.mark.long
 def test_the_deepest_fault_known_after_a_fifth_of_a_second():
-    """The optimum is where full elevator without fuel just turns the nose: to the resolution of the bisection."""
+    """At the optimum, full elevator without fuel just turns the nose, to the resolution of the bisection."""
     problem = recovery(VEHICLE, ENVELOPE, 0.2, HORIZON)
     found = problem.solve(at_trim(problem), 1e-4)
     assert found.scalar == pytest.approx(turning_limit(VEHICLE, 0.2), abs=2e-4)
@@ -100,7 +100,7 @@ def test_an_iteration_that_ends_early_is_refused(monkeypatch):
 
 
 def test_static_limits_are_those_of_trims():
-    """At the target as printed in the issue, 0.41; the fastest and lowest point of the envelope needs least."""
+    """At the target 0.41; the fastest and lowest point of the envelope needs the least effectiveness."""
     at_target = static_limit(VEHICLE, np.array([TARGET]))
     assert at_target == pytest.approx(0.4064, abs=1e-4)
     points = envelope_points(ENVELOPE)
@@ -108,7 +108,7 @@ def test_static_limits_are_those_of_trims():
     best = min(points, key=lambda point: static_limit(VEHICLE, point[None]))
     assert best == pytest.approx([ENVELOPE.altitude_range[0], ENVELOPE.velocity_range[1]])
     assert static_limit(VEHICLE, points) == static_limit(VEHICLE, best[None]) < at_target
-    # No trim at a velocity that no fuel gives.
+    # There is no trim at a velocity that no amount of fuel can hold.
     assert static_limit(VEHICLE, np.array([[TARGET[0], 3.0 * TARGET[1]]])) == np.inf
 
 
@@ -120,7 +120,7 @@ def test_each_delay_costs_effectiveness():
 
 @pytest.mark.long
 def test_the_fastest_transfers_of_the_page():
-    """Another first guess and mesh change the times by less than 0.1 %."""
+    """Another first guess and another mesh change the times by less than 0.1 %."""
     rest = fastest_transfer(VEHICLE, PERIODS, settling=False)
     assert rest.found.scalar == pytest.approx(10.626, abs=2e-3)
     assert rest.change < 0.1
@@ -153,7 +153,7 @@ def test_the_deepest_faults_of_the_page():
 
 @pytest.mark.long
 def test_the_limits_of_all_corners():
-    """Over all corners the target's trim needs at most 0.4386, and turning after 0.2 s at most 0.491: below 0.5."""
+    """Over all corners, the target's trim needs at most 0.4386, and turning after 0.2 s at most 0.491: below 0.5."""
     others = [VEHICLE.perturbed(corner) for corner in corners(ENVELOPE.uncertainty)[1:]]
     static = [static_limit(vehicle, np.array([TARGET])) for vehicle in others]
     turning = [turning_limit(vehicle, 0.2) for vehicle in others]
@@ -174,7 +174,7 @@ def flown(scenario, **changes):
 
 
 def test_settling_times_of_a_ramp_count_from_its_beginning():
-    """As docs/governor.md prints them."""
+    """The values printed in docs/governor.md."""
     assert settling_times(flown("case1_governed")) == pytest.approx([29.0, 28.8], abs=0.05)
 
 

@@ -41,7 +41,7 @@ def behind(*names, delay=0.0):
     [((), -0.004), (("elevator_150",), 0.005), (("elevator_50",), -0.037), (("elevator_20",), -0.31)],
 )
 def test_without_the_notch_a_slow_elevator_stabilises_the_modes(elevator, expected):
-    """The published numbers, of the worst of both ends of the step before the fault, to their own rounding."""
+    """Published numbers to their last digit, the worse of both ends of the step before the fault."""
     vehicle = load_vehicle().coupled("paper_like")
     hardware = behind("fuel_10", *elevator) if elevator else Hardware()
     found = Feedback.of(design("baseline"), notched=False, hardware=hardware).growth(vehicle)
@@ -75,7 +75,7 @@ def test_delays_borne_and_rigid_damping_behind_published_elevators(elevator, sam
 
 
 def test_noise_of_the_fine_sensors_is_half_a_degree_of_elevator():
-    """The published number; and a simulation of the loop gives what the covariance says."""
+    """The published number; a simulation of the loop agrees with the covariance."""
     vehicle, noise = load_vehicle().coupled("paper_like"), np.zeros(9)
     channels = SENSOR_SETS["fine"].channels
     noise[:5] = [channels[name]["noise"] for name in STATE_NAMES[:5]]

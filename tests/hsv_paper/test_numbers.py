@@ -1,4 +1,4 @@
-"""Numbers that claims rest on: sets, levels, disturbances and the peaks of the modes."""
+"""Numbers behind the claims: sets, levels, disturbances, and peaks of the modes."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_what_loses_a_step_s_share_of_its_level_decreases():
     A = np.array([[[0.5, 0.0], [0.0, 0.5]], [[0.0, 0.9], [0.0, 0.0]]])
     B = np.zeros((2, 2, 1))
     assert kept_of_level(A, B, np.zeros((1, 2)), np.eye(2)) == pytest.approx(0.81)
-    # The same map seen in another metric grows: a shape decides, not the poles alone.
+    # With another shape matrix the same map grows: the shape decides, not only the poles.
     assert kept_of_level(A, B, np.zeros((1, 2)), np.diag([4.0, 1.0])) > 1.0
 
 

@@ -37,7 +37,7 @@ def test_robust_mpc_is_lost_without_a_notch_and_would_not_be_with_one():
 
 
 def test_limits_of_the_notch_of_the_nominal_vehicle():
-    """As docs/study/notch.md prints them."""
+    """The values printed in docs/study/notch.md."""
     centres, depths = np.array([8.0, 15.0, 26.0]), np.geomspace(0.005, 0.5, 17)
     paper_like, derived = (list(stable_range(coupled, [{}], centres, depths).values()) for coupled in SETS)
     assert paper_like == ["≤ 8", "≥ 26", "≥ 0.5"]
@@ -59,7 +59,7 @@ def test_a_coarse_study_has_a_page_with_its_findings():
 
 
 def test_hardware_limits_of_the_baseline_and_of_the_loop_without_notch():
-    """Where stability changes the loop is on the edge; without the notch elevators of a middle range destabilise it."""
+    """The growth is zero at each limit. Without the notch, elevators in a middle range of bandwidth are unstable."""
     with_notch, without = hardware.CASES[:2]
     for case in (with_notch, without):
         borne = hardware.tolerated_delay(case, hardware.ELEVATORS["50 rad/s"])

@@ -1,4 +1,4 @@
-"""What the package declares and how it is built: dependencies, extras and bounds; the compiler that it needs."""
+"""The package's metadata and build: dependencies, extras, version bounds, and the required compiler."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from hsv.cli.main import EXTRAS
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "src" / "hsv" / "hsv"
 BY_NAME = {"clarabel"}
-"""Given to cvxpy by its name only, as the solver."""
+"""Modules that are not imported by us; cvxpy gets the solver by its name."""
 DECLARED = [Requirement(line) for line in requires("hsv") or []]
 
 OF_ROS = {"ament_index_python"}
-"""Imported where a ROS workspace is sourced only."""
+"""Modules that are imported only if a ROS workspace is sourced."""
 
 
 def extra_of(requirement):
-    """Return the extra that a requirement belongs to, "all" left out; "" if it is always installed."""
+    """Return the extra of a requirement, other than "all"; "" if it is always installed."""
     found = re.search(r'extra == "(\w+)"', str(requirement.marker or ""))
     return found[1] if found else ""
 
 
 def imported():
-    """Return the modules outside the standard library that the package imports, wherever and whenever it does."""
+    """Return all modules outside the standard library that the package imports, also inside functions."""
     found = set(BY_NAME)
     for path in SOURCES.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -86,7 +86,7 @@ for words in sys.argv[1:]:
     except SystemExit as end:
         print(words, end.code or 0, file=sys.stderr)
 """
-"""Commands one after the other in a Python in which no library of an extra can be imported."""
+"""A program that runs commands in turn, in a Python that cannot import any library of an extra."""
 
 
 WITHOUT = {
@@ -102,7 +102,7 @@ WITHOUT = {
     "montecarlo case1 --samples 2": "campaign",
     f"export {ROOT}/bags/reference/case1 --scene": "live",
 }
-"""Commands, with the extra that each needs."""
+"""Commands with the extra that each needs; "" if none."""
 
 
 @pytest.mark.long

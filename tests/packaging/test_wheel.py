@@ -1,6 +1,6 @@
-"""The package as pip installs it, in virtual environments without ROS, on the newest and the oldest libraries allowed.
+"""The package, installed by pip without ROS in virtual environments with the newest and oldest libraries allowed.
 
-Needs a package index; where there is none, the tests say so and are skipped.
+Needs a package index; without one, the tests are skipped with this reason.
 """
 
 import json
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.long
 
 
 def run(*command, cwd=None):
-    """Run a command with nothing of this process' environment but how it reaches a package index."""
+    """Run a command with an empty environment except for the settings of the package index."""
     handed_on = {
         name: value for name, value in os.environ.items() if name.startswith("PIP_") or "proxy" in name.lower()
     }
@@ -42,7 +42,7 @@ def checked(*command, cwd=None):
 
 @pytest.fixture(scope="module")
 def index():
-    """Skip where pip finds no package index."""
+    """Skip the tests if pip finds no package index."""
     asked = run(sys.executable, "-m", "pip", "index", "versions", "setuptools")
     if asked.returncode:
         pytest.skip(f"no package index: {asked.stderr.strip().splitlines()[-1]}")
@@ -50,7 +50,7 @@ def index():
 
 @pytest.fixture(scope="module")
 def sdist(tmp_path_factory):
-    """Build the source distribution from a copy of the sources, with the link that leads out of them."""
+    """Build the source distribution from a copy of the sources, including the link that leads out of them."""
     folder = tmp_path_factory.mktemp("sources")
     made = shutil.ignore_patterns("__pycache__", "*.egg-info", "build")
     shutil.copytree(ROOT / "src" / "hsv", folder / "src" / "hsv", symlinks=True, ignore=made)
@@ -61,7 +61,7 @@ def sdist(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def wheel(sdist, index):
-    """Build the wheel from the source distribution alone."""
+    """Build the wheel from the source distribution only."""
     folder = sdist.parent / "wheel"
     checked(sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", folder, sdist)
     (wheel,) = folder.glob("hsv-*.whl")
@@ -70,7 +70,7 @@ def wheel(sdist, index):
 
 @pytest.fixture
 def environment(tmp_path):
-    """Return a function that makes a bare virtual environment, installs into it, and returns its ``bin``."""
+    """Return a function that creates a virtual environment, installs into it, and returns its ``bin`` folder."""
 
     def make(*words):
         checked(sys.executable, "-m", "venv", tmp_path / "venv")
@@ -83,7 +83,7 @@ def environment(tmp_path):
 
 
 def fly(folder, cwd):
-    """Fly Case 1 and check that it is the published flight."""
+    """Fly Case 1 and check that the flight has the published fingerprint."""
     table = tomllib.loads((ROOT / "src/hsv/hsv/flight/fingerprints.toml").read_text(encoding="utf-8"))
     flown = json.loads(checked(folder / "hsv", "simulate", "case1", "--json", cwd=cwd))
     assert flown["fingerprint"] == table["case1"]["fingerprint"]
@@ -98,10 +98,10 @@ def test_both_distributions_hold_every_file_of_the_package(sdist, wheel):
     assert expected <= in_sdist
     assert {"setup.py", "pyproject.toml", "package.xml", "resource/hsv"} <= in_sdist
     in_wheel = set(ZipFile(wheel).namelist())
-    # The paper's claims and figures are in hsv_paper.
+    # The paper's claims and figures belong to hsv_paper.
     assert not [name for name in in_wheel if "claims" in name or "figures" in name or name.startswith("hsv_paper")]
     assert {name for name in in_wheel if name.startswith("hsv/")} == expected | {"hsv/core/_core.abi3.so"}
-    assert wheel.stem.split("-")[2:4] == ["cp311", "abi3"]  # one for every Python from 3.11 on
+    assert wheel.stem.split("-")[2:4] == ["cp311", "abi3"]  # one wheel for every Python from 3.11 on
 
 
 def test_a_bare_environment_flies_and_reports(wheel, environment, tmp_path):

@@ -1,4 +1,4 @@
-"""The layout for viewers names what is recorded, and nothing else."""
+"""The layout for viewers names recorded topics only."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Numbers that the literature prints and the control study demands: of the vehicle, of Case 1 and its variants."""
+"""Numbers printed in the literature or required by the control study: of the vehicle, Case 1 and its variants."""
 
 import math
 
@@ -62,7 +62,7 @@ def test_limits_of_the_scenario_are_kept(flown, name):
 
 
 def test_case1_is_what_the_control_study_measured(flown):
-    # Control study, section 7; its gains differ in the last digits, so the tolerance is theirs.
+    # Control study, section 7. Its gains differ in the last digits, hence the tolerances.
     _, m = flown("case1")
     assert m["velocity_rise_time"] == pytest.approx(50.3, abs=1)
     assert m["velocity_settling_time"] == pytest.approx(71.8, abs=1)
@@ -125,7 +125,7 @@ def test_the_paper_s_decoupled_plant_flies_case1_too():
     [("case1_rmpc", "case1_tube_dm", 1059), ("case1_rmpc_last_k", "case1_tube_dm_family", 23)],
 )
 def test_what_the_fault_leaves_of_the_altitude_without_a_tube(flown, robust, tube, altitude_error):
-    # Control study, section 7: the size of the error is that of K.
+    # Control study, section 7: the size of the error depends on K.
     _, without = flown(robust)
     _, with_tube = flown(tube)
     assert without["altitude_end_error"] == pytest.approx(altitude_error * FOOT, rel=0.02)
@@ -157,7 +157,7 @@ def lightly_damped(vehicle):
 
 
 def test_elastic_trim_is_within_half_a_percent_of_the_full_model():
-    # Parker et al.: eta 0.9700 and 0.7967 at this point, full model with canard.
+    # Parker et al.: eta is 0.9700 and 0.7967 at this point, full model with canard.
     point = trim(load_vehicle().coupled(), ALTITUDE, VELOCITY)
     assert point.state[5] * ELASTIC == pytest.approx(0.9700, rel=5e-3)
     assert point.state[7] * ELASTIC == pytest.approx(0.7967, rel=5e-3)
@@ -187,7 +187,7 @@ def test_decoupled_model_keeps_structural_modes_exactly_and_rigid_poles_nearly()
 
 
 def test_coupled_model_has_the_seven_motion_modes_of_figure_4():
-    # Five of the rigid body and two aeroelastic: a real pair, the phugoid pair, one at the origin; two pairs.
+    # Five modes of the rigid body (a real pair, the phugoid pair, a pole at the origin) and two aeroelastic pairs.
     vehicle = load_vehicle().coupled()
     point = trim(vehicle, ALTITUDE, VELOCITY)
     poles = np.linalg.eigvals(jacobian(point.state, point.input, vehicle)[0])

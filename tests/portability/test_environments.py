@@ -1,4 +1,4 @@
-"""The same flights on other processors, Pythons and packages, and with other kernels of the libraries."""
+"""The same flights on other processors, Pythons and packages, and with other kernels of libraries."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from other_environments import changed_flights, fly
 from portability import Environment
 
 
-# Slow, so that make test leaves them out. In this order, because two workers are given two tests each: the emulated
-# processors, which take longest, side by side.
+# Slow, so that make test leaves them out. In this order, two workers with two tests each run the emulated processors,
+# the slowest, side by side.
 @pytest.mark.portability
 @pytest.mark.parametrize(
     ("name", "field", "begins"),
@@ -35,7 +35,7 @@ def test_flights_are_as_published(name, field, begins):
 
 
 FMA = "fma" in Path("/proc/cpuinfo").read_text().split()
-"""Where there is none, libraries have nothing to choose from."""
+"""Without FMA, libraries have no choice of kernels."""
 
 
 def test_libm_blas_and_numpy_as_on_an_old_processor():

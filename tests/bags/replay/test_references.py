@@ -1,4 +1,4 @@
-"""Today's code still does what the committed reference bags recorded."""
+"""The present code computes what the committed reference bags have recorded."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A bag is repeated bit for bit; whatever is changed is found and named."""
+"""A bag is replayed bit for bit; every change in it is found and named."""
 
 import re
 
@@ -18,7 +18,7 @@ CONTROLLER = "tube_mpc"
 
 
 def quiet(*_):
-    """No progress."""
+    """Ignore the progress."""
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""The page of a campaign as a browser shows it."""
+"""The page of a campaign in a browser."""
 
 import pytest
 from page_checks import PageChecks
@@ -33,7 +33,7 @@ def show(browser, page):
 
 
 class TestPage(PageChecks):
-    """As all pages."""
+    """The checks of all pages."""
 
 
 def ends(browser, name, axis):

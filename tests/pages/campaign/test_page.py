@@ -1,4 +1,4 @@
-"""The page of a campaign."""
+"""The HTML page of a campaign."""
 
 import re
 

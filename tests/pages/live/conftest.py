@@ -1,4 +1,4 @@
-"""A short flight's messages, as the live node gets them, and what decodes them."""
+"""The messages of a short flight as the live node receives them."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from hsv.pages.live.hub import Hub
 from hsv.pages.live.server import PageServer
 
 Message = tuple[str, int, bytes]
-"""Topic, simulated time (ns) and bytes."""
+"""Topic, simulated time (ns) and bytes of a message."""
 
 
 @pytest.fixture(scope="session")
 def bag(tmp_path_factory):
-    """Four seconds of Case 1 whose fault begins at two."""
+    """Return the bag of 4 s of Case 1, with the fault at 2 s."""
     return record_flight(tmp_path_factory.mktemp("bags") / "flown", duration=4.0, fault=2.0)
 
 
 @pytest.fixture(scope="session")
 def messages(bag):
-    """All step messages in the order in which a step is recorded."""
+    """Return all step messages, in the order in which the messages of a step are recorded."""
     by_time: dict[int, list[Message]] = {}
     for topic in TOPICS:
         for time, data in bag.messages(topic):

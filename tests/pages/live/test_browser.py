@@ -1,4 +1,4 @@
-"""The live page as a browser shows it: a flight over DDS with a fault injected by its button, and its report."""
+"""The live page in a browser: a flight over DDS, a fault injected by the page's button, and the report."""
 
 import time
 
@@ -45,7 +45,7 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
     browser.requests()
     driver.get(page)
     until(browser, flight, "window.live && live.now > 4")
-    # Space pauses, and the flight goes on where it was.
+    # The space key pauses the flight and resumes it.
     browser.press(" ")
     until(browser, flight, "live.status.settings.paused")
     until(browser, flight, "live.form.pause.textContent === 'Resume'")
@@ -57,7 +57,7 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
     until(browser, flight, "!live.status.settings.paused")
     driver.find_element("css selector", "[name=parameters]").send_keys("80 %")
     driver.find_element("css selector", "[name=inject]").click()
-    # The fault may be seen to act before the answer has come.
+    # The page may show the active fault before the answer has arrived.
     until(browser, flight, "live.status.faults.length === 1 && document.getElementById('answer').className")
     answer = browser.run("return document.getElementById('answer').textContent")
     assert answer.startswith("loss of effectiveness 0.8 of elevator deflection from step ")
@@ -70,7 +70,7 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
     browser.run(f"{limits}.scrollIntoView()")
     until(browser, flight, f"{limits}.layout && {limits}.layout.shapes.filter((s) => s.type === 'line').length === 2")
     pace = driver.find_element("css selector", "[name=pace]")
-    # In the middle of the window: at its edge something else may lie above it.
+    # Scroll it to the middle of the window; at the edge another element may cover it.
     browser.run("document.querySelector('[name=pace]').scrollIntoView({ block: 'center', behavior: 'instant' })")
     wait_until(pace.is_displayed, [flight.pid])
     pace.clear()
@@ -79,7 +79,7 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
     state = browser.run("return document.getElementById('state').textContent")
     assert state == f"Flight finished at t = 120.00 s · verdict, metrics and report: {bag}/report.html"
     wait_until(lambda: flight.poll() is not None, [flight.pid])
-    # The server has left; the curves stay.
+    # The server has ended; the curves stay.
     until(browser, flight, "live.over")
     assert browser.run("return live.now") == pytest.approx(120.0)
     assert browser.run("return document.querySelector('fieldset.flight').disabled")
@@ -97,7 +97,7 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
 
 @pytest.fixture(scope="module")
 def endless(tmp_path_factory):
-    """Start a flight that lasts longer than the tests that look at it; return its process and the page's address."""
+    """Start a flight that outlasts the tests on it; return its process and the address of its page."""
     folder = tmp_path_factory.mktemp("endless")
     with own_environment() as environment:
         started = Processes(environment, folder)
@@ -107,8 +107,8 @@ def endless(tmp_path_factory):
 
 
 def look(browser, flight, page):
-    """Open the live page at an address, and wait until a fault acts and everything is drawn."""
-    # The same page with another token is no other page to a browser.
+    """Open the live page at an address; wait until a fault acts and everything is drawn."""
+    # A browser does not reload a page of which only the token changes.
     browser.driver.get("about:blank")
     browser.driver.get(page)
     until(browser, flight, "window.live && live.now > 3 && live.status && live.status.faults.length")
@@ -120,7 +120,7 @@ def show(browser, endless):
 
 
 class TestPage(PageChecks):
-    """As all pages."""
+    """The checks of all pages."""
 
 
 def test_on_a_phone_controls_are_below_the_flight_and_inject_is_apart_from_pause(browser, endless, screen):
@@ -141,7 +141,7 @@ def test_with_another_token_every_button_is_answered_with_a_reason(browser, endl
 
 
 def assert_refused(browser, flight):
-    """The page says why nothing was done, and nothing was: the flight goes on as it was."""
+    """Assert that the page shows a refusal and that the flight goes on unchanged."""
     until(browser, flight, "document.getElementById('answer').className === 'bad'")
     assert browser.run("return document.getElementById('answer').textContent").startswith("token: wrong or missing")
     before = browser.run("return live.now")

@@ -1,4 +1,4 @@
-"""What a page may ask for, and what it is told when it may not."""
+"""Commands that the live page may send, and the answers to refused ones."""
 
 import pytest
 

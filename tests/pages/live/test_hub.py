@@ -1,4 +1,4 @@
-"""What the page is told of a flight."""
+"""The data of a flight that the live page receives."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from hsv.pages.panels import LIVE_CURVES
 
 STEPS = 201
 A_STEP = 9
-"""Messages."""
+"""Number of messages in a step."""
 
 
 def offer(hub, messages, every=A_STEP):
@@ -59,7 +59,7 @@ def test_a_long_flight_is_thinned_and_keeps_its_beginning(hub, messages, monkeyp
     step = messages[state : state + 1] + [m for i, m in enumerate(messages[:A_STEP]) if i != state]
     for number in range(2500):
         for topic, _, data in step:
-            # The bytes are those of step 0: what is looked at here is how many rows are kept.
+            # The bytes are always those of step 0, because only the number of rows matters here.
             hub.offer(topic, number * period, data)
         hub.sample()
     later, first, rows = hub.history(generation, 0)

@@ -1,4 +1,4 @@
-"""The servers of the page and for Foxglove: ports, access, data, commands, and clients that do not read."""
+"""The servers for the page and for Foxglove: ports, access, data, commands, and clients that do not read."""
 
 import json
 import socket
@@ -39,7 +39,7 @@ def fly(hub, server, messages):
 
 
 def rows(client, hub, count):
-    """Read until so many rows have come; return them."""
+    """Receive messages until ``count`` rows have arrived, and return the rows."""
     width = 4 * (1 + len(LIVE_CURVES))
     while len(client.data) < count * width:
         assert client.read()
@@ -116,7 +116,7 @@ def test_whoever_comes_late_gets_all_and_then_what_is_new(hub, server, messages)
 
 @pytest.fixture(params=["live.port", "live.page_port"])
 def serve(request, hub):
-    """Return the parameter that a server's port is, and what starts it on one."""
+    """Return the name of a server's port parameter, and a function that starts the server on a port."""
     if request.param == "live.page_port":
         return request.param, lambda port: PageServer(port, hub, "{}")
     return request.param, lambda port: FoxgloveServer(port, {resolved(topic): kind for topic, kind in TOPICS.items()})

@@ -14,13 +14,13 @@ def bags(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def quiet(bags):
-    """A flight in which nothing happens but the fault."""
+    """Return a flight whose only event is the fault."""
     return record_flight(bags / "quiet")
 
 
 @pytest.fixture(scope="session")
 def loud(bags, quiet):
-    """Less fuel than wanted and too narrow a set: commands are limited, the tube is left, warnings are given."""
+    """Return a flight with too little fuel and too small a set: limited commands, errors outside the tube, warnings."""
     design = flight_parameters(load_scenario("case1"))
     level = quiet.columns("/hsv/tube_status")["level"]
     shrunk = 2.0 / float(level.min() + level.max())

@@ -1,4 +1,4 @@
-"""The page as a browser shows it."""
+"""The report in a browser."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def show(browser, page):
 
 
 class TestPage(PageChecks):
-    """As all pages."""
+    """The checks of all pages."""
 
 
 def recorded(bag, curve):
@@ -47,7 +47,7 @@ def recorded(bag, curve):
 
 
 def drawn(browser, panel):
-    """Return the curves of a panel as the plotting library holds them: name, x and y at the samples."""
+    """Return the curves of a panel from the plotting library: name, and x and y at the samples."""
     script = """
         const [name, samples] = arguments;
         const pick = (values) => samples.map((i) => values[Math.min(i, values.length - 1)]);
@@ -74,7 +74,7 @@ def test_plots_hold_what_the_bags_hold(opened, flights, units):
         factor = in_system(1.0, panel.unit, units)[0]
         curves = drawn(opened, panel)
         for bag, label in zip(flights, ("case1 (quiet)", "case1 (loud)"), strict=True):
-            # A bound that is constant is drawn between its ends.
+            # A constant bound is drawn by its two ends, so it has no samples to compare.
             for curve in (curve for curve in panel.curves if curve.kind is not Kind.bound):
                 seen = curves.get(f"{label}, {curve.label}") or curves[curve.label]
                 expected = recorded(bag, curve)[SAMPLES] * factor
@@ -95,7 +95,7 @@ def test_zooming_one_plot_zooms_all(opened):
 
 
 def state(browser):
-    """Return what the page shows: units, time window, curves of the altitude, runs of the picture."""
+    """Return the state of the page: units, time window, curves of the altitude, and runs of the picture."""
     return browser.run(
         """
         const inSight = (path) => getComputedStyle(path).display !== "none";
@@ -146,7 +146,7 @@ def test_the_keyboard_reaches_everything(opened):
     scrolling = "return [...document.querySelectorAll('.scroll, pre')].every((each) => each.tabIndex === 0)"
     assert opened.run(scrolling)
     button = opened.driver.find_element("css selector", "[name=units]:checked")
-    button.send_keys("\ue014")  # arrow to the right
+    button.send_keys("\ue014")  # right-arrow key
     opened.settle()
     assert opened.run("return document.documentElement.dataset.units") == "si"
 

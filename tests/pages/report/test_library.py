@@ -1,4 +1,4 @@
-"""The plotting library is an unchanged copy of the published one."""
+"""The plotting library is an unchanged copy of its published version."""
 
 import json
 

@@ -23,7 +23,7 @@ def page(quiet, loud):
 
 
 def words(page):
-    """What a reader sees: without scripts, style and tags."""
+    """Return the text that a reader sees, without scripts, style and tags."""
     page = re.sub(r"<(script|style).*?</\1>", "", page, flags=re.DOTALL)
     return html.unescape(re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", page)))
 

@@ -1,4 +1,4 @@
-"""The picture that pages open with."""
+"""The picture at the top of the pages."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Quantities in the systems of units of a page."""
+"""Quantities in a page's systems of units."""
 
 from hsv.pages.text import in_brackets, quantity
 

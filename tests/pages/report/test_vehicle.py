@@ -1,4 +1,4 @@
-"""The side view of the report as a browser shows it: the recorded state, with the shape and signs of the vehicle."""
+"""The side view of the report in a browser: the recorded state, with the vehicle's shape and signs."""
 
 import math
 
@@ -31,7 +31,7 @@ def opened(browser, page):
 
 
 def shown(browser, at, exaggeration=40):
-    """Show a time; return the figures as drawn, paths as numbers in pixels."""
+    """Show a time; return the drawn figures, with paths as numbers (pixels)."""
     script = """
         const [time, exaggeration] = arguments, slider = document.querySelector("[name=exaggeration]");
         slider.value = exaggeration;
@@ -49,7 +49,7 @@ def shown(browser, at, exaggeration=40):
 
 
 def body_of(figure, drawn="paths"):
-    """Return the outline of the body, the longest path, in metres: x forward, z up, from the centre of gravity."""
+    """Return the outline of the body, its longest path, in metres from the centre of gravity: x forward, z up."""
     points = np.array(max(figure[drawn], key=len)).reshape(-1, 2)
     scale = 0.72 * 640 / airframe().length
     return (points - [301, 165]) * [1.0, -1.0] / scale
@@ -74,7 +74,7 @@ def test_the_outline_is_the_bent_body_of_the_recorded_state(opened, quiet, at, e
     np.testing.assert_allclose(body_of(vehicle), expected, atol=2e-3)
     eta = np.array([plan[f"reference.{name}"][row] + plan[f"deviation.{name}"][row] for name in ELASTIC])
     pitch = plan["reference.pitch_angle"][row] + plan["deviation.pitch_angle"][row]
-    # The nominal vehicle is the dashed outline.
+    # The dashed outline is the nominal vehicle.
     np.testing.assert_allclose(body_of(vehicle, "ghost"), expected_body(eta, pitch, exaggeration), atol=2e-3)
     assert f"bending drawn × {exaggeration}" in vehicle["text"]
 
@@ -93,7 +93,7 @@ def test_positive_elevator_is_drawn_trailing_edge_down(opened):
     """
 
     def elevator(deflection, fuel=0.5):
-        # A leading edge, a top, a trailing edge and a bottom.
+        # The elevator's path has four points: leading edge, top, trailing edge, bottom.
         [points] = [
             np.array(path).reshape(-1, 2)
             for path in opened.run(script, deflection, fuel)
@@ -136,7 +136,7 @@ def test_it_plays_at_the_speed_chosen_and_stops_at_the_end(opened):
 def test_keys_move_the_time_and_play(opened):
     shown(opened, 4.0)
     slider = opened.driver.find_element("css selector", "#player [name=time]")
-    slider.send_keys("\ue014")  # arrow to the right
+    slider.send_keys("\ue014")  # right-arrow key
     assert opened.run("return own.time") == pytest.approx(4.02)
     slider.send_keys(" ")
     opened.wait("return own.playing && own.time > 4.1")

@@ -1,4 +1,4 @@
-"""The page as a browser shows it."""
+"""The page of a resilience campaign in a browser."""
 
 import pytest
 from node_processes import short_scenario
@@ -28,7 +28,7 @@ def show(browser, page):
 
 
 class TestPage(PageChecks):
-    """As all pages."""
+    """The checks of all pages."""
 
 
 @pytest.mark.usefixtures("screen")
