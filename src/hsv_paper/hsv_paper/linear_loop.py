@@ -63,7 +63,7 @@ class SampledLoop:
     """The open loop A (n, n), B (n, 2), the gain (2, n) of u = gain x, and the period (s).
 
     The states are those of vehicle (9), actuators, delay and filter. B includes the effectiveness of the elevator.
-"""
+    """
 
     A: np.ndarray
     B: np.ndarray

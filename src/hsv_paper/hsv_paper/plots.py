@@ -45,7 +45,7 @@ WIDTH = 7.0
 
 DOTTED_GREY: Any = {"color": GREY, "linewidth": 0.6, "linestyle": ":"}
 ZERO: Any = {"color": "black", "linewidth": 0.6}
-"""Line styles: dotted for marked values, black for zero."""
+"""Line styles: dotted for marked values, black for the zero line."""
 
 
 def new_figure(height: float) -> Figure:

@@ -117,7 +117,7 @@ def box(evidence: Evidence) -> Numbers:
 
 
 def symmetric(evidence: Evidence) -> Numbers:
-    """Return how far the centres of W and Z are from zero, relative to their half-widths; the largest of each."""
+    """Return the distances of the centres of the sets W and Z from zero over half-widths; the largest of each set."""
     tube = tube_of("baseline")
     channels = certificate("baseline")["tube"]["disturbance"]["channels"]
     off = {name: abs(b["upper"] + b["lower"]) / (b["upper"] - b["lower"]) for name, b in channels.items()}
@@ -132,7 +132,7 @@ def certified_attitude(evidence: Evidence) -> Numbers:
 
 
 def input_set(evidence: Evidence) -> Numbers:
-    """Return the widths of U ⊖ FZ, and the margins of the nominal trajectory to its bounds, SI."""
+    """Return the widths of the tightened input set U ⊖ FZ, and the nominal trajectory's margins to it, SI."""
     tightening = certificate("baseline")["tube"]["tightening"]
     widths = np.array(tightening["upper"]) - np.array(tightening["lower"])
     rooms = np.minimum(tightening["plan"]["margin_to_lower"], tightening["plan"]["margin_to_upper"])
@@ -224,8 +224,8 @@ def coupling_in_pitch_rate(evidence: Evidence) -> Numbers:
 def falls(evidence: Evidence) -> Numbers:
     """Return by how much (dB) notch filters reduce the peaks of the first and the second elastic mode.
 
-    ``first``, ``second``: by the design's filter. ``least``: first peak, the least effective of the poles of Figure 3.
-    ``first_centred``, ``second_centred``: by a filter centred at that mode.
+    ``first``, ``second``: by the design's filter. ``least``: the smallest reduction of the first peak over the filter's
+    poles in Figure 3. ``first_centred``, ``second_centred``: by a filter centred at the mode.
     """
     section, at = design("baseline").notch[0], modes.elastic_modes("paper_like")["first"].natural_frequency
     changed = [replace(section, pole_frequency=w) for w in POLE_FREQUENCIES]
@@ -377,7 +377,7 @@ def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.
 
 
 def conforms(evidence: Evidence) -> Numbers:
-    """Return the largest differences between the co-designed model and the ECM, in dB and degrees.
+    """Return the largest differences (dB, deg) between the co-designed model and the ECM, the extended model.
 
     ``low_magnitude`` is the largest difference in magnitude below ``rigid`` (rad/s).
     """

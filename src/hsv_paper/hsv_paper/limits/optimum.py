@@ -157,7 +157,7 @@ def curvatures(
 ) -> np.ndarray:
     """Return the second derivatives (N, 12, 12) of the states after N periods, summed with ``weights`` (N, 9).
 
-    The derivatives, differences of complex steps, are by state, input and length of the period; zero by elastic states.
+    They are by state, input and period length, as differences of complex steps. Those by elastic states are zero.
     """
     reach = {0: 1.0, 1: 1.0, 2: 1e-4, 3: 1e-4, 4: 1e-4, 9: 1e-3, 10: 1e-3, 11: 1e-5}
     curved = list(reach)

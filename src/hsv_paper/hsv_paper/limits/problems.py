@@ -27,7 +27,7 @@ PERIOD, SUBSTEPS = 0.02, 2
 """The period T (s) and its Runge-Kutta steps in flight."""
 
 LONGEST, TYPICAL = 60.0, 12.0
-"""Upper bound of a transfer's time (s), and the longest time with Runge-Kutta steps as short as in flight."""
+"""Upper bound of a transfer's time (s), and the time for which its Runge-Kutta steps are as long as in flight."""
 
 REST = 0.4
 """Time from settling to rest, as a share of the time to settling. A longer one does not change the result."""

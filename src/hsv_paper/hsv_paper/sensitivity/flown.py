@@ -47,7 +47,7 @@ PERIODS = {
     period: Controller(f"T = {period:g} s", "case1", color)
     for period, color in ((0.01, plots.GREEN), (0.02, plots.BLUE), (0.05, plots.RED))
 }
-"""Labels and colours by sampling period (s), as controllers."""
+"""Controllers by sampling period (s), for the labels and colours of curves."""
 
 INTEGRATION_STEP = 0.01
 """Integration step (s) of the vehicle, as in the shipped scenarios."""

@@ -55,7 +55,7 @@ def elevator(bandwidth: float, delay: float = 0.0) -> Hardware:
 
 
 def growth(case: Controller, hardware: Hardware, over: Corners = NOMINAL) -> float:
-    """Return the largest growth (1/s) of a case with this hardware, over both ends of the step, fault and vehicles."""
+    """Return the largest growth (1/s) of a case: of both ends of the step, both effectivenesses, all vehicles."""
     return replace(case.loop, hardware=hardware).growth(case.vehicle, over)
 
 

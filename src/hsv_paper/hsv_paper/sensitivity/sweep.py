@@ -25,7 +25,7 @@ from hsv_paper.plots import BLUE, GREEN, ORANGE, PURPLE, RED, letter, plain_log
 from hsv_paper.study import Scope
 
 Columns = dict[str, np.ndarray]
-"""Arrays (points of a sweep) of one controller, by name."""
+"""Arrays of one controller by name, with one element per point of a sweep."""
 
 SATURATED_STEPS = 50
 """A flight whose command is limited in more steps than these, one second, counts as saturated."""
@@ -88,7 +88,7 @@ def sweep(
     values: Sequence[float],
     point: Callable[[Controller, float], Point],
 ) -> dict[Controller, Columns]:
-    """Fly every controller at the points of all values, and return its columns."""
+    """Fly every controller at all values and return its columns; ``point`` gives the flights of a value."""
     results = {}
     for controller in controllers:
         tables = []
