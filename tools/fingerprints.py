@@ -1,4 +1,4 @@
-"""Recreate the table of published fingerprints: python3 tools/fingerprints.py, after "source env.sh"."""
+"""Recreate the table of published fingerprints. Usage, after "source env.sh": python3 tools/fingerprints.py."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HEADER = """# Fingerprints of the shipped scenarios with the shipped designs. Ma
 
 
 def main() -> None:
-    """Fly every shipped scenario whose law calls no solver in flight, and write what came of it."""
+    """Simulate every shipped scenario whose nominal law calls no solver in flight, and write the fingerprints."""
     table = {}
     for name in scenario_names():
         scenario = load_scenario(name)

@@ -1,8 +1,8 @@
-"""Prepare other processors, Pythons and packages to fly on: what "make test-portability" runs before its tests.
+"""Prepare environments with other processors, Pythons and packages, before the tests of "make test-portability".
 
-Each environment has a folder below ``.portability`` with wheels at their pinned versions. For aarch64 there are also
-Debian's Python and a cross compiler for the core, unpacked and not installed: nothing outside the checkout changes. An
-environment that cannot be had is named in one line; the tests fly on the others.
+Each environment has a folder below ``.portability`` with wheels at their pinned versions. For aarch64, Debian's Python
+and a cross compiler for the core are unpacked there but not installed: nothing outside the checkout changes. An
+environment that cannot be prepared is reported in one line; the tests use the others.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 CACHE = ROOT / ".portability"
 PACKAGES = ("cffi", "numpy", "pint", "pydantic", "pyyaml", "scipy", "tomli-w")
-"""Packages that a flight in one process imports."""
+"""Packages that a simulated flight imports."""
 LIBRARY = ROOT / "src" / "hsv"
-"""The sources of the library with the core that the set-up has compiled for this machine."""
+"""Folder of the library, with the core that the set-up compiled for this machine."""
 
 
 class MissingError(Exception):
-    """An environment cannot be had; one line says what is missing."""
+    """An environment cannot be prepared; the message states in one line what is missing."""
 
 
 @dataclass(frozen=True)
 class Environment:
-    """A Python that can fly: the command that starts it, and its folders of packages, as PYTHONPATH has them."""
+    """A Python that can simulate flights: its start command, and its folders of packages in the form of PYTHONPATH."""
 
     command: list[str]
     packages: str
     library: str = str(LIBRARY)
-    """Folder of the library, with a core that the processor can run."""
+    """Folder of the library, with a core compiled for the processor."""
 
     @classmethod
     def read(cls, name: str) -> Environment | None:
@@ -46,20 +46,20 @@ class Environment:
 
 
 def own() -> Environment:
-    """Return the project's own environment: its interpreter, outside the virtual environment, and its packages."""
+    """Return the environment of the project: the interpreter that its virtual environment uses, and its packages."""
     folders = [entry for entry in sys.path if entry.endswith(("site-packages", "dist-packages"))]
     return Environment([os.path.realpath(sys.executable)], os.pathsep.join(folders))
 
 
 def nehalem(folder: Path) -> Environment:
-    """Return the project's own environment on an x86-64 processor without AVX and FMA."""
+    """Return the environment of the project on an emulated x86-64 processor without AVX and FMA."""
     if platform.machine() != "x86_64":
         raise MissingError(f"this machine is {platform.machine()}, expected x86_64: its programs run on no Nehalem")
     return Environment([emulator("x86_64"), "-cpu", "Nehalem", *own().command], own().packages)
 
 
 def aarch64(folder: Path) -> Environment:
-    """Return Debian's Python for aarch64, of the project's version, under the project's pins, with a core for it."""
+    """Return an emulated aarch64 environment: Debian's Python of the project's version, pinned wheels, and a core."""
     version = f"3.{sys.version_info.minor}"
     root = unpack("aarch64", "aarch64-root", f"python{version}", "libstdc++6")
     command = [emulator("aarch64"), "-L", str(root), str(root / "usr/bin" / f"python{version}")]
@@ -75,7 +75,7 @@ def aarch64(folder: Path) -> Environment:
 
 
 def python_3_12(folder: Path, pins: str = "constraints.txt") -> Environment:
-    """Return Python 3.12 of this machine, under pins of the project."""
+    """Return an environment with a Python 3.12 of this machine and wheels pinned by the file ``pins``."""
     return Environment([python312()], install(folder, "3.12", platform.machine(), pins))
 
 
@@ -88,10 +88,10 @@ ENVIRONMENTS: dict[str, Callable[[Path], Environment]] = {
 
 
 def run(failure: str, command: list[str], cwd: Path = ROOT, variables: dict[str, str] | None = None) -> str:
-    """Run a command and return what it prints.
+    """Run a command and return its standard output.
 
     Raises:
-        MissingError: It fails; the message is ``failure`` and its last line about errors.
+        MissingError: The command fails; the message is ``failure`` with the last error line of the output.
     """
     env = os.environ | (variables or {})
     done = subprocess.run(command, cwd=cwd, env=env, capture_output=True, text=True, stdin=subprocess.DEVNULL)
@@ -103,27 +103,27 @@ def run(failure: str, command: list[str], cwd: Path = ROOT, variables: dict[str,
 
 
 def python312() -> str:
-    """Return a CPython 3.12 of this machine, found on the PATH or where pyenv and uv put theirs."""
+    """Return the path of a Python 3.12 of this machine, found on the PATH or in the folders of pyenv and uv."""
     places = (".pyenv/versions/3.12*/bin/python3.12", ".local/share/uv/python/*/bin/python3.12")
     known = sorted(str(path) for place in places for path in Path.home().glob(place))
     for command in filter(shutil.which, (sys.executable, "python3.12", *known)):
         probe = "import os, sys; print(os.path.realpath(sys.executable) if sys.version_info[:2] == (3, 12) else '')"
-        # A shim of pyenv is there whether or not its version is.
+        # A shim of pyenv may exist without its version.
         if path := subprocess.run([command, "-c", probe], capture_output=True, text=True).stdout.strip():
             return path
     raise MissingError("no Python 3.12 on the PATH, in ~/.pyenv/versions or ~/.local/share/uv/python")
 
 
 def emulator(machine: str) -> str:
-    """Return the program that runs programs of ``machine``: the installed one, or Debian's, unpacked."""
+    """Return the path of the QEMU emulator for ``machine``: the installed one, or Debian's, unpacked."""
     found = shutil.which(f"qemu-{machine}") or shutil.which(f"qemu-{machine}-static")
     return found or str(unpack(platform.machine(), "qemu", "qemu-user-static") / f"usr/bin/qemu-{machine}-static")
 
 
 def unpack(machine: str, name: str, *packages: str) -> Path:
-    """Unpack Debian packages for ``machine``, and all that they depend on, into a folder of the cache; return it.
+    """Unpack Debian packages for ``machine`` and their dependencies into the folder ``name`` of the cache; return it.
 
-    The system's sources and keys are used with separate lists and archives: nothing is installed.
+    The package sources and keys of the system are used with separate lists and archives: nothing is installed.
     """
     folder, architecture = CACHE / name, {"x86_64": "amd64", "aarch64": "arm64"}[machine]
     if folder.is_dir():
@@ -138,7 +138,7 @@ def unpack(machine: str, name: str, *packages: str) -> Path:
     options += ["APT::Install-Recommends=false", f"Dir::State={apt}", f"Dir::State::status={apt}/status"]
     options += [f"Dir::Cache={apt}", f"Dir::State::lists={apt}/lists", f"Dir::Cache::archives={apt}/archives"]
     command = ["apt-get", "--quiet", *(word for option in options for word in ("-o", option))]
-    # A source that does not answer need not be the one that has them.
+    # Errors are ignored: a source that does not answer may not be needed.
     subprocess.run([*command, "update"], capture_output=True)
     failure = f"apt-get has no {' and '.join(packages)} for {architecture}"
     run(failure, [*command, "install", "--assume-yes", "--download-only", *packages])
@@ -152,13 +152,13 @@ def unpack(machine: str, name: str, *packages: str) -> Path:
 
 
 def install(folder: Path, version: str, machine: str, constraints: str) -> str:
-    """Install the wheels that a flight imports, for another Python or machine; return their folder."""
+    """Install the wheels of :data:`PACKAGES` for another Python version or machine; return their folder."""
     packages = folder / "packages"
-    # pip takes wheels of exactly the platforms that are named: glibc 2.17 to that of Debian 12.
+    # pip takes wheels of exactly the named platforms, here from glibc 2.17 to the 2.36 of Debian 12.
     platforms = [f"--platform=manylinux_2_{minor}_{machine}" for minor in range(36, 16, -1)]
     command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--quiet"]
     command += ["--target", str(packages), "--only-binary=:all:", f"--python-version={version}", "--no-compile"]
-    # It would compare what the wheels require with the Python that it runs on; the pins were resolved for the other.
+    # pip would check the requirements of the wheels against its own Python; the pins were resolved for the other one.
     command += ["--ignore-requires-python", *platforms, f"--platform=manylinux2014_{machine}"]
     failure = f"pip has no wheels for Python {version} on {machine} under {constraints}"
     run(failure, [*command, "--constraint", constraints, *PACKAGES])
@@ -166,7 +166,7 @@ def install(folder: Path, version: str, machine: str, constraints: str) -> str:
 
 
 def main() -> int:
-    """Prepare every environment anew; return 1 if one is missing."""
+    """Prepare every environment anew; return the exit code, 1 if an environment cannot be prepared."""
     code = 0
     for name, prepare in ENVIRONMENTS.items():
         shutil.rmtree(folder := CACHE / name, ignore_errors=True)

@@ -1,7 +1,7 @@
 """Renew the reference bags: ``make references``.
 
-Every scenario ``bags/reference/<name>.toml`` has its bag ``bags/reference/<name>/``. All bags are flown, and replayed,
-in a temporary folder first; only if every one is good do they take the place of the old ones, together.
+Every scenario ``bags/reference/<name>.toml`` has a bag ``bags/reference/<name>/``. All bags are first recorded and
+replayed in a temporary folder. Only if all replays succeed do they replace the old bags.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ REFERENCES = ROOT / "bags" / "reference"
 
 
 def main() -> int:
-    """Make all reference bags or none; return the exit code."""
+    """Record all reference bags and replace the old ones, or change nothing; return the exit code."""
     changes = subprocess.run(
         ["git", "-C", str(ROOT), "status", "--porcelain", "--", ".", ":!bags/reference"],
         capture_output=True,
@@ -33,7 +33,7 @@ def main() -> int:
     ).stdout
     if changes:
         return _refuse("uncommitted changes; commit first: a reference names the commit that made it\n" + changes)
-    # Beside the old bags, so that putting the new ones in their place is a rename.
+    # Next to the old bags, so that replacing them is a rename.
     with tempfile.TemporaryDirectory(prefix=".new_", dir=REFERENCES) as folder:
         made = {}
         for scenario in sorted(REFERENCES.glob("*.toml")):
@@ -56,7 +56,7 @@ def main() -> int:
 
 
 def _without_paths(folder: Path, target: Path) -> Path:
-    """Write the bag in ``folder`` to ``target``, message by message, without the paths of this machine in its log."""
+    """Copy the bag in ``folder`` to ``target``, without the paths of this machine in its log; return ``target``."""
     bag = Bag(folder)
     target.parent.mkdir(exist_ok=True)
     writer = BagWriter(target, bag.topics.values(), bag.custom_data)

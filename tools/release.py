@@ -1,7 +1,7 @@
 """Give all packages the version of a release: python3 tools/release.py 1.1.0.
 
-Writes the version to every package.xml, where setup.py takes it from, and to CITATION.cff, and heads what is
-"Forthcoming" or "Unreleased" in the changelogs with it and today's date: all files, or none.
+The version is written to every package.xml, from which setup.py reads it, and to CITATION.cff. In the changelogs, the
+section "Forthcoming" or "Unreleased" gets the version and today's date as its heading. All files change, or none.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def released(root: Path, version: str, date: str) -> dict[Path, str]:
-    """Return the new text of every file of the checkout ``root`` that changes with a release.
+    """Return the new text of every file below ``root`` that a release changes, by path.
 
     Raises:
-        ValueError: The version is not above the present one, or a file is not as expected.
+        ValueError: The version is not above the present one, or a file does not have the expected text once.
     """
     if not re.fullmatch(r"\d+\.\d+\.\d+", version):
         raise ValueError(f"version = {version!r}: expected three numbers, as 1.2.0")

@@ -1,8 +1,8 @@
-"""The part of the `ros2` command that the bench needs where ROS 2 is installed as wheels, which have none.
+"""A small `ros2` command with `run` and `pkg`, for ROS 2 installed as wheels, which contain no `ros2`.
 
-Packages and executables are found by the rule of the real one: a package is a file
-share/ament_index/resource_index/packages/NAME below a prefix in AMENT_PREFIX_PATH, its executables are the executable
-files below lib/NAME there. Where a real `ros2` is on PATH, this one hands over to it.
+Packages and executables are found as by the real command: a package is a file
+share/ament_index/resource_index/packages/NAME below a prefix in AMENT_PREFIX_PATH, and its executables are the
+executable files below lib/NAME there. If a real `ros2` is on PATH, this command runs it instead.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-# Tells the stand-ins of other checkouts on PATH from the real command.
+# Text in the replacements of other checkouts on PATH, which distinguishes them from the real command.
 _SIGNATURE = "tools/ros2.py"
 _FULL_TOOLS = "needs the full ROS 2 command-line tools (apt package ros-jazzy-ros-base)"
 
@@ -48,7 +48,7 @@ def executables(package: str) -> list[Path]:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Replace this process by the executable, so that signals and the exit code are its own."""
+    """Replace this process by the executable, which then receives the signals and sets the exit code."""
     paths = [path for path in executables(options.package_name) if path.name == options.executable_name]
     if not paths:
         sys.exit("No executable found")
@@ -73,15 +73,15 @@ def list_executables(options: argparse.Namespace) -> None:
 
 
 def print_prefix(options: argparse.Namespace) -> None:
-    """Print where a package is installed."""
+    """Print the installation prefix of a package, or its share directory."""
     if (prefix := prefixes().get(options.package_name)) is None:
         sys.exit("Package not found")
     print(prefix / "share" / options.package_name if options.share else prefix)
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Carry out one command line; return the exit code."""
-    # A listing cut short by "| head" is no error.
+    """Run one command line and return its exit code."""
+    # A reader that closes the pipe early, such as "| head", is no error.
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     if real := real_command():
         os.execv(real, [real, *arguments])

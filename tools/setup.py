@@ -1,7 +1,7 @@
-"""Set the bench up: what "make setup" runs. Needs Python 3.11 or 3.12 and what its first error message names.
+"""The set-up of the bench, run by "make setup". It needs Python 3.11 or 3.12; an error message lists what is missing.
 
-Makes .venv with the pinned packages, ROS 2 Jazzy among them where none is sourced, and builds the packages by colcon. A
-complete step leaves a stamp of what it was made of and is skipped as long as that is unchanged.
+It creates .venv with the pinned packages, with ROS 2 Jazzy if none is sourced, and builds the packages with colcon.
+Each completed step writes a stamp file with its inputs, and is skipped as long as these are unchanged.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ PYTHON = str(VENV / "bin" / "python3")
 BASE = os.path.realpath(sys.executable)
 BUILD, INSTALL, LOG = (ROOT / "ros_ws" / name for name in ("build", "install", "log"))
 
-# Where ROS comes from: the pins, and the requirements, those of the build first.
+# For each source of ROS: the file of pinned versions, and the files of requirements, those of the build first.
 ROUTES = {
     "wheels": ("constraints.txt", ["requirements-ros.txt", "requirements.txt", "requirements-test.txt"]),
     "jazzy": ("constraints-jazzy.txt", ["requirements.txt", "requirements-test.txt"]),
@@ -38,11 +38,11 @@ COLCON = "import sys; from colcon_core.command import main; sys.argv[0] = 'colco
 
 
 class SetupError(Exception):
-    """The set-up cannot go on."""
+    """The set-up cannot continue; the message is for the user."""
 
 
 def clean_environment(route: str) -> dict[str, str]:
-    """Return the variables without what a sourced env.sh, make or pip's settings for other places would change."""
+    """Return the environment variables without those of a sourced env.sh and of pip's settings for other folders."""
     dropped = DROPPED + SEARCHED if route == "wheels" else DROPPED  # the wheels alone supply ROS packages
     env = {name: value for name, value in os.environ.items() if name not in dropped}
     for name in {"PATH", *SEARCHED} & {*env}:
@@ -51,13 +51,16 @@ def clean_environment(route: str) -> dict[str, str]:
 
 
 def sourced_distribution() -> str:
-    """Return the sourced ROS distribution, or ``wheels``; official images set ROS_DISTRO without sourcing anything."""
+    """Return the name of the sourced ROS distribution, or ``wheels`` if none is sourced.
+
+    ROS_DISTRO alone does not count: official images set it without sourcing anything.
+    """
     env = clean_environment("jazzy")
     return (env.get("AMENT_PREFIX_PATH") and env.get("ROS_DISTRO")) or "wheels"
 
 
 def missing(route: str, env: dict[str, str]) -> dict[str, str]:
-    """Return what the machine lacks, and for each the Debian package that has it, or "" if none has."""
+    """Return what the machine lacks, each with the Debian package that provides it, or "" if there is none."""
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
     if version not in ("3.11", "3.12"):
         return {f"Python 3.11 or 3.12 (this is {version}; make setup PYTHON=/path/to/python3 names another)": "python3"}
@@ -82,12 +85,12 @@ def missing(route: str, env: dict[str, str]) -> dict[str, str]:
 
 
 def read(stamp: Path) -> str:
-    """Return what a stamp says, or "" if there is none."""
+    """Return the text of a stamp file, or "" if there is none."""
     return stamp.read_text() if stamp.is_file() else ""
 
 
 class Step:
-    """A command whose output goes to a log file; the user sees its start and its duration."""
+    """A running command whose output goes to a log file; its start and its duration are printed."""
 
     def __init__(self, title: str, command: list[str], env: dict[str, str]) -> None:
         print(f"{title} ...", flush=True)
@@ -95,11 +98,11 @@ class Step:
         self._log = LOG / f"setup-{title.split()[0].lower()}.log"
         LOG.mkdir(parents=True, exist_ok=True)
         with self._log.open("w") as out:
-            # It inherits the lock of the checkout: as long as it runs on by itself, the next set-up waits.
+            # The command inherits the lock of the checkout: the next set-up waits even if only the command still runs.
             self._process = subprocess.Popen(command, cwd=ROOT, env=env, stdout=out, stderr=out, close_fds=False)
 
     def end(self) -> None:
-        """Wait for the command; if it has failed, SetupError quotes the last line that it printed."""
+        """Wait for the command; if it fails, raise SetupError with the last line of its output."""
         if self._process.wait():
             last = [line.strip() for line in self._log.read_text().splitlines() if line.strip()][-1:]
             raise SetupError(f"{self._title} failed: {''.join(last)} (more in {self._log.relative_to(ROOT)})")
@@ -107,11 +110,11 @@ class Step:
 
 
 def make_environment(route: str, env: dict[str, str]) -> None:
-    """Make the virtual environment anew; where ROS comes as wheels, with uv and a ros2 command."""
+    """Create the virtual environment anew; for ROS as wheels, also install uv and a ros2 command."""
     options = ["--clear", *(["--system-site-packages"] if route == "jazzy" else [])]
     Step("Environment", [BASE, "-m", "venv", *options, str(VENV)], env).end()
     if route == "wheels":
-        # uv does not know the index of pip's settings. empy, built from source, needs the pinned setuptools first.
+        # uv ignores the index in pip's settings. empy is built from source and needs the pinned setuptools first.
         settings = subprocess.run([PYTHON, "-m", "pip", "config", "list"], env=env, capture_output=True, text=True)
         wanted = ["setuptools"] if re.search(r"\.(index-url|no-index)=", settings.stdout) else ["setuptools", "uv"]
         Step("Installer", [PYTHON, "-m", "pip", "install", "--constraint", ROUTES[route][0], *wanted], env).end()
@@ -120,7 +123,7 @@ def make_environment(route: str, env: dict[str, str]) -> None:
 
 
 def install(title: str, route: str, files: list[str], env: dict[str, str]) -> None:
-    """Install what the files require by uv, or by pip where there is no uv or it fails."""
+    """Install the requirements in ``files`` with uv, or with pip if uv is missing or fails."""
     wanted = [f"--constraint={ROUTES[route][0]}", "--no-build-isolation", *(f"--requirement={name}" for name in files)]
     try:
         if (uv := VENV / "bin" / "uv").exists():
@@ -131,19 +134,22 @@ def install(title: str, route: str, files: list[str], env: dict[str, str]) -> No
 
 
 def relocate() -> None:
-    """Replace the prefix of the Python for which ROS wheels, if any, were built, in CMake files and ament index."""
+    """Replace the prefix of the Python with which ROS wheels, if any, were built, in CMake files and ament index."""
     share = VENV / "share"
     for path in [*share.glob("*/cmake/*.cmake"), *share.glob("ament_index/resource_index/parent_prefix_path/*")]:
         before = path.read_text()
         headers = re.sub(r"/opt/python/cp3\d+-cp3\d+/include/python3\.\d+", sysconfig.get_path("include"), before)
         after = re.sub(r"/opt/python/cp3\d+-cp3\d+", str(VENV), headers)
         if after != before:
-            path.unlink()  # it may be a link to uv's cache
+            path.unlink()  # the file may be a link into uv's cache
             path.write_text(after)
 
 
 def package_key(folder: Path, identity: str, pins: str) -> str:
-    """Return a hash of what a build depends on: of a Python package, setup.py, the core and the names of data files."""
+    """Return a hash of the inputs of the build of the package in ``folder``.
+
+    For a Python package these are the files at its top, the C sources, build.py, and the names of its data files.
+    """
     is_python = (folder / "setup.py").exists()
     parts = [identity, *([] if is_python else re.findall(r"(?m)^(?:ros-|numpy=).*", pins))]
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
@@ -157,27 +163,30 @@ def package_key(folder: Path, identity: str, pins: str) -> str:
 
 
 def build(route: str, names: list[str], env: dict[str, str]) -> Step:
-    """Start colcon on packages after removing their builds, which may hold products of deleted files."""
+    """Remove the builds of the packages, which may contain products of deleted files, and start colcon on them."""
     for path in (base / name for base in (BUILD, INSTALL) for name in names):
         shutil.rmtree(path, ignore_errors=True)
-    # The number of jobs is set here, because colcon's own choice also limits by load and crawls on a busy machine.
+    # The number of jobs is set here: colcon's default also limits the load, which is very slow on a busy machine.
     env = {**env, "PATH": f"{VENV}/bin:{env['PATH']}", "MAKEFLAGS": f"-j{min(os.cpu_count() or 1, 8)}"}
     env |= {"AMENT_PREFIX_PATH": str(VENV), "CMAKE_PREFIX_PATH": str(VENV)} if route == "wheels" else {}
     command = [PYTHON, "-c", COLCON, "--log-base", str(LOG), "build", "--symlink-install", "--packages-select", *names]
     command += ["--base-paths", "src", "ros_ws/src", "--build-base", str(BUILD), "--install-base", str(INSTALL)]
-    # All files of messages are generated; to link them would take longer than to copy them.
+    # All files of messages are generated; linking them would take longer than copying.
     command += ["--ament-cmake-args", "-DAMENT_CMAKE_SYMLINK_INSTALL=OFF", "--cmake-args", "-DBUILD_TESTING=OFF"]
     command += ["-DCMAKE_BUILD_TYPE=Release", f"-DPython3_EXECUTABLE={PYTHON}"]
     return Step(f"Workspace ({', '.join(names)})", command, env)
 
 
 def simplify_scripts(name: str) -> None:
-    """Write the scripts of a Python package as pip does: those of setup.py develop first search all metadata."""
+    """Replace the scripts of a Python package by scripts as pip writes them, which start faster.
+
+    Those of "setup.py develop" first search the metadata of all packages.
+    """
     for info in (BUILD / name).glob("*.egg-info"):
         for entry in Distribution.at(info).entry_points.select(group="console_scripts"):
-            # Ctrl-C would be a traceback in Python's own start, and is blocked until hsv.cli.entry unblocks it.
+            # Ctrl-C would print a traceback while Python starts, so it is blocked until hsv.cli.entry unblocks it.
             blocked = "/usr/bin/env -S --block-signal=INT " if entry.module == "hsv.cli.entry" else ""
-            # Processes that are spawned import the script as a module.
+            # Spawned processes import the script as a module.
             text = f"#!{blocked}{PYTHON}\nimport sys\n\nfrom {entry.module} import {entry.attr}\n\n"
             text += f'if __name__ == "__main__":\n    sys.exit({entry.attr}())\n'
             for script in (INSTALL / name / "bin" / entry.name, INSTALL / name / "lib" / name / entry.name):
@@ -186,7 +195,7 @@ def simplify_scripts(name: str) -> None:
 
 
 def set_up(route: str, env: dict[str, str]) -> None:
-    """Take every step that is not complete."""
+    """Run every step of the set-up that is not complete."""
     constraints, files = ROUTES[route]
     pins = (ROOT / constraints).read_text()
     identity = f"{route} {BASE} {sys.version} {ROOT}"  # env.sh reads the route
@@ -195,7 +204,7 @@ def set_up(route: str, env: dict[str, str]) -> None:
     folders = [path.parent for base in ("src", "ros_ws/src") for path in (ROOT / base).glob("*/package.xml")]
     prefixes = filter(None, env.get("AMENT_PREFIX_PATH", "").split(":"))
     if any(Path(prefix, "share/simulation_interfaces").is_dir() for prefix in prefixes):
-        folders = [folder for folder in folders if folder.name != "simulation_interfaces"]  # the whole package is there
+        folders = [folder for folder in folders if folder.name != "simulation_interfaces"]  # ROS has the full package
     keys = {folder.name: package_key(folder, identity, pins) for folder in sorted(folders)}
     outdated = [name for name, key in keys.items() if read(INSTALL / name / "hsv-setup") != key]
     if (outdated or not installed) and (lacking := missing(route, env)):
@@ -222,9 +231,9 @@ def set_up(route: str, env: dict[str, str]) -> None:
 
 
 def main() -> int:
-    """Set up, one process at a time; return the exit code."""
+    """Set the bench up, with a lock against a second set-up of this checkout; return the exit code."""
     start, route = time.monotonic(), sourced_distribution()
-    if sys.prefix != sys.base_prefix:  # the interpreter of the environment itself, or of another one
+    if sys.prefix != sys.base_prefix:  # this interpreter is that of a virtual environment
         os.execve(BASE, [BASE, *sys.argv], clean_environment(route))
     if route not in ROUTES:
         sys.exit(f"make setup: ROS_DISTRO={route} is sourced, expected jazzy or no ROS in this shell")

@@ -1,13 +1,13 @@
-/* State feedback with two gains, interpolated over the velocity: u = u_r - K(V) (x - x_r), without a design of the bench.
+/* State feedback with two gains, interpolated over the velocity: u = u_r - K(V) (x - x_r). No design is used.
  *
- * The law of examples/compiled, which computes the gains by linear-quadratic regulators at two velocities; here they are
- * numbers, which a scenario may replace.
+ * The law is that of examples/compiled, which computes the gains of linear-quadratic regulators at two velocities. Here
+ * the gains are constants, which a scenario may replace.
  */
 #include "hsv_block.h"
 
 enum { RIGID = HSV_PITCH_RATE + 1 };
 
-/* Where the parameters are, in the order of the table below. */
+/* Indices of the parameters, in the order of the table below. */
 enum { LOW_VELOCITY, HIGH_VELOCITY, LOW_GAIN, HIGH_GAIN = LOW_GAIN + HSV_INPUTS * RIGID };
 
 static const double low_velocity = 2407.92, high_velocity = 2484.12;

@@ -1,6 +1,6 @@
-"""Processor in the loop: the exported controller on an emulated Cortex-M7, one exchange for each step.
+"""Processor in the loop: the exported controller on an emulated Cortex-M7, with one exchange for each step.
 
-``python3 cortex_m.py`` flies Case 1 and prints the cost of a step, see README.md.
+``python3 cortex_m.py`` simulates Case 1 and prints instructions and memory of a step, see README.md.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from hsv.control.nominal_trajectory import NominalTrajectory
 FIRMWARE = Path(__file__).parent / "build" / "firmware.elf"
 REQUEST, ANSWER = struct.Struct("<q29d"), struct.Struct("<2d2I")
 SHIFT = 10
-"""QEMU takes 2^SHIFT ns for an instruction."""
+"""QEMU takes 2^SHIFT ns of simulated time for an instruction."""
 TICKS_PER_INSTRUCTION = 2**SHIFT * 1e-9 * 25e6
 QEMU = (
     *("qemu-system-arm", "-machine", "mps2-an500", "-icount", f"shift={SHIFT}", "-display", "none"),
@@ -33,34 +33,34 @@ QEMU = (
 
 
 class CortexM:
-    """A controller whose steps QEMU computes."""
+    """A controller whose steps are computed by the firmware on an emulated Cortex-M7."""
 
     PARAMETERS = ()
 
     def __init__(self, reference: Any) -> None:
-        """Take the reference, whose defect is an input of the exported controller."""
+        """Create the controller; the defect of ``reference`` is an input of the exported controller."""
         self.reference = reference
         self.instructions: list[int] = []
-        """Instructions of each step"""
+        """Number of instructions of each step."""
         self.stack = 0
-        """Largest use of the stack (bytes)"""
+        """Largest use of the stack so far (bytes)."""
         self._process: subprocess.Popen[bytes] | None = None
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign | None) -> CortexM:
-        """Return the controller; its design is that of the firmware."""
+        """Return the controller; its gains are those in the firmware."""
         for tool in (QEMU[0], FIRMWARE):
             if not shutil.which(tool) and not Path(tool).is_file():
                 raise ParameterError(f"{tool}: not there, expected as examples/cortex_m/README.md says")
         return cls(NominalTrajectory.from_parameters(values, design).reference.data)
 
     def reset(self) -> None:
-        """Start the processor anew."""
+        """Restart the emulated processor."""
         self.close()
         self._process = subprocess.Popen([*QEMU, FIRMWARE], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def close(self) -> None:
-        """End the processor: it stops at the end of its input."""
+        """Close the input of the emulated processor, which ends it, and wait for the end."""
         if self._process:
             self._process.communicate()
             self._process = None
@@ -69,7 +69,7 @@ class CortexM:
         self.close()
 
     def step(self, inputs: ControllerInput) -> np.ndarray:
-        """Return the input that the processor computes, before the limits."""
+        """Return the input u (2) that the processor computes, before it is limited."""
         row = min(max(inputs.step - self.reference.first, 0), len(self.reference.defect) - 1)
         signals = (inputs.estimate, inputs.reference, self.reference.defect[row], inputs.reference_input)
         process = self._process
@@ -85,7 +85,7 @@ class CortexM:
 
 
 def main() -> None:
-    """Fly Case 1 and print what a step costs."""
+    """Simulate Case 1; print the fingerprint, and the instructions and memory that a step needs."""
     from hsv.flight.assembly import assemble_flight
     from hsv.flight.closed_loop import fly
     from hsv.flight.scenario import load_scenario

@@ -1,11 +1,11 @@
-/* The exported controller on a Cortex-M7: startup, and a loop that reads the signals of a step and answers with u.
+/* The exported controller on a Cortex-M7: start-up code, and a loop that reads the signals of a step and returns u.
  *
- * A request is k (int64) and the inputs of the block "controller", 29 doubles; the answer is struct Answer. They pass
- * through semihosting, with which a debugger, or QEMU, reads and writes files of the host: its standard input and
- * output. The end of the input ends the program.
+ * A request is k (int64) and the inputs of the block "controller", 29 doubles; the answer is struct Answer. They are
+ * transferred by semihosting, with which a debugger or QEMU lets the program read and write files of the host, here its
+ * standard input and output. The program ends at the end of the input.
  *
- * SysTick counts the time of a step. Under "-icount shift=10" QEMU takes 1024 ns for every instruction, which are 25.6
- * periods of the clock of 25 MHz, so that the count gives the number of instructions exactly. */
+ * SysTick counts clock periods during a step. With "-icount shift=10" QEMU takes 1024 ns for every instruction, which
+ * is 25.6 periods of the 25 MHz clock, so the count determines the number of instructions exactly. */
 #include "hsv_block.h"
 
 extern const hsv_block controller;
@@ -16,7 +16,7 @@ enum { SYS_OPEN = 0x01, SYS_WRITE = 0x05, SYS_READ = 0x06, SYS_EXIT = 0x18, APPL
 
 struct Answer {
     double wanted[HSV_INPUTS];
-    uint32_t ticks, stack; /* of this step; bytes of stack used at most since the start */
+    uint32_t ticks, stack; /* clock periods of this step; largest use of the stack since the start, bytes */
 };
 
 #define REGISTER(address) (*(volatile uint32_t *)(address))
@@ -39,7 +39,7 @@ static int open_file(const char *name, uint32_t length, uint32_t mode)
     return semihosting(SYS_OPEN, arguments);
 }
 
-/* Read or write all bytes; return whether that was possible. The host returns how many bytes are left. */
+/* Read or write all bytes; return 1 if this was possible, else 0. A host call returns the number of bytes left. */
 static int transfer(int operation, int file, void *bytes, uint32_t size)
 {
     while (size > 0) {
@@ -75,7 +75,7 @@ static void serve(void)
             for (int i = 0; i < ROOM; i++) state[i] = 0.0;
         const uint32_t before = SYSTICK_VALUE;
         controller.step(request.k, request.in, out, state, parameters);
-        answer.ticks = (before - SYSTICK_VALUE) & 0xffffff; /* it counts down */
+        answer.ticks = (before - SYSTICK_VALUE) & 0xffffff; /* SysTick counts down */
         answer.stack = stack_used();
         for (int i = 0; i < HSV_INPUTS; i++) answer.wanted[i] = out[i];
         if (!transfer(SYS_WRITE, output, &answer, sizeof answer)) break;
@@ -84,13 +84,13 @@ static void serve(void)
 
 void reset(void)
 {
-    COPROCESSOR_ACCESS |= 0xfu << 20; /* the floating-point unit */
+    COPROCESSOR_ACCESS |= 0xfu << 20; /* enable the floating-point unit */
     __asm__ volatile("dsb\n isb");
     for (uint32_t *word = bss_start; word < bss_end; word++) *word = 0;
     uint32_t *here;
     __asm__ volatile("mov %0, sp" : "=r"(here));
     for (uint32_t *word = stack_start; word < here; word++) *word = UNUSED;
-    SYSTICK_RELOAD = 0xffffff, SYSTICK_VALUE = 0, SYSTICK_CONTROL = 5; /* on, with the clock of the processor */
+    SYSTICK_RELOAD = 0xffffff, SYSTICK_VALUE = 0, SYSTICK_CONTROL = 5; /* enabled, with the processor clock */
     serve();
     semihosting(SYS_EXIT, (const void *)APPLICATION_EXIT);
     for (;;) {}
@@ -98,7 +98,7 @@ void reset(void)
 
 static void fault(void)
 {
-    semihosting(SYS_EXIT, (const void *)0x20023); /* a run-time error */
+    semihosting(SYS_EXIT, (const void *)0x20023); /* ADP_Stopped_RunTimeErrorUnknown */
     for (;;) {}
 }
 

@@ -1,4 +1,4 @@
-"""The example as a package of a ROS 2 workspace."""
+"""Build file of the example as a package of a ROS 2 workspace."""
 
 from setuptools import setup
 

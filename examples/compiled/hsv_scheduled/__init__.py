@@ -1,4 +1,4 @@
-"""State feedback with two gains, interpolated over the velocity, compiled: it flies as fast as the bench's own."""
+"""An example of a compiled controller, as fast as those of the bench: two gains, interpolated over the velocity."""
 
 import numpy as np
 from numba import cfunc
@@ -15,15 +15,15 @@ RIGID = 5  # altitude, velocity, angle of attack, pitch angle, pitch rate
 STATE_SCALE = np.array([100.0, 20.0, 0.01, 0.01, 0.05])  # m, m/s, rad, rad, rad/s: deviations that weigh equally
 INPUT_SCALE = np.array([0.5, 0.1])  # fuel equivalence ratio, elevator deflection (rad)
 
-# Where the step function finds what it is given: x (9), q_f, x_r (9), u_r (2), x_n (9), u_n (2), s.
+# Indices into the inputs of the step function: x (9), q_f, x_r (9), u_r (2), x_n (9), u_n (2), filter state s.
 FILTERED_RATE, REFERENCE, REFERENCE_INPUT = 9, 10, 19
-# And its parameters: two velocities, then the gains (2 x 5) there, row by row.
+# Indices into its parameters: two velocities, then the gains (2 x 5) at these velocities, row by row.
 LOW, HIGH, GAINS = 0, 1, 2
 
 
 @cfunc("int32(int64, CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64))", cache=True)
 def step(k, given, wanted, state, parameters):
-    """Write the wanted input: u_r - K(V) (x - x_r), the pitch rate in x filtered."""
+    """Write the unsaturated input u_r - K(V) (x - x_r) to ``wanted``; the pitch rate in x is the filtered one."""
     share = (given[1] - parameters[LOW]) / (parameters[HIGH] - parameters[LOW])
     share = min(max(share, 0.0), 1.0)
     for i in range(2):
@@ -47,7 +47,7 @@ class Scheduled:
 
     @classmethod
     def from_parameters(cls, values, design):
-        """Compute the gains for the nominal rigid vehicle; no design of the bench is used."""
+        """Return the controller, with gains computed for the nominal rigid vehicle; ``design`` is not used."""
         own = validate(cls.PARAMETERS, values)
         speeds = [own[f"scheduled.{end}_velocity"] for end in ("low", "high")]
         if not speeds[0] < speeds[1]:
@@ -63,7 +63,7 @@ class Scheduled:
 
 
 def regulator(vehicle, altitude, velocity, input_weight, period):
-    """Return the gain (2, 5) of a linear-quadratic regulator about a trim (m, m/s) of the rigid vehicle."""
+    """Return the gain (2, 5) of a linear-quadratic regulator for the rigid vehicle in its trim (m, m/s), SI."""
     point = trim(vehicle, altitude, velocity)
     A, B = zero_order_hold(*jacobian(point.state, point.input, vehicle), period)
     A, B = A[:RIGID, :RIGID], B[:RIGID]

@@ -1,4 +1,4 @@
-// A controller as a ROS 2 node in C++: it knows the messages of the bench, and nothing else of it.
+// A controller as a separate ROS 2 node in C++, which uses nothing of the bench except its messages.
 #include <algorithm>
 #include <memory>
 
@@ -15,7 +15,7 @@ using hsv_msgs::msg::NominalState;
 constexpr double GAIN[2][5] = {{-5.05e-3, -2.26e-2, 69.9, -99.0, -8.85}, {9.26e-4, -4.46e-3, -10.4, 24.8, 4.50}};
 constexpr double MINIMUM[2] = {0.0, -0.5235987755982988}, MAXIMUM[2] = {1.5, 0.5235987755982988};
 
-// Answers the filtered and the nominal state of a step with the command of the same step.
+// Publishes the command of a step when both the filtered and the nominal state of the step have arrived.
 class Regulator : public rclcpp::Node {
 public:
     Regulator() : Node("regulator")

@@ -1,4 +1,4 @@
-"""A linear-quadratic regulator about the trim of the reference, with integral action: a controller of one's own."""
+"""An example of a custom controller: a linear-quadratic regulator about the reference, with integral action."""
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
@@ -25,7 +25,7 @@ class Lqr:
 
     @classmethod
     def from_parameters(cls, values, design):
-        """Compute the gain for the nominal rigid vehicle; no design of the bench is used."""
+        """Return the regulator, with the gain computed for the nominal rigid vehicle; ``design`` is not used."""
         own = validate(cls.PARAMETERS, values)
         period = values.get("period", 0.02)
         vehicle = Vehicle.from_parameters(values).decoupled
@@ -45,15 +45,15 @@ class Lqr:
         return lqr
 
     def reset(self):
-        """Start a new run."""
+        """Set the integrals to zero; called before every flight."""
         self.integral = np.zeros(2)
 
     def step(self, inputs):
-        """Return the wanted input; the bench limits it."""
+        """Return the unsaturated input u (2); the bench limits it."""
         error = (inputs.estimate - inputs.reference)[:RIGID]
         error[PITCH_RATE] = inputs.filtered_pitch_rate - inputs.reference[PITCH_RATE]
         wanted = inputs.reference_input - self.gain @ np.concatenate((error, self.integral))
-        # The integral stands still while an input is limited: it would wind up.
+        # Anti-windup: the integrals are held while an input is limited.
         if np.all((wanted >= self.minimum) & (wanted <= self.maximum)):
             self.integral += self.period * error[:2]
         return wanted

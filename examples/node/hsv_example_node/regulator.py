@@ -1,4 +1,4 @@
-"""A controller as a ROS 2 node of its own: it knows the messages of the bench, and nothing else of it."""
+"""A controller as a separate ROS 2 node, which uses nothing of the bench except its messages."""
 
 from contextlib import suppress
 
@@ -16,7 +16,7 @@ LIMITS = np.array([0.0, -np.pi / 6]), np.array([1.5, np.pi / 6])
 
 
 class Regulator(Node):
-    """Answers the filtered and the nominal state of a step with the command of the same step."""
+    """Publishes the command of a step when both the filtered and the nominal state of the step have arrived."""
 
     def __init__(self):
         super().__init__("regulator")
@@ -26,7 +26,7 @@ class Regulator(Node):
         self.create_subscription(FilteredState, "hsv/filtered_state", self.on_filtered, deep)
         self.create_subscription(NominalState, "hsv/nominal", self.on_nominal, deep)
 
-    def on_filtered(self, message):  # either may come first
+    def on_filtered(self, message):  # either message may come first
         self.filtered = message
         self.answer()
 
