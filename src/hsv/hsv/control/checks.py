@@ -36,7 +36,7 @@ class Check:
 
     @property
     def shown(self) -> str:
-        """The value found as text, a number with six significant digits."""
+        """The value found, as text; a number has six significant digits."""
         return self.value if isinstance(self.value, str) else f"{self.value:.6g}"
 
 
@@ -58,9 +58,7 @@ class Subject:
         return found
 
     def count(self, field: str, limit: int) -> int:
-        """Return the count in a ``field`` of the certificate, e.g. of samples or steps.
-
-        The ``limit`` guards against the work that a hostile file could cause.
+        """Return the count in a ``field`` of the certificate; a ``limit`` bounds the work that a file can cause.
 
         Raises:
             DesignError: The field is not an integer from 1 to ``limit``.
@@ -89,14 +87,9 @@ def load_subject(path: Path) -> Subject:
 
 
 def same(name: str, value: Any, expected: Any, tolerance: str, size: Any = 1.0) -> Check:
-    """Return the check that every entry of ``value`` equals that of ``expected``.
+    """Return the check that every entry of the array ``value`` equals that of ``expected``, within a tolerance.
 
-    Args:
-        name: Name of the check.
-        value: Number or array found.
-        expected: Number or array of the same shape, recomputed.
-        tolerance: Key of the tolerance in :data:`hsv.control.tolerances.TOLERANCES`.
-        size: Size of the entries, for the absolute tolerance.
+    ``tolerance`` is its key in :data:`hsv.control.tolerances.TOLERANCES`, ``size`` the size of the entries.
     """
     value, expected = np.asarray(value, float), np.asarray(expected, float)
     if value.shape != expected.shape:
@@ -130,16 +123,10 @@ def parameter(
     index: Any = ...,
     fields: Sequence[str] = (),
 ) -> Check:
-    """Return the check that a parameter of the design file equals the ``expected`` array, within its own tolerance.
+    """Return the check that the ``value`` of the design parameter ``name`` equals ``expected``, within its tolerance.
 
-    Args:
-        subject: Design and certificate.
-        name: Name of the parameter, as in :data:`hsv.control.tolerances.PARAMETERS`.
-        value: The array of the parameter, or a part of it.
-        expected: Recomputed array of the same shape.
-        shown: Name of the check; empty: that of the parameter.
-        index: Index of the part in the array; by default ``value`` is all of it.
-        fields: Fields of the certificate that the check covers.
+    ``value`` is the array of the parameter, or only its part ``[index]``. The check is called ``shown``, by default
+    ``name``, and covers these ``fields`` of the certificate.
     """
     size = entry_size(name, subject.certificate)[index]
     return replace(same(shown or name, value, expected, PARAMETERS[name], size), fields=tuple(fields))
@@ -161,7 +148,7 @@ def required(check: Check) -> Check:
 
 
 def gathered(name: str, checks: Callable[[], Checks]) -> list[Check]:
-    """Run ``checks`` and return their results; an error ends them as a failed, required check called ``name``."""
+    """Return the results of ``checks``; an error while they run becomes a last, failed and required check ``name``."""
     done: list[Check] = []
     try:
         done.extend(checks())

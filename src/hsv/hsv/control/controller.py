@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 FOREIGN_FAILURES = (Exception, SystemExit)
-"""Exceptions of external code: it may raise anything, and even end the program."""
+"""Exceptions to expect from external code, which may raise anything and even call ``sys.exit``."""
 
 STEP_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, *[ctypes.c_void_p] * 4)
 """``int32_t step(int64_t k, const double *in, double *out, double *state, const double *par)``."""

@@ -104,7 +104,7 @@ def controller_class(name: str) -> ControllerClass:
 
 
 def class_place(name: str) -> str:
-    """Return the place ``package.module:Class`` of the controller ``name`` without loading it; libraries as named.
+    """Return the place ``package.module:Class`` of the controller ``name`` without loading it, or a library's as given.
 
     Raises:
         ParameterError: There is no such controller.

@@ -1,9 +1,8 @@
 """List the properties of a flight that the certificate of its design does not cover.
 
 A certificate holds for a vehicle with its uncertainty, the actuators of the design, ideal sensors and links, still air
-of the model's density, and a loss of elevator effectiveness down to the value in the inputs of the design. A flight
-outside these limits can succeed, and ``hsv certify`` may find a certificate that covers it, but the existing one makes
-no statement about it.
+of the model's density, and a loss of elevator effectiveness down to the value in the inputs of the design. It says
+nothing about other flights, which may succeed all the same; ``hsv certify`` looks for a certificate that covers them.
 """
 
 from __future__ import annotations
@@ -91,10 +90,7 @@ def uncovered_hardware(values: Mapping[str, Any], design: ControlDesign) -> list
 
 
 def uncovered_vehicle(values: Mapping[str, Any], design: ControlDesign) -> list[str]:
-    """Return a message for each property of vehicle, notch filter and control law that the certificate does not cover.
-
-    ``values`` are the flat parameters of the flight.
-    """
+    """Return a message for each property of vehicle, notch filter and law that the certificate does not cover."""
     found = []
     coupling, digest = values.get("vehicle.coupling", design.coupling), values.get("vehicle.digest", design.vehicle)
     if coupling != design.coupling:
@@ -187,10 +183,7 @@ def _effectiveness(certificate: Mapping[str, Any]) -> float:
 
 
 def commanded(design: ControlDesign) -> np.ndarray:
-    """Return the largest magnitude (2) of a certified command of each input: plan plus feedback in the tube.
-
-    Without bounds of the plan, it is that of the input limits.
-    """
+    """Return the largest magnitude (2) of each certified input: plan plus feedback, or the limits without a plan."""
     bounds = design.plan_bounds
     if bounds is None:
         return np.maximum(np.abs(design.input_minimum), np.abs(design.input_maximum))

@@ -27,7 +27,7 @@ TAU = Parameter("feedback.tau", [1.0], f"adjustable factor of the feedback gain:
 TAU_MINIMUM = Parameter("feedback.tau_minimum", [1.0], f"least certified factor, up to 1: {FACTORS}", "", 0.0, 1.0)
 
 _SAME_SHARE = 1e-9
-"""Difference between two shares that counts as rounding."""
+"""Factors are on the certified line if (1 - tau) / (1 - minimum) differs between them by no more than this."""
 
 TAU_CHANGE_PARAMETERS = (
     Parameter("tau_change.starts", [], "simulated times at which feedback.tau changes, in order", "s", 0.0),
@@ -36,7 +36,7 @@ TAU_CHANGE_PARAMETERS = (
 
 
 def rigid_factors(values: Sequence[float], name: str) -> np.ndarray:
-    """Return the factors (5) of the rigid states from ``values``, which holds one for all states or one for each.
+    """Return the factors tau (5) of the rigid states from ``values``: one for all states, or one for each.
 
     Raises:
         ParameterError: The parameter ``name`` has another number of values, or one that is not above zero.
@@ -85,10 +85,7 @@ def compact(tau: np.ndarray) -> np.ndarray:
 def scheduled_changes(values: Mapping[str, Any], minimum: np.ndarray, period: float) -> list[tuple[int, np.ndarray]]:
     """Return first step and factors tau (5) of each change in the parameters :data:`TAU_CHANGE_PARAMETERS`.
 
-    Args:
-        values: Flat parameters.
-        minimum: Smallest certified factors (5).
-        period: Control period, s.
+    ``minimum`` (5) are the smallest certified factors, ``period`` is the control period (s).
 
     Raises:
         ParameterError: The arrays do not match, times decrease, or a factor is not certified.
@@ -426,7 +423,7 @@ _ARRAYS = {
     "input_minimum": ("input.minimum", (N_INPUTS,)),
     "input_maximum": ("input.maximum", (N_INPUTS,)),
 }
-"""Parameter and shape of each field of :class:`ControlDesign` that is an array."""
+"""Array fields of :class:`ControlDesign` that every design has, with the name and shape of their parameters."""
 
 _POSITIVE = ("nominal_state_scale", "nominal_input_scale", "nominal_input_bound")
 
@@ -567,7 +564,7 @@ def read_design(path: Path) -> ControlDesign:
 
 
 def find_design(name: str) -> Path:
-    """Return the path of the parameter file of a design, given by that path or by name.
+    """Return the path of a design's parameter file, given as a path or as a name.
 
     A name is looked up in the folders of the environment variable ``HSV_DESIGN_PATH``, then among the shipped designs.
 

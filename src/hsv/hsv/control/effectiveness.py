@@ -1,6 +1,6 @@
-"""Estimator of the elevator effectiveness in flight, an extension of the paper's tube law that is off by default.
+"""Estimator of the elevator effectiveness in flight, with the equations of ``core/effectiveness.h``.
 
-``core/effectiveness.h`` has its equations.
+It is an extension of the paper's tube law, off by default.
 """
 
 from __future__ import annotations
@@ -78,10 +78,7 @@ class Effectiveness(NamedTuple):
 
 
 def effectiveness_data(values: Mapping[str, Any], period: float) -> Struct | None:
-    """Return the data of the estimator as the struct ``hsv_effectiveness`` of the core, or None if it is not enabled.
-
-    ``values`` are the flat parameters of the flight, ``period`` is the control period (s).
-    """
+    """Return the estimator as a struct of the core, or None if ``values`` do not enable it; ``period`` is in s."""
     v = validate(EFFECTIVENESS_PARAMETERS, values)
     if not v[EFFECTIVENESS_ENABLED.name]:
         return None

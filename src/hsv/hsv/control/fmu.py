@@ -139,7 +139,7 @@ class LoadedFmu:
         except Exception as error:
             raise ParameterError(f"cannot be loaded ({failure_words(error)}), expected an FMU") from error
         self.failure = ""
-        """Reason why the last step failed, or empty"""
+        """Reason of the last failure of a step; empty before the first"""
         self._function = STEP_FUNCTION(self._step)
         self.block = CBlock(
             self._description.modelName,

@@ -40,11 +40,11 @@ NOTICE = 2.0
 processor time, so that a flight in real time need not wait for it."""
 
 KEPT_FREE = 1e-3
-"""Share of U minus F Z that a plan leaves free on every side, because measurements schedule the model in flight."""
+"""Share of U minus F Z that a plan leaves free on every side; in flight, measured states schedule the model instead."""
 
 
 class Leg(NamedTuple):
-    """A leg of a command: time ``start`` (s) of the request, minimum ``duration`` (s), target point (m and m/s)."""
+    """A leg of a command: request time ``start`` (s), minimum ``duration`` (s), target altitude (m), velocity (m/s)."""
 
     start: float
     duration: float
@@ -118,7 +118,7 @@ class Governor:
         Args:
             start: Altitude (m) and velocity (m/s) at the start of the flight, in trim.
             legs: Legs in order; each begins when requested, or at the last corner of the previous one if that is later.
-            blend: Half-width of the blend at each corner, s; rounded up to a multiple of the period.
+            blend: Half-width of the blend at each corner, s, rounded up to a multiple of the period.
 
         Raises:
             GovernorError: No reference fits a leg; the message gives the reason.
@@ -156,7 +156,7 @@ class Governor:
         """Return the first step that a leg requested for time ``start`` (s) changes in a reference with ``corners``.
 
         Raises:
-            GovernorError: The ``blend`` (s) is not above zero.
+            GovernorError: The half-width ``blend`` (s) is out of its range.
         """
         return max(self._steps(start), self._steps(corners[-1].time) + 1 - self._half(blend))
 

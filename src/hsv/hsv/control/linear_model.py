@@ -130,7 +130,7 @@ def linearise(
         velocity: m/s, or a text with unit; empty: likewise.
         vehicle: Name or path of a vehicle; empty: the paper's.
         coupling: Set of inertial coupling, or a multiple of the derived set; empty: the vehicle's default.
-        model: Coupled (CM), decoupled (DM), or extended by the notch filter (ECM).
+        model: Coupled (CM), decoupled (DM), or extended by the notch filter with default parameters (ECM).
         reading: Pitch rate in eq. 40, for the ECM only: ``physical`` (q, the default) or ``printed`` (q').
 
     Raises:

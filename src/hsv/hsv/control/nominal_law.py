@@ -17,7 +17,7 @@ MEMBERSHIP_TOLERANCE = 1e-6
 """Relative tolerance of x' P x <= 1, as in ``core/nominal.h``; x_n(0) lies on the outermost boundary."""
 
 NOT_IN_FAMILY = 255
-"""Index that stands for a gain that is not in the family, but found in flight."""
+"""Index of a gain that does not belong to the nested family of the design."""
 
 
 class NominalStatus(IntFlag):
@@ -34,8 +34,8 @@ class NominalStatus(IntFlag):
 class LawResult:
     """Result of a nominal law: u_n (2), the gain K (2, 9) used, its index in the family, and the status of the step.
 
-    The index is 0 for the outermost ellipsoid and ``NOT_IN_FAMILY`` for a gain found in flight. In an interpolated
-    family, gain and index are those of the smallest ellipsoid that contains x_n.
+    The index is 0 for the outermost ellipsoid and ``NOT_IN_FAMILY`` for another gain. In an interpolated family, gain
+    and index are those of the smallest ellipsoid that contains x_n.
     """
 
     input: np.ndarray

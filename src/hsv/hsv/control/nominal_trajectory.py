@@ -27,10 +27,7 @@ NOMINAL_PARAMETERS = (
 
 
 class NominalResult(NamedTuple):
-    """One step of the nominal trajectory: x_r (9), u_r (2), x_n (9), u_n (2), the gain K (2, 9), its index and status.
-
-    The index is that of the gain in the nested family, 0 for the outermost, see :class:`LawResult`.
-    """
+    """A step: x_r (9), u_r (2), x_n (9), u_n (2), gain K (2, 9), its index in the family (0: outermost), and status."""
 
     reference: np.ndarray
     reference_input: np.ndarray
@@ -42,14 +39,14 @@ class NominalResult(NamedTuple):
 
     @property
     def in_family(self) -> bool:
-        """Whether the gain belongs to the nested family of the design; otherwise it was found in flight."""
+        """Whether the gain belongs to the nested family of the design."""
         return self.gain_index != NOT_IN_FAMILY
 
 
 class NominalTrajectory:
-    """The nominal trajectory of a flight: the nominal system from x_n(0) = x(0) - x_r(0), stepped under a nominal law.
+    """The nominal system of a flight under its nominal law, starting from x_n(0) = x(0) - x_r(0).
 
-    Measured altitude and velocity schedule the model.
+    Measured altitude and velocity schedule its model.
     """
 
     PARAMETERS = (*NOMINAL_PARAMETERS, *VEHICLE_PARAMETERS, *ACTUATOR_PARAMETERS)
@@ -107,7 +104,7 @@ class NominalTrajectory:
         self.law.reset()
 
     def step(self, state: np.ndarray) -> NominalResult:
-        """Return reference, nominal state and input of this step, and advance x_n by the measured ``state`` (9)."""
+        """Return reference, nominal state and input of this step, and advance x_n; ``state`` (9) is measured."""
         row = self.reference.row(self._step)
         data = self.reference.data
         reference = data.state[row]

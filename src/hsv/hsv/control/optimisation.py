@@ -108,10 +108,7 @@ def rounded(values: np.ndarray, size: Any, digits: int) -> np.ndarray:
 
 
 def rounded_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Return a positive definite ``matrix`` (n, n) rounded to :data:`MATRIX_DIGITS`, and symmetric.
-
-    The size of an entry is the root of the product of its two diagonal entries.
-    """
+    """Return a positive definite ``matrix`` (n, n), rounded relative to the roots of its diagonal, and symmetric."""
     root = np.sqrt(np.diag(matrix))
     return rounded(0.5 * (matrix + matrix.T), np.outer(root, root), MATRIX_DIGITS)
 
@@ -185,10 +182,9 @@ GAP = 1e-3
 """Intended relative gap between the cost of a solution and the minimum; within a factor of the root of 2."""
 
 _INSIDE = (1e-5, 1e-4, 1e-3, 1e-8)
-"""Margins of the inequalities in the search for an interior start: lower bounds of their eigenvalues, tried in order.
+"""Lower bounds of the inequalities' eigenvalues in the search for an interior start, tried in order.
 
-A solution that the solver calls inaccurate may be off by 1e-5; if the inequalities leave little room, a smaller margin
-has to do.
+A solution that the solver calls inaccurate may be off by 1e-5; inequalities with little room need a smaller bound.
 """
 
 _STEPS = 500
@@ -232,9 +228,9 @@ Cost = Callable[..., float]
 
 @dataclass(frozen=True)
 class _Inequality:
-    """A linear matrix inequality G(x) >= 0 with G(x) = constant + sum_j x[acting[j]] slopes[j].
+    """Linear matrix inequality G(x) = constant (k, k) + sum_j x[acting[j]] slopes[j] >= 0; j indexes a unknowns.
 
-    ``constant`` (k, k); ``acting`` (a): indices of the entries of x that occur; ``slopes`` (a, k, k).
+    ``acting`` (a) are their positions in x, and ``slopes`` has the shape (a, k, k).
     """
 
     constant: np.ndarray

@@ -69,9 +69,9 @@ class Corner(NamedTuple):
 
 
 class ReferenceTrajectory:
-    """The reference x_r(k), u_r(k) and its defect d_r(k) for every step k.
+    """The reference x_r(k), u_r(k) and its defect d_r(k) for every step k, computed once.
 
-    They are computed once. The constant parts before the first and after the last corner are not stored step by step.
+    The constant parts before the first and after the last corner are not stored step by step.
     """
 
     def __init__(
@@ -227,10 +227,10 @@ def _blend(
     slope: np.ndarray,
     bend: np.ndarray,
 ) -> None:
-    """Blend all corners in ``command`` (r, 2), its ``slope`` (r, 2) and the second derivative ``bend`` (r) of altitude.
+    """Blend in place ``command`` (r, 2), altitude and velocity, its ``slope`` (r, 2), and the altitude's ``bend`` (r).
 
-    The arrays change in place. All times are in steps: ``instants`` (b) of the corners, at which altitude and velocity
-    are ``commands`` (b, 2), ``half`` (b) half-widths of their blends, and ``steps`` (r) of the rows.
+    All times are in steps: ``instants`` (b) and ``half`` (b) are the times of the corners and half-widths of their
+    blends, ``commands`` (b, 2) altitude and velocity there. Slope and bend are derivatives at the ``steps`` (r).
     """
     before = np.zeros(commands.shape[1])
     for index in range(len(instants)):

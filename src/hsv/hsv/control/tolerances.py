@@ -51,7 +51,7 @@ TOLERANCES = {
     "flights": Tolerance(1e-05, 1e-12),
     "random sequences": Tolerance(1e-06, 1e-12),
 }
-"""Tolerances by the quantity compared."""
+"""Tolerances by kind of quantity."""
 
 RECOMPUTED_DESIGN = 1e-3
 """Largest deviation of a recomputed design from the shipped one, as a share of the larger of an entry and its size."""
@@ -75,7 +75,7 @@ PARAMETERS = {
     }.items()
     for name in names.split()
 }
-"""The tolerance of every number of a design file."""
+"""Kind of tolerance, a key of :data:`TOLERANCES`, for each numeric parameter of a design file."""
 
 
 ROUNDING = TOLERANCES["inequalities"].absolute
@@ -83,9 +83,7 @@ ROUNDING = TOLERANCES["inequalities"].absolute
 
 
 def entry_size(parameter: str, certificate: Mapping[str, Any]) -> np.ndarray:
-    """Return the size (SI) of the entries of a design ``parameter``, the unit of the absolute tolerances.
-
-    The array has the shape of the parameter's, or one that broadcasts to it.
+    """Return the size (SI) of each entry of a design ``parameter``, as an array that broadcasts to its shape.
 
     Raises:
         KeyError: The certificate lacks a field that gives the size.

@@ -120,10 +120,7 @@ def inverse(Q: np.ndarray) -> np.ndarray:
 
 
 def quotient(M: np.ndarray, N: np.ndarray) -> np.ndarray:
-    """Return the gain M N^-1 (2, 9) from M (2, 5) and N (5, 5); the columns of the flexible states are zero.
-
-    N is scaled to a unit diagonal for the computation.
-    """
+    """Return M N^-1, from M (2, 5) and N (5, 5), as a gain (2, 9) that is zero on the flexible states."""
     scale = np.sqrt(np.diag(N))
     gain = np.zeros((len(M), N_STATES))
     gain[:, :N_RIGID] = np.linalg.solve(N / np.outer(scale, scale), (M / scale).T).T / scale
@@ -139,10 +136,7 @@ def sizes(table: Mapping[str, float], names: Sequence[str]) -> np.ndarray:
 
 
 def statement_checks(subject: Subject) -> Checks:
-    """Compare name, units, number of vertices, and the digests of inputs and parameters.
-
-    The digests replace no other check: the other parts recompute the numbers themselves.
-    """
+    """Compare name, units, number of vertices and digests; a digest replaces no check of the numbers themselves."""
     from pydantic import TypeAdapter  # formats numbers as the design does; imported here to keep nodes light
 
     design, inputs = subject.design, subject.certificate["inputs"]
@@ -200,7 +194,7 @@ def notch_in_series(design: ControlDesign) -> Filter:
 def recomputed_model(subject: Subject) -> tuple[PolytopicModel, tuple[np.ndarray, np.ndarray]]:
     """Return the polytopic model recomputed from the vehicle, and the scales of its states (n) and inputs (2), SI.
 
-    The model is that of the vehicle alone (eq. 10 to 12) or with the notch filter (eq. 45), as the inputs require.
+    The inputs of the design say whether it is the vehicle alone (eq. 10 to 12) or with the notch filter (eq. 45).
     """
     from hsv.model.lpv.polytopic import polytopic_model
 
@@ -282,10 +276,7 @@ class NominalWeights:
 
     @classmethod
     def of(cls, subject: Subject) -> NominalWeights:
-        """Return the data of the nominal problem in a certificate.
-
-        The weights contain the period, so that a cost approximates an integral over time, in s.
-        """
+        """Return the nominal problem of a certificate, with weights that make a cost an integral over time, in s."""
         polytope, inputs = subject.design.polytope, subject.certificate["inputs"]["nominal"]
         scales = sizes(inputs["state_scale"], STATE_NAMES[:N_RIGID]), sizes(inputs["input_scale"], INPUT_NAMES)
         psi, sigma = (subject.design.period * np.diag(scale**-2.0) for scale in scales)
@@ -310,10 +301,7 @@ class NominalWeights:
         return float(np.linalg.eigvals(np.linalg.solve(decrease, stage)).real.max())
 
     def decrease(self, K: np.ndarray, Q: np.ndarray, gamma: float) -> np.ndarray:
-        """Return the smallest eigenvalue (r) of the matrix of eq. 34 at each vertex, for the cost bound ``gamma``.
-
-        The diagonal blocks of the matrix are scaled to the identity.
-        """
+        """Return the smallest eigenvalue (r) of eq. 34 at each vertex, its diagonal blocks scaled to the identity."""
         L = np.linalg.cholesky(Q)
         M = np.linalg.solve(L, (self.A + self.B @ K) @ L)
         stage = np.vstack((np.sqrt(self.psi) @ L, np.sqrt(self.sigma) @ K @ L)) / np.sqrt(gamma)
@@ -531,7 +519,7 @@ class Tube:
         return np.append(np.minimum(bounds[: len(star)], star), bounds[len(star) :])
 
     def residuals(self) -> np.ndarray:
-        """Return the residual (r) of the S-procedure in each closed loop; if all are positive, eq. 26 holds.
+        """Return the residual (r) of the S-procedure in each closed loop; all positive: the set is invariant (eq. 26).
 
         With the contraction lam and multipliers l_j, errors v = e - c in the set satisfy lam v' Q^-1 v <= lam, and
         disturbances |d_j| <= 1 satisfy sum_j l_j d_j^2 <= sum_j l_j <= 1 - lam.
@@ -545,12 +533,10 @@ class Tube:
         return 1.0 - image(self.Q, self.A / np.sqrt(self.lam), scaled) ** 2
 
     def tightened(self, lag: Sequence[Sequence[float]] = ((0.0, 0.0), (0.0, 0.0))) -> np.ndarray:
-        """Return the bounds of u_n + u_r, U minus the range of the feedback: (lower and upper, inputs), i.e. (2, 2).
+        """Return the lower and upper bounds (2 each) of u_n + u_r: U minus the range of the feedback (eq. 30).
 
-        This is eq. 30; eq. 53 prints a plus in place of the minus.
-
-        Args:
-            lag: Minimum and maximum (2 each) of the feedback that the lag of the actuators behind the plan causes.
+        Eq. 53 prints a plus instead. ``lag`` is the minimum and maximum (2 each) of the feedback that the lag of the
+        actuators behind the plan causes.
         """
         middle = self.system.F @ self.c + self.system.F_d @ self.middle
         half = self.feedback + np.abs(self.system.F_d) @ self.half
@@ -594,9 +580,8 @@ class StarNorms(NamedTuple):
     def start(self, tube: Tube) -> float:
         """Return the largest level of the start e = 0 in the ellipsoids; at most 1 means that it lies in all (eq. 25).
 
-        The start is e - c = -c, which is split into one term for each acting channel. The split is not in the paper: a
-        term is minus the steady response of the mean vertex to the mid-point of the channel. The last term takes the
-        remainder.
+        The start e - c = -c is split into one term for each acting channel: minus the steady response of the mean
+        vertex to the mid-point of the channel. The last term takes the remainder. This split is not in the paper.
         """
         acting, mean = np.flatnonzero(tube.columns.any(axis=(0, 1))), tube.A.mean(axis=0)
         terms = np.linalg.solve(mean - np.eye(len(mean)), tube.G.mean(axis=0) * tube.middle).T
@@ -648,10 +633,7 @@ def set_checks(subject: Subject) -> Checks:
 
 
 def lag_feedback(subject: Subject) -> Sequence[Sequence[float]]:
-    """Return the stated minimum and maximum (2 each) of the feedback that the actuators' lag behind the plan causes.
-
-    They are zero if the certificate states none.
-    """
+    """Return the stated minimum and maximum (2 each), or zeros, of the feedback due to the actuators' lag."""
     lag = subject.certificate["tube"]["tightening"].get("lag_feedback")
     return (lag["lower"], lag["upper"]) if lag else ((0.0, 0.0), (0.0, 0.0))
 
@@ -770,10 +752,7 @@ def factor_checks(subject: Subject) -> Checks:
 
 
 def adjustable_checks(subject: Subject) -> Checks:
-    """Recompute tau (eq. 48), Z and Z' (eq. 47), the relaxed input bounds (eq. 52), K' (eq. 49 to 52) and the poles.
-
-    A design that is not adjustable has none of these, and no checks.
-    """
+    """Recompute tau (eq. 48), Z, Z' (eq. 47), relaxed input bounds (eq. 52), K' (eq. 49 to 52) and poles, if stated."""
     design, stated = subject.design, subject.certificate.get("adjustable")
     if stated is None:
         return
@@ -864,14 +843,11 @@ RECOMPUTED: dict[str, Part] = {
 def preflight(design: ControlDesign, certificate: str = "") -> str:
     """Check a design before a flight; return a warning, or an empty string.
 
-    A modified design may fly as long as the conditions for its safety hold:
-
-    - the gains are stable at every vertex;
-    - F has a common Lyapunov function for all vertices (eq. 24), and so has every K (eq. 34);
-    - the invariant set monitored in flight is the certified one, and is invariant at every vertex under the gain F.
-
-    A design that violates a condition is refused. Any other difference from the certificate is a warning, and so is a
-    missing certificate.
+    A modified design may fly as long as the conditions for its safety hold. The gains are stable at every vertex; F has
+    a common Lyapunov function (eq. 24), and so has every K (eq. 34). The invariant set monitored in flight is the
+    certified one, it contains e = 0, and it is invariant at every vertex under the feedback in flight. Actuators, range
+    of tau, ``nominal.filtered`` and ``nominal.interpolated`` are as certified. If one of these fails, the design is
+    refused. Any other difference from the certificate is a warning, and so is a missing certificate.
 
     Args:
         design: The design to check.
