@@ -43,7 +43,7 @@ def test_compiled_loop_equals_the_components_step_by_step_bit_for_bit(scenario, 
     for name in HISTORIES:
         assert_array_equal(getattr(compiled.history, name), stepped[name], err_msg=name)
     assert compiled.status == stepped["plant_status"][-1]
-    assert_array_equal(compiled.curves.saturated, stepped["saturated"])
+    assert_array_equal(compiled.saturated, stepped["saturated"])
 
 
 def test_every_signal_of_the_loop_has_one_source_and_follows_it_within_a_step():

@@ -9,7 +9,6 @@ from marking import long
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.fingerprint import _table, as_published, fingerprint
-from hsv.flight.metrics import flight_metrics
 from hsv.flight.scenario import load_scenario, scenario_names
 
 
@@ -94,7 +93,7 @@ SOLVED_IN_FLIGHT = {
 def test_flights_that_solve_a_problem_in_flight_agree_within_their_tolerance(name):
     tolerance, expected = SOLVED_IN_FLIGHT[name]
     assert name not in _table()
-    metrics = flight_metrics(fly(assemble_flight(load_scenario(name))).data())
+    metrics = fly(assemble_flight(load_scenario(name))).metrics
     assert {key: metrics[key] for key in expected} == pytest.approx(expected, rel=tolerance)
 
 

@@ -81,7 +81,7 @@ def test_answers_are_limited_and_the_limits_are_told(monkeypatch):
     flown = fly(flight("Late"))
     assert flown.history.u_unsaturated[20].tolist() == [5.0, -3.0]
     assert flown.history.command[20].tolist() == [LIMITS.input_maximum[0], LIMITS.input_minimum[1]]
-    assert flown.curves.saturated[20].all() and not flown.curves.saturated[19].any()
+    assert flown.saturated[20].all() and not flown.saturated[19].any()
 
 
 def test_a_flight_has_the_wall_times_of_a_law_in_python_step_by_step():

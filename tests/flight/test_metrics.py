@@ -1,5 +1,4 @@
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,8 +7,9 @@ from numpy.testing import assert_allclose
 
 from hsv.base.units import UnitSystem
 from hsv.flight.closed_loop import fly
+from hsv.flight.history import History
 from hsv.flight.limits import Verdict, verdict_sentence, verdicts
-from hsv.flight.metrics import METRICS, FlightData, flight_metrics
+from hsv.flight.metrics import METRICS, FlightData
 from hsv.flight.scenario import load_scenario
 
 PERIOD = 0.02
@@ -39,15 +39,15 @@ def flight(duration=100.0, fault=None, **columns):
     for name, function in columns.items():
         array, column = places[name]
         array[:, column] = array[:, column] + function(time)
-    unlimited = np.where(saturated, np.nan, command)
-    return FlightData(
-        time, state, np.tile(REFERENCE, (len(time), 1)), deviation, command, unlimited, np.zeros(len(time)), fault
+    history = History.of(
+        state=state, deviation=deviation, command=command, u_unsaturated=np.where(saturated, np.nan, command)
     )
+    return FlightData(time, history, np.tile(REFERENCE, (len(time), 1)), fault)
 
 
 def test_exponential_response_has_the_textbook_times():
     tau = 5.0
-    m = flight_metrics(flight(altitude=lambda t: -100.0 * np.exp(-t / tau)))
+    m = flight(altitude=lambda t: -100.0 * np.exp(-t / tau)).metrics
     assert m["altitude_rise_time"] == pytest.approx(tau * math.log(9.0), abs=2 * PERIOD)
     assert m["altitude_settling_time"] == pytest.approx(tau * math.log(50.0), abs=2 * PERIOD)
     assert m["altitude_overshoot"] == 0.0
@@ -64,7 +64,7 @@ def test_second_order_response_overshoots_as_the_textbook_says_up_and_down(sign)
         decay = np.exp(-zeta * omega * t)
         return -sign * 10.0 * decay * (np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t))
 
-    m = flight_metrics(flight(velocity=error))
+    m = flight(velocity=error).metrics
     assert m["velocity_overshoot"] == pytest.approx(math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2)), abs=1e-4)
     assert m["velocity_settling_time"] == pytest.approx(8.1, abs=0.1)
     assert m["velocity_rise_time"] == pytest.approx(1.64, abs=0.05)
@@ -74,7 +74,7 @@ def test_response_metrics_stop_at_the_fault_but_errors_do_not():
     def error(t):
         return np.where(t < 50.0, -100.0 * np.exp(-t), 30.0)
 
-    m = flight_metrics(flight(fault=50.0, altitude=error))
+    m = flight(fault=50.0, altitude=error).metrics
     assert m["altitude_settling_time"] < 5.0
     assert m["altitude_overshoot"] == 0.0
     assert m["altitude_end_error"] == 30.0
@@ -86,7 +86,7 @@ def test_attitude_deviation_is_from_the_mean_before_the_fault_or_from_nominal():
         # It oscillates about 0.001 in the 5 s before the fault, differs before, and jumps by 0.004 at the fault.
         return np.select([t < 45.0, t < 50.0], [0.1, 0.001 + 1e-4 * np.sin(2 * math.pi * t)], 0.005)
 
-    m = flight_metrics(flight(fault=50.0, alpha=alpha, nominal_alpha=lambda t: 0.002 + 0 * t))
+    m = flight(fault=50.0, alpha=alpha, nominal_alpha=lambda t: 0.002 + 0 * t).metrics
     assert m["post_fault_attitude_deviation"] == pytest.approx(0.004, abs=1e-6)
     assert m["post_fault_attitude_from_nominal"] == pytest.approx(0.003, abs=1e-9)
     assert m["attitude_from_nominal"] == pytest.approx(0.098, abs=1e-9)
@@ -96,7 +96,7 @@ def test_decay_time_is_that_of_the_envelope_and_the_slower_mode_counts():
     def ring(tau):
         return lambda t: np.where(t < 50.0, 5.0, np.exp(-(t - 50.0) / tau) * np.cos(15.0 * (t - 50.0)))
 
-    m = flight_metrics(flight(fault=50.0, rate_1=ring(2.0), rate_2=ring(4.0)))
+    m = flight(fault=50.0, rate_1=ring(2.0), rate_2=ring(4.0)).metrics
     half_swing = math.pi / 15.0
     assert m["elastic_rate_1_decay_time"] == pytest.approx(2.0 * math.log(20.0), abs=half_swing)
     assert m["elastic_rate_2_decay_time"] == pytest.approx(4.0 * math.log(20.0), abs=half_swing)
@@ -104,14 +104,12 @@ def test_decay_time_is_that_of_the_envelope_and_the_slower_mode_counts():
 
 
 def test_input_ranges_and_saturated_steps():
-    m = flight_metrics(
-        flight(
-            fuel=lambda t: 0.1 * np.sin(t),
-            elevator=lambda t: -0.05 * (t > 3.0),
-            fuel_limited=lambda t: t < 0.09,
-            elevator_limited=lambda t: (t > 0.05) & (t < 0.15),
-        )
-    )
+    m = flight(
+        fuel=lambda t: 0.1 * np.sin(t),
+        elevator=lambda t: -0.05 * (t > 3.0),
+        fuel_limited=lambda t: t < 0.09,
+        elevator_limited=lambda t: (t > 0.05) & (t < 0.15),
+    ).metrics
     assert_allclose([m["fuel_equivalence_ratio_minimum"], m["fuel_equivalence_ratio_maximum"]], [0.2, 0.4], atol=1e-4)
     assert_allclose([m["elevator_deflection_minimum"], m["elevator_deflection_maximum"]], [0.15, 0.2])
     # Limited: steps 0-4 of one input, 3-7 of the other. A step with both limited counts once.
@@ -122,25 +120,27 @@ def test_a_flight_that_ended_in_numbers_that_are_none_still_has_metrics():
     def gone(t):
         return np.where(t > 99.0, np.nan, np.exp(-t))
 
-    m = flight_metrics(flight(fault=50.0, altitude=gone, velocity=gone, alpha=gone, rate_1=gone, rate_2=gone))
+    m = flight(fault=50.0, altitude=gone, velocity=gone, alpha=gone, rate_1=gone, rate_2=gone).metrics
     assert math.isnan(m["altitude_end_error"])
     assert m["elastic_rate_1_decay_time"] == pytest.approx(50.0)
 
 
 def test_order_and_names_are_those_of_the_table():
     curves = {name: lambda t: -np.exp(-t) for name in ("altitude", "velocity", "rate_1")}
-    assert list(flight_metrics(flight(fault=50.0, **curves))) == list(METRICS)
+    assert list(flight(fault=50.0, **curves).metrics) == list(METRICS)
 
 
 @pytest.mark.parametrize(("scenario", "limited"), [("case1", False), ("case1_derived_no_notch", True)])
 def test_a_flight_that_was_recorded_has_the_same_metrics_in_every_bit(scenario, limited):
-    flown = fly(components(scenario, duration=110.0)).data()
-    columns = {name: getattr(flown, name).copy() for name in ("state", "reference", "deviation", "command")}
-    recorded = replace(flown, **columns, unlimited=np.where(flown.flight_curves.saturated, np.nan, flown.command))
-    assert flown.flight_curves.saturated.any() == limited
+    flown = fly(components(scenario, duration=110.0))
+    signals = {name: getattr(flown.history, name) for name in ("state", "deviation", "command")}
+    unlimited = np.where(flown.saturated, np.nan, flown.history.command)
+    history = History.of(**signals, u_unsaturated=unlimited)
+    recorded = FlightData(flown.time, history, flown.reference.copy(), flown.fault_start)
+    assert flown.saturated.any() == limited
     for name in ("curves", "saturated"):
-        assert np.array_equal(getattr(flown.flight_curves, name), getattr(recorded.flight_curves, name))
-    assert flight_metrics(flown) == flight_metrics(recorded)
+        assert np.array_equal(getattr(flown, name), getattr(recorded, name))
+    assert flown.metrics == recorded.metrics
 
 
 @pytest.mark.parametrize(

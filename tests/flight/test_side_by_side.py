@@ -25,11 +25,9 @@ def check(flights, group=None):
     group, levels = FlightGroup() if group is None else group, TubeLevels(flights[0])
     for (together, level), own in zip(group.fly(flights, levels.set), alone, strict=True):
         if levels.set:
-            assert level == pytest.approx(levels.worst(own.data()), rel=0, abs=0, nan_ok=True)
+            assert level == pytest.approx(levels.worst(own), rel=0, abs=0, nan_ok=True)
         for name in ("curves", "saturated"):
-            assert np.array_equal(
-                getattr(together.curves, name), getattr(own.data().flight_curves, name), equal_nan=True
-            ), name
+            assert np.array_equal(getattr(together, name), getattr(own, name), equal_nan=True), name
         assert together.fingerprint == own.fingerprint
         assert together.status == own.status and len(together.time) == len(own.time)
         for name, column in own.history.columns().items():
@@ -137,5 +135,5 @@ def published_levels(parts, flight):
 def test_the_worst_level_is_the_largest_that_the_controller_publishes_in_every_bit():
     parts = components("case1_heavy", duration=110.0)
     flight = fly(parts)
-    worst = TubeLevels(parts).worst(flight.data())
+    worst = TubeLevels(parts).worst(flight)
     assert worst == max(published_levels(parts, flight))

@@ -59,7 +59,7 @@ def test_every_sample_of_a_flight_is_drawn(draw):
     whole, closer = draw(13).axes[2:]
     for axis, (start, end) in ((whole, (0.0, 200.0)), (closer, closer.get_xlim())):
         inside = (flight.time >= start) & (flight.time <= end)
-        rate = [to_paper(value, "kg^0.5 m/s")[0] for value in flight.state[inside, 8]]
+        rate = [to_paper(value, "kg^0.5 m/s")[0] for value in flight.history.state[inside, 8]]
         assert axis.get_lines()[0].get_ydata() == pytest.approx(rate)
 
 

@@ -16,8 +16,8 @@ def test_a_table_has_a_row_for_every_vehicle_in_order():
     table = fly_over(Point(short(), over))
     parts = assemble(short())
     for index, corner in enumerate(over):
-        flight = fly(parts.perturbed(corner)).data()
-        assert table["altitude_end_error"][index] == flight.state[-1, 0] - flight.reference[-1, 0]
+        flight = fly(parts.perturbed(corner))
+        assert table["altitude_end_error"][index] == flight.history.state[-1, 0] - flight.reference[-1, 0]
     assert not table["diverged"].any()
 
 

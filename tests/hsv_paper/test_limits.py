@@ -170,7 +170,7 @@ def test_a_page_has_the_least_time(page):
 
 
 def flown(scenario, **changes):
-    return fly(assemble({**flight_parameters(load_scenario(scenario)), **changes})).data()
+    return fly(assemble({**flight_parameters(load_scenario(scenario)), **changes}))
 
 
 def test_settling_times_of_a_ramp_count_from_its_beginning():
@@ -181,4 +181,4 @@ def test_settling_times_of_a_ramp_count_from_its_beginning():
 def test_the_page_has_what_the_controllers_reach():
     page_of_limits = (ROOT / "docs" / "study" / "limits.md").read_text(encoding="utf-8")
     flown = fly(assemble_flight(parse_scenario(governed("case1", BLEND).text, "case1")))
-    assert f"{max(settling_times(flown.data())):.1f}" in page_of_limits
+    assert f"{max(settling_times(flown)):.1f}" in page_of_limits

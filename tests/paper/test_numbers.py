@@ -8,7 +8,6 @@ from flights import components
 
 from hsv.base.units import factor
 from hsv.flight.closed_loop import fly
-from hsv.flight.metrics import flight_metrics
 from hsv.flight.scenario import load_scenario
 from hsv.model.dynamics import jacobian
 from hsv.model.lpv.linearisation import modes
@@ -27,7 +26,7 @@ def flown():
     def get(name):
         if name not in cache:
             flight = fly(components(name))
-            cache[name] = flight, flight_metrics(flight.data())
+            cache[name] = flight, flight.metrics
         return cache[name]
 
     return get
@@ -115,7 +114,7 @@ def test_attitude_stays_within_half_a_degree_after_the_fault_at_a_heavy_corner(f
 
 
 def test_the_paper_s_decoupled_plant_flies_case1_too():
-    m = flight_metrics(fly(components("case1", vehicle__model="DM")).data())
+    m = fly(components("case1", vehicle__model="DM")).metrics
     assert abs(m["altitude_end_error"]) <= 8 * FOOT
     assert m["post_fault_attitude_deviation"] <= 0.25 * DEGREE
 
@@ -136,7 +135,7 @@ def test_integral_action_removes_the_offset_of_a_wrong_mass(flown):
     for name in ("case1_integral_heavy", "case1_integral_light"):
         _, m = flown(name)
         assert abs(m["altitude_end_error"]) < 0.5 * FOOT
-    off = flight_metrics(fly(components("case1_integral_light", integral__rate=0.0)).data())
+    off = fly(components("case1_integral_light", integral__rate=0.0)).metrics
     assert abs(off["altitude_end_error"]) > 10 * FOOT
 
 

@@ -156,4 +156,4 @@ def plot(flights: Flight | Mapping[str, Flight], *, units: str = UnitSystem.metr
     from hsv.pages.plots import flight_figure
 
     shown = {"flight": flights} if isinstance(flights, Flight) else flights
-    return flight_figure({label: flight.data() for label, flight in shown.items()}, unit_system(units))
+    return flight_figure(shown, unit_system(units))

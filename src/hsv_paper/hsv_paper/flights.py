@@ -13,7 +13,7 @@ from hsv.flight.assembly import assemble, flight_parameters
 from hsv.flight.closed_loop import fly
 from hsv.flight.corners import Corner
 from hsv.flight.flight import Flight
-from hsv.flight.metrics import FlightData, flight_metrics
+from hsv.flight.metrics import FlightData
 from hsv.flight.scenario import load_scenario
 from hsv.flight.side_by_side import TubeLevels, fly_perturbed
 from hsv.model.plant import FlightStatus
@@ -46,7 +46,7 @@ class Point:
 @cache
 def flight_of(scenario: str) -> FlightData:
     """Return the flight of a shipped scenario by its name."""
-    return fly(assemble(flight_parameters(load_scenario(scenario)))).data()
+    return fly(assemble(flight_parameters(load_scenario(scenario))))
 
 
 def fly_over(point: Point, progress: Callable[[int], None] = lambda done: None) -> Table:
@@ -55,13 +55,12 @@ def fly_over(point: Point, progress: Callable[[int], None] = lambda done: None) 
     levels = TubeLevels(parts)
 
     def measures(corner: Corner, flight: Flight) -> dict[str, float]:
-        data = flight.data()
-        level = levels.worst(data)
+        level = levels.worst(flight)
         return {
             "diverged": float(flight.status is FlightStatus.DIVERGED),
-            "end_time": float(data.time[-1]),
+            "end_time": float(flight.time[-1]),
             **({} if level is None else {"tube_level": level}),
-            **flight_measures(data),
+            **flight_measures(flight),
         }
 
     rows = fly_perturbed(parts, point.over, measures, progress)
@@ -75,25 +74,25 @@ def flight_measures(flight: FlightData) -> dict[str, float]:
     ``rigid_error`` is relative to the half-widths of the baseline's invariant set, so that it can combine different
     states.
     """
-    values = flight_metrics(flight)
-    deviation = np.abs(flight.state - flight.reference)
+    values, state = dict(flight.metrics), flight.history.state
+    deviation = np.abs(state - flight.reference)
     values["attitude_from_reference"] = float(deviation[:, 2:4].max())
     if flight.fault_start is None or flight.time[-1] < flight.fault_start + AFTER:
         return values
     since = flight.time - flight.fault_start
     after, window = since >= 0.0, (since >= 0.0) & (since <= AFTER)
     ringing = (since >= RINGING[0]) & (since <= RINGING[1])
-    error = (flight.state - flight.reference - flight.deviation)[window, :5]
+    error = (state - flight.reference - flight.history.deviation)[window, :5]
     values["post_fault_altitude_error"] = float(deviation[after, 0].max())
     values["rigid_error"] = float(np.sqrt(np.mean((error / tube_of("baseline").half_width[:5]) ** 2)))
     values["pitch_rate_error"] = float(np.sqrt(np.mean(error[:, 4] ** 2)))
-    values["pitch_rate_ringing"] = float(np.ptp(flight.state[ringing, 4]))
+    values["pitch_rate_ringing"] = float(np.ptp(state[ringing, 4]))
     for mode, column in ((1, 5), (2, 7)):
-        values[f"elastic_coordinate_{mode}_span"] = float(np.ptp(flight.state[after, column]))
-        values[f"elastic_rate_{mode}_span"] = float(np.ptp(flight.state[after, column + 1]))
-        values[f"elastic_rate_{mode}_ringing"] = float(np.ptp(flight.state[ringing, column + 1]))
-    values["attitude_settling_time"] = _settling_time(since[after], flight.state[after, 2:4])
-    values["pitch_rate_settling_time"] = _settling_time(since[after], flight.state[after, 4:5])
+        values[f"elastic_coordinate_{mode}_span"] = float(np.ptp(state[after, column]))
+        values[f"elastic_rate_{mode}_span"] = float(np.ptp(state[after, column + 1]))
+        values[f"elastic_rate_{mode}_ringing"] = float(np.ptp(state[ringing, column + 1]))
+    values["attitude_settling_time"] = _settling_time(since[after], state[after, 2:4])
+    values["pitch_rate_settling_time"] = _settling_time(since[after], state[after, 4:5])
     decay = values["elastic_decay_time"]
     values["elastic_settling_time"] = decay if decay < since[-1] - LAST else np.inf
     return values

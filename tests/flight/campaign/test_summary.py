@@ -52,9 +52,8 @@ def test_flights_that_diverge_are_within_no_limit_and_come_first(lost):
 
 
 def test_an_envelope_has_the_extremes_and_the_mean_values_of_each_window():
-    data = fly(components("case1", duration=3.0)).data()
-    data.state[140:, 6] = np.nan
-    flown = data.flight_curves
+    flown = fly(components("case1", duration=3.0))
+    flown.history.state[140:, 6] = np.nan
     envelope = Envelope.empty(50)
     envelope.add(flown, 150)
     envelope.add(flown, 150)

@@ -10,6 +10,7 @@ from node_processes import short_scenario
 from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
 from hsv.flight.fingerprint import drop_older
+from hsv.flight.history import History
 from hsv.flight.metrics import FlightData
 from hsv.flight.resilience.campaign import ResilienceCampaign, plan
 from hsv.flight.resilience.faults import RESOLUTION, SEVERITIES, TRIED, Moment
@@ -94,10 +95,9 @@ def test_the_ends_of_a_range_may_be_survived_or_lost():
 def flight(altitude, attitude):
     """Return a flight with one step per second, at rest except for altitude (m) and pitch angle (rad)."""
     n = len(altitude)
-    state, zeros = np.zeros((n, 9)), np.zeros((n, 9))
+    state = np.zeros((n, 9))
     state[:, 0], state[:, 3] = altitude, attitude
-    two = np.zeros((n, 2))
-    return FlightData(np.arange(float(n)), state, zeros, zeros, two, two, np.zeros(n), 2.0)
+    return FlightData(np.arange(float(n)), History.of(state=state), np.zeros((n, 9)), 2.0)
 
 
 def test_recovery_is_the_last_exit_from_the_band():

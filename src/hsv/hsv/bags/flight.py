@@ -12,6 +12,7 @@ from hsv.bags.description import ACTUATOR, COMMAND, FILTERED_STATE, FORCES, MEAS
 from hsv.bags.reader import Bag
 from hsv.bags.steps import cut_off, expected_stamps, joined
 from hsv.flight.fingerprint import fingerprint
+from hsv.flight.history import History
 from hsv.flight.metrics import FlightData
 from hsv.model.signals import INPUT_NAMES, STATE_NAMES
 
@@ -58,12 +59,14 @@ def flight_data(bag: Bag) -> FlightData:
     u = input_columns(command)
     return FlightData(
         time=state["header.stamp"] * 1e-9,
-        state=state_columns(state),
+        history=History.of(
+            state=state_columns(state),
+            deviation=state_columns(nominal, "deviation."),
+            gain_index=nominal["gain_index"],
+            u_unsaturated=np.where(command["saturated"], np.nan, u),
+            command=u,
+        ),
         reference=state_columns(nominal, "reference."),
-        deviation=state_columns(nominal, "deviation."),
-        command=u,
-        unlimited=np.where(command["saturated"], np.nan, u),
-        gain_index=nominal["gain_index"],
         fault_start=float(status["header.stamp"][acting[0]]) * 1e-9 if len(acting) else None,
     )
 

@@ -135,7 +135,6 @@ def simulate(
     from hsv.flight.assembly import assemble_flight, blamed_on, uncovered_of
     from hsv.flight.closed_loop import fly
     from hsv.flight.flight import step_statistics
-    from hsv.flight.metrics import flight_metrics
     from hsv.flight.scenario import load_scenario
     from hsv.model.plant import FlightStatus
 
@@ -154,7 +153,7 @@ def simulate(
             np.savez_compressed(stream, **columns)
     flown = FlightSummary(
         loaded,
-        flight_metrics(flight.data()),
+        flight.metrics,
         fingerprint=flight.fingerprint,
         design_hash=design.digest if design else digest({}),
         ending="diverged" if flight.status is FlightStatus.DIVERGED else "finished",
@@ -278,7 +277,6 @@ def _conclude(
     from hsv.bags.info import describe
     from hsv.bags.reader import Bag
     from hsv.cli.summary import FlightSummary, report_flight
-    from hsv.flight.metrics import flight_metrics
     from hsv.flight.scenario import parse_scenario
     from hsv.pages.report import write_report
 
@@ -300,7 +298,7 @@ def _conclude(
     description = describe(recorded)
     flown = FlightSummary(
         parse_scenario(recorded.text("scenario.toml"), recorded.custom_data.get("scenario", "")),
-        flight_metrics(data),
+        data.metrics,
         fingerprint=description["fingerprint"],
         design_hash=recorded.custom_data.get("design_hash", ""),
         ending=description["ending"],

@@ -173,7 +173,7 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
     from hsv.bags.steps import completeness
     from hsv.base.errors import RecordingError
     from hsv.cli.summary import print_metrics
-    from hsv.flight.metrics import METRICS, flight_metrics
+    from hsv.flight.metrics import METRICS
 
     description = describe(opened)
     problem, remark = None, ""
@@ -181,7 +181,7 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
     metrics: dict[str, float] = {}
     try:
         if not lacking:
-            metrics, remark = flight_metrics(flight_data(opened)), completeness(opened)
+            metrics, remark = flight_data(opened).metrics, completeness(opened)
     except RecordingError as error:
         # The other contents help to see what is wrong with the bag.
         problem = error

@@ -168,10 +168,12 @@ class ReferenceTrajectory:
 
     def along(self, steps: int) -> Struct:
         """Return :attr:`data` with one row for each of the first ``steps`` steps; it is cached, do not change it."""
-        if self._along is None or len(self._along.state) != steps:
+        along = self._along
+        if along is None or len(along.state) != steps:
             arrays = {name: getattr(self.data, name)[self.rows(steps)] for name in ("state", "input", "defect")}
-            self._along = Struct("hsv_reference", first=0, **arrays)
-        return self._along
+            # Another thread may need another length, so return this one and not the attribute.
+            self._along = along = Struct("hsv_reference", first=0, **arrays)
+        return along
 
     @property
     def end(self) -> float:

@@ -19,7 +19,6 @@ from hsv.design.sets.star_norms import star_norms
 from hsv.design.tightening import TightenedInputs, check_plan, plan_bounds, tighten
 from hsv.design.tube_problem import TubeProblem, tube_problem
 from hsv.flight.flight import Flight
-from hsv.flight.metrics import flight_metrics
 from hsv.flight.random_sequences import random_sequences
 from hsv.model.signals import PITCH_RATE
 
@@ -166,7 +165,7 @@ def flight_evidence(flight: Flight, found: InvariantSet, model: ChannelModel) ->
     """Return the evidence of ``flight`` for the invariant set ``found``; ``model`` computes its disturbances."""
     (errors, _), plan = model.errors(flight), flight.plan
     pitch_acceleration = np.diff(flight.history.deviation[:, PITCH_RATE]) / flight.period
-    metrics = flight_metrics(flight.data())
+    metrics = flight.metrics
     return FlightEvidence(
         level=float(found.level(errors).max()),
         ratios=np.max(np.abs(errors - found.centre), axis=0) / found.half_width,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.flight.fingerprint import fingerprint
 from hsv.flight.history import History
-from hsv.flight.metrics import FlightCurves, FlightData, flight_metrics, read_curves
+from hsv.flight.metrics import FlightData
 from hsv.model.dynamics import in_model_range
 from hsv.model.plant import FlightStatus
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES, NEVER, STATE_NAMES, STATE_UNITS
@@ -29,24 +28,16 @@ def _along(name: str, meaning: str) -> property:
 
 
 @dataclass(frozen=True, repr=False)
-class Flight:
-    """A flight: control period (s), history, reference, time of the first fault (s) and final status."""
+class Flight(FlightData):
+    """A simulated flight, with its control period (s), its reference for all times, and its final status."""
 
     period: float
-    history: History
     trajectory: ReferenceTrajectory
-    fault_start: float | None
     status: FlightStatus
     law_times: Mapping[str, Sequence[float]] = field(default_factory=dict)
     """Wall times (s) of the steps of the nominal law and the controller, if they are in Python; those in the core are
     not measured one by one."""
 
-    @cached_property
-    def time(self) -> np.ndarray:
-        """Simulated time (n + 1), s."""
-        return np.arange(len(self.history.signals)) * self.period
-
-    reference = _along("state", "x_r (n + 1, 9)")
     reference_input = _along("input", "u_r (n + 1, 2)")
     defect = _along("defect", "d_r (n + 1, 9), see :mod:`hsv.control.reference_trajectory`")
 
@@ -59,18 +50,6 @@ class Flight:
     def fingerprint(self) -> str:
         """The digest of all bits of the history, see :mod:`hsv.flight.fingerprint`."""
         return fingerprint(self.history.signals)
-
-    @cached_property
-    def metrics(self) -> dict[str, float]:
-        """The metrics that the flight defines, SI, by the names in :data:`hsv.flight.metrics.METRICS`."""
-        return flight_metrics(self.curves)
-
-    @cached_property
-    def curves(self) -> FlightCurves:
-        """The curves from which metrics are computed."""
-        history = self.history
-        curves = read_curves(history.signals, history.auxiliary, self.reference)
-        return FlightCurves(self.time, *curves, self.fault_start)
 
     def __repr__(self) -> str:
         steps = len(self.history.signals) - 1
@@ -99,12 +78,6 @@ class Flight:
         frame.attrs["units"] = {"time": "s", **units}
         return frame
 
-    def data(self) -> FlightData:
-        """Return the data from which metrics are computed."""
-        h = self.history
-        inputs = {"command": h.command, "unlimited": h.u_unsaturated, "gain_index": h.gain_index}
-        return FlightData(self.time, h.state, self.reference, h.deviation, **inputs, fault_start=self.fault_start)
-
 
 def step_statistics(seconds: Sequence[float]) -> dict[str, float]:
     """Return median, 99th percentile and maximum of wall times, in ms, by the nearest rank."""
@@ -129,8 +102,9 @@ def flight_of(components: Components, history: History) -> Flight:
     plant = components.plant
     diverged = not in_model_range(history.state[-1], plant.vehicle.angle_limit)
     status = FlightStatus.DIVERGED if diverged else FlightStatus.FINISHED
-    reference, start = components.nominal_trajectory.reference, fault_start(components, len(history.state))
-    return Flight(plant.period, history, reference, start, status)
+    rows, trajectory = len(history.signals), components.nominal_trajectory.reference
+    time, reference, start = np.arange(rows) * plant.period, trajectory.along(rows).state, fault_start(components, rows)
+    return Flight(time, history, reference, start, plant.period, trajectory, status)
 
 
 def fault_start(components: Components, rows: int) -> float | None:

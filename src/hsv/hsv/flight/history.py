@@ -40,6 +40,15 @@ class History(_Matrices):
         return cls.over(np.empty(rows * numbers), rows, estimated=estimated)
 
     @classmethod
+    def of(cls, **signals: np.ndarray) -> History:
+        """Return a history with these ``signals`` (n + 1 rows each), by name; the others are NaN."""
+        history = cls.empty(len(next(iter(signals.values()))), estimated=False)
+        history.signals[:] = history.auxiliary[:] = np.nan
+        for name, values in signals.items():
+            getattr(history, name)[:] = values
+        return history
+
+    @classmethod
     def over(cls, memory: np.ndarray, rows: int, *, estimated: bool = True) -> History:
         """Return a history of ``rows`` steps in ``memory`` (..., numbers), one matrix after the other."""
         matrices, start = [], 0

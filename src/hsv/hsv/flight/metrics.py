@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
-from hsv.core import doubles, ffi, lib
-from hsv.flight.history import ACTUATOR, AUXILIARY_COLUMNS, Q_F, SIGNAL_COLUMNS, U_N, U_UNSATURATED, X_N, U, X
+from hsv.core import doubles, ffi, lib, vector
+from hsv.flight.history import History
 from hsv.model.signals import N_INPUTS
 
 SETTLING_BAND = 0.02
@@ -115,66 +114,53 @@ def is_share(name: str) -> bool:
 
 
 CURVES = 10
-"""Number of the curves of a :class:`FlightCurves`."""
-
-
-class FlightCurves(NamedTuple):
-    """The curves from which metrics are computed, for steps k = 0 ... n.
-
-    ``curves`` (10, n + 1): errors of altitude and velocity; angle of attack and pitch angle; the two elastic rates; the
-    two commands; absolute differences of angle of attack and pitch angle from reference + nominal; all SI. ``time``
-    (n + 1) and ``fault_start``, the time of the first fault, are in seconds; ``saturated`` (n + 1, 2) marks the limited
-    commands.
-    """
-
-    time: np.ndarray
-    curves: np.ndarray
-    saturated: np.ndarray
-    fault_start: float | None
+"""Number of rows of :attr:`FlightData.curves`."""
 
 
 @dataclass(frozen=True)
 class FlightData:
-    """Signals from which metrics are computed, for steps k = 0 ... n, SI.
-
-    ``time`` (n + 1); ``state``, ``reference`` and ``deviation`` (n + 1, 9): x, x_r and x_n; ``command`` and
-    ``unlimited`` (n + 1, 2): inputs after and before limitation. ``unlimited`` is NaN if a recording states only that
-    the command was limited. ``gain_index`` (n + 1) is the index of the nominal gain, counted from the outermost.
-    """
+    """A simulated or recorded flight for the steps k = 0 ... n, from which metrics are computed; SI."""
 
     time: np.ndarray
-    state: np.ndarray
+    """Simulated time (n + 1), s"""
+    history: History
     reference: np.ndarray
-    deviation: np.ndarray
-    command: np.ndarray
-    unlimited: np.ndarray
-    gain_index: np.ndarray
+    """x_r (n + 1, 9)"""
     fault_start: float | None
-    """Time of the first fault (s), ``None`` without one."""
+    """Time of the first fault (s), None without a fault"""
 
     @cached_property
-    def flight_curves(self) -> FlightCurves:
-        """Curves from which metrics are computed."""
-        rows = len(self.state)
-        signals, auxiliary = np.zeros((rows, SIGNAL_COLUMNS)), np.zeros((rows, AUXILIARY_COLUMNS))
-        signals[:, X:Q_F], signals[:, X_N:U_N], signals[:, U:ACTUATOR] = self.state, self.deviation, self.command
-        auxiliary[:, U_UNSATURATED:] = self.unlimited
-        return FlightCurves(self.time, *read_curves(signals, auxiliary, self.reference), self.fault_start)
+    def _evaluated(self) -> tuple[np.ndarray, np.ndarray]:
+        """The curves (10, n + 1) and the saturation (n + 1, 2)."""
+        rows = len(self.time)
+        curves, saturated = np.empty((CURVES, rows)), np.empty((rows, N_INPUTS), np.uint8)
+        inputs = map(doubles, map(vector, (self.history.signals, self.history.auxiliary, self.reference)))
+        lib.hsv_curves(rows, rows, *inputs, doubles(curves), ffi.from_buffer("uint8_t *", saturated))
+        return curves, saturated.view(bool)
+
+    @property
+    def curves(self) -> np.ndarray:
+        """The curves (10, n + 1) from which metrics are computed, SI.
+
+        Errors of altitude and velocity, angle of attack, pitch angle, the two elastic rates, the two commands, and the
+        absolute differences of angle of attack and pitch angle from reference + nominal.
+        """
+        return self._evaluated[0]
+
+    @property
+    def saturated(self) -> np.ndarray:
+        """Whether each command was limited (n + 1, 2)."""
+        return self._evaluated[1]
+
+    @cached_property
+    def metrics(self) -> dict[str, float]:
+        """The metrics that the flight defines, SI, by their names in :data:`METRICS`."""
+        return _metrics(self)
 
 
-def read_curves(signals: np.ndarray, auxiliary: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the curves (10, n) of a history (see there) with reference x_r (n, 9), and the limited commands (n, 2)."""
-    rows = len(signals)
-    curves, saturated = np.empty((CURVES, rows)), np.empty((rows, N_INPUTS), np.uint8)
-    inputs = map(doubles, (signals, auxiliary, np.ascontiguousarray(reference, float)))
-    lib.hsv_curves(rows, rows, *inputs, doubles(curves), ffi.from_buffer("uint8_t *", saturated))
-    return curves, saturated.view(bool)
-
-
-def flight_metrics(given: FlightData | FlightCurves) -> dict[str, float]:
+def _metrics(flight: FlightData) -> dict[str, float]:
     """Return the metrics of a flight, SI, without those that it does not define (no step, no fault)."""
     values: dict[str, float] = {}
-    flight = given.flight_curves if isinstance(given, FlightData) else given
     time, curves = flight.time, flight.curves
     faultless = len(time) if flight.fault_start is None else int(np.searchsorted(time, flight.fault_start - 1e-9))
     before, after = slice(faultless), slice(faultless, None)

@@ -78,8 +78,8 @@ class TubeLevels:
         """Return the largest level (e - c)' P (e - c) of the flight, None if no set holds for it."""
         if not self.set:
             return None
-        given = [doubles(vector(each)) for each in (flight.state, flight.deviation, flight.reference)]
-        return float(lib.hsv_worst_level(self.set.pointer, len(flight.state), *given))
+        given = [doubles(vector(each)) for each in (flight.history.state, flight.history.deviation, flight.reference)]
+        return float(lib.hsv_worst_level(self.set.pointer, len(flight.time), *given))
 
 
 def fly_perturbed(

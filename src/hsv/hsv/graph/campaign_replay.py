@@ -44,7 +44,7 @@ def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
     row, runner = results.row(flight), results.sample_runner
     try:
         flown = runner.fly(flight, runner.sample(flight))
-        repeated = runner.outcome((flown, runner.level(flown.data())))
+        repeated = runner.outcome((flown, runner.level(flown)))
     except ControllerError as error:
         repeated = runner.outcome(error)
     return ReplayedFlight(flight, _outcome(row), repeated)
@@ -77,7 +77,7 @@ def replay_over_dds(
     # Stamps are whole nanoseconds, the campaign's time is not: the last bit of an integral over time would differ.
     data = replace(data, time=np.arange(len(data.time)) * runner.period)
     fingerprint = flight_fingerprint(recorded)
-    repeated = runner.measured(data.flight_curves, data.state[-1], runner.level(data), fingerprint)
+    repeated = runner.measured(data, runner.level(data), fingerprint)
     exact = not (
         measurement_errors(joined(recorded, equipment_topics(recorded)))
         or prepared.scenario.settings.get(ESTIMATOR_ENABLED.name)

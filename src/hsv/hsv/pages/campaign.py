@@ -277,5 +277,5 @@ def _limits(results: Results, shown: Distribution) -> list[float]:
 
 def _curve(flight: Flight, windows: np.ndarray, index: int) -> np.ndarray:
     """Return a signal of a flight at the first steps of the windows that it reached."""
-    curve = signals(flight.data().flight_curves)[index]
+    curve = signals(flight)[index]
     return np.asarray(curve[windows[windows < len(curve)]])

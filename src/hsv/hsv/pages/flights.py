@@ -16,7 +16,6 @@ from hsv.bags.steps import completeness, joined
 from hsv.base.errors import HsvError
 from hsv.control.design import parse_parameters
 from hsv.flight.limits import Verdict, verdicts
-from hsv.flight.metrics import flight_metrics
 from hsv.flight.scenario import Scenario, parse_scenario
 from hsv.model.signals import INPUT_NAMES
 from hsv.pages.events import Event, flight_events
@@ -113,7 +112,7 @@ def reported_runs(bags: Sequence[Bag]) -> list[ReportedRun]:
 def _reported_run(bag: Bag, label: str) -> ReportedRun:
     curves = flight_curves(bag)
     description = describe(bag)
-    metrics = flight_metrics(flight_data(bag))
+    metrics = flight_data(bag).metrics
     names = ("scenario.toml", "scenario.yaml", "design.yaml", "certificate.json")
     texts = {name: bag.attachments.get(name, b"").decode(errors="replace") for name in names}
     scenario, remark = _scenario(texts["scenario.toml"], bag.custom_data.get("scenario", label))

@@ -32,7 +32,7 @@ def flight_figure(flights: Mapping[str, FlightData], system: UnitSystem, remarks
         system: Units that are drawn.
         remarks: Remarks on the flights, such as missing steps, printed above the panels.
     """
-    histories = {label: np.hstack((flight.state, flight.command)) for label, flight in flights.items()}
+    histories = {label: np.hstack((flight.history.state, flight.history.command)) for label, flight in flights.items()}
     panels = [
         column
         for column in map(_NAMES.index, (*_STATES, *INPUT_NAMES))

@@ -162,7 +162,7 @@ def nominal_law(evidence: Evidence) -> Numbers:
     A, B = flown.polytope.A[:, :N_RIGID, :N_RIGID], flown.polytope.B[:, :N_RIGID]
     pairs = zip(flown.nominal_gains, flown.nominal_ellipsoids, strict=True)
     outermost = flown.nominal_ellipsoids[0]
-    x = flight_of("case1").deviation[:, : len(outermost)]
+    x = flight_of("case1").history.deviation[:, : len(outermost)]
     level = np.einsum("ki,ij,kj->k", x, outermost, x)
     return {
         "kept": max(kept_of_level(A, B, gain[:, :N_RIGID], shape) for gain, shape in pairs),
@@ -176,7 +176,7 @@ def nominal_inputs(evidence: Evidence) -> Numbers:
     """Return the largest nominal input relative to its bound in Case 1, nominal vehicle."""
     flown = design("baseline")
     law = FamilyLaw(nominal_data(flown))
-    planned = np.abs([law.step(deviation).input for deviation in flight_of("case1").deviation])
+    planned = np.abs([law.step(deviation).input for deviation in flight_of("case1").history.deviation])
     return {"used": float((planned / flown.nominal_input_bound).max())}
 
 

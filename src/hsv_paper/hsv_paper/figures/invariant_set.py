@@ -41,7 +41,7 @@ def errors_at(flight: FlightData, instants: Sequence[float]) -> np.ndarray:
     """Return the errors e = x - x_r - x_n (n, 5) of the rigid-body states at ``instants`` (n), s after the fault."""
     assert flight.fault_start is not None
     steps = np.abs(flight.time[:, None] - flight.fault_start - np.asarray(instants)).argmin(axis=0)
-    return (flight.state - flight.reference - flight.deviation)[steps, :N_RIGID]
+    return (flight.history.state - flight.reference - flight.history.deviation)[steps, :N_RIGID]
 
 
 def figure_06() -> Figure:

@@ -136,7 +136,7 @@ def _panel(
 ) -> None:
     """Draw one quantity of several flights, each with its line style, with the fault and perhaps the commands."""
     unit, first = to_paper(1.0, panel.unit)[0], drawn[0][0]
-    lines = [(flight.time, getattr(flight, panel.array), style) for flight, style in drawn]
+    lines = [(flight.time, getattr(flight.history, panel.array), style) for flight, style in drawn]
     for time, values, style in [*lines, *([(first.time, first.reference, _COMMAND)] if reference else [])]:
         inside = slice(None) if window is None else (time >= window.start) & (time <= window.end)
         axis.plot(time[inside], unit * values[inside, panel.column], **style)
@@ -181,8 +181,8 @@ def figure_09() -> Figure:
     panels = ALTITUDE._replace(shown=(85450.0, top)), VELOCITY._replace(shown=(7880.0, 8190.0))
     figure = histories(panels, curves, None, 2.7, reference=True)
     flight = flight_of(RMPC_SINGLE[0])
-    error = (flight.state[-1, 0] - flight.reference[-1, 0]) / FOOT
-    leaves = flight.time[np.argmax(flight.state[:, 0] > top * FOOT)]
+    error = (flight.history.state[-1, 0] - flight.reference[-1, 0]) / FOOT
+    leaves = flight.time[np.argmax(flight.history.state[:, 0] > top * FOOT)]
     arrow = {"arrowstyle": "-", "color": RED, "linewidth": 0.5}
     text, at, place = f"{error:.0f} ft above the\ncommand at 200 s", (leaves, top - 10), (leaves + 12, top - 190)
     figure.axes[0].annotate(text, at, place, color=RED, fontsize=8, arrowprops=arrow)

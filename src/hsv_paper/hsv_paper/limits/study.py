@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.corners import Corner, corners
+from hsv.flight.flight import Flight
 from hsv.flight.governed import governed
-from hsv.flight.metrics import SETTLING_BAND, FlightData
+from hsv.flight.metrics import SETTLING_BAND
 from hsv.flight.scenario import load_scenario, parse_scenario
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.trim import trim
@@ -104,10 +105,10 @@ def run(scope: Scope) -> Outcome:
     scope.progress("fastest transfers", 0, 4)
     rest, settled = (fastest_transfer(vehicle, periods, settling=settling) for settling in (False, True))
     scope.progress("flights of the controllers", 1, 4)
-    flights = {name: fly(assemble_flight(load_scenario(name))).data() for name in SCENARIOS}
+    flights = {name: fly(assemble_flight(load_scenario(name))) for name in SCENARIOS}
     along = parse_scenario(governed("case1", BLEND).text, "case1")
     named = f'[governor](../governor.md), `hsv govern case1 --blend "{BLEND:g} s"`'
-    flights[named] = fly(assemble_flight(along)).data()
+    flights[named] = fly(assemble_flight(along))
     scope.progress("corners", 2, 4)
     over = corners(envelope.uncertainty)[:: 1 if whole else min(512, round(64 * scope.coarseness))]
     limits = corner_limits(vehicle, envelope, over, CURVE)
@@ -116,7 +117,7 @@ def run(scope: Scope) -> Outcome:
     faults = [deepest_fault(vehicle, envelope, delay) for delay in problems.DELAYS]
     scope.progress("done", 4, 4)
 
-    def settling(name: str, data: FlightData) -> dict[str, Any]:
+    def settling(name: str, data: Flight) -> dict[str, Any]:
         times = settling_times(data)
         cells = (*times, times.max() / settled.found.scalar)
         heads = ("settled: h s", "V s", "later, times the least")
@@ -149,20 +150,21 @@ def run(scope: Scope) -> Outcome:
     )
 
 
-def settling_times(flight: FlightData) -> np.ndarray:
+def settling_times(flight: Flight) -> np.ndarray:
     """Return the times (2), s, from which altitude and velocity stay within 2 % of their change until the fault.
 
     The change is from the first state to the last reference, be it a step or a ramp. Infinite: not settled by then.
     """
     before = flight.time < (np.inf if flight.fault_start is None else flight.fault_start - 1e-9)
     target = flight.reference[-1, :2]
-    off = np.abs(flight.state[before, :2] - target) > SETTLING_BAND * np.abs(target - flight.state[0, :2])
+    tracked = flight.history.state[:, :2]
+    off = np.abs(tracked[before] - target) > SETTLING_BAND * np.abs(target - tracked[0])
     last = [int(np.flatnonzero(column)[-1]) + 1 if column.any() else 0 for column in off.T]
     return np.array([flight.time[index] if index < len(off) else np.inf for index in last])
 
 
 def _figure(
-    rest: Optimum, settled: Optimum, flights: dict[str, FlightData], faults: Sequence[Optimum], needed: np.ndarray
+    rest: Optimum, settled: Optimum, flights: dict[str, Flight], faults: Sequence[Optimum], needed: np.ndarray
 ) -> Figure:
     figure = new_figure(7.6)
     axes = figure.subplots(3, 2)
@@ -178,7 +180,7 @@ def _figure(
             drawn(axis, optimum, FEET * (optimum.found.state[:, state] - START[state]), 40.0, color=color, label=label)
         for label, color in (("case1", ORANGE), ("case1_governed", GREEN)):
             flight = flights[label]
-            axis.plot(flight.time, FEET * (flight.state[:, state] - START[state]), color=color, label=label)
+            axis.plot(flight.time, FEET * (flight.history.state[:, state] - START[state]), color=color, label=label)
         axis.set(xlabel="time (s)", ylabel=name)
         step = FEET * (TARGET[state] - START[state])
         axis.axhspan(0.98 * step, 1.02 * step, color=GREY, alpha=0.3, linewidth=0)

@@ -19,7 +19,6 @@ from hsv.design.tube import MeasuredSet, measured_set
 from hsv.flight.assembly import assemble
 from hsv.flight.closed_loop import fly
 from hsv.flight.corners import fraction, region_parameters
-from hsv.flight.metrics import flight_metrics
 from hsv.model.signals import N_RIGID
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
@@ -154,4 +153,4 @@ def _with(gains: ControlDesign, tau: float) -> ControlDesign:
 
 def _metrics(design: ControlDesign, inputs: DesignInputs, over: Corners) -> list[dict[str, float]]:
     parts = assemble({**design.to_parameters(), **region_parameters(inputs.model_dump(), inputs.flown_vehicle)})
-    return [flight_metrics(fly(parts.perturbed(corner)).data()) for corner in over]
+    return [fly(parts.perturbed(corner)).metrics for corner in over]

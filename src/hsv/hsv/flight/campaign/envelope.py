@@ -9,7 +9,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from hsv.flight.metrics import FlightCurves
+from hsv.flight.metrics import FlightData
 
 WINDOWS = 400
 """Number of time windows of a flight; each keeps minimum and maximum, so that no peak is lost."""
@@ -34,7 +34,7 @@ SIGNALS = (
 )
 
 
-def signals(flight: FlightCurves) -> np.ndarray:
+def signals(flight: FlightData) -> np.ndarray:
     """Return the curves of a flight (signals, steps)."""
     return flight.curves[: len(SIGNALS)]
 
@@ -58,7 +58,7 @@ class Envelope:
         shape = windows, len(SIGNALS)
         return cls(np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape), np.zeros(windows))
 
-    def add(self, flight: FlightCurves, steps: int) -> None:
+    def add(self, flight: FlightData, steps: int) -> None:
         """Add a flight with a planned length of ``steps`` steps; a diverged flight covers fewer windows."""
         curves = signals(flight)
         rows = curves.shape[1]

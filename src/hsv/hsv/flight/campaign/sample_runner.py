@@ -21,7 +21,7 @@ from hsv.flight.campaign.envelope import Envelope
 from hsv.flight.campaign.variants import FlightVariants
 from hsv.flight.closed_loop import Components, fly, watched
 from hsv.flight.flight import Flight
-from hsv.flight.metrics import METRICS, FlightCurves, FlightData, flight_metrics
+from hsv.flight.metrics import METRICS, FlightData
 from hsv.flight.side_by_side import FlightGroup, TubeLevels
 from hsv.model.dynamics import in_model_range
 
@@ -109,15 +109,16 @@ class SampleRunner:
         if isinstance(flown, ControllerError):
             return {"diverged": False, "crashed": str(flown)}
         flight, level = flown
-        return self.measured(flight.curves, flight.history.state[-1], level, flight.fingerprint)
+        return self.measured(flight, level, flight.fingerprint)
 
-    def measured(self, curves: FlightCurves, last: np.ndarray, level: float | None, fingerprint: str | None) -> Outcome:
-        """Return the row of a flight from its curves, its last state x (9), its largest level and its fingerprint."""
+    def measured(self, flight: FlightData, level: float | None, fingerprint: str | None) -> Outcome:
+        """Return the row of a flight with its largest level in the tube and its fingerprint."""
+        vehicle = self._variants.unchanged.plant.vehicle
         return {
-            "diverged": not in_model_range(last, self._variants.unchanged.plant.vehicle.angle_limit),
-            "end_time": float(curves.time[-1]),
+            "diverged": not in_model_range(flight.history.state[-1], vehicle.angle_limit),
+            "end_time": float(flight.time[-1]),
             "tube_level": level,
-            **flight_metrics(curves),
+            **flight.metrics,
             "crashed": None,
             "fingerprint": fingerprint,
         }
@@ -128,7 +129,7 @@ class SampleRunner:
         samples, seeds = self.campaign.draw(flights)
         for flight, sample, seed, flown in zip(flights, samples, seeds, self.fly_all(flights, samples), strict=True):
             if not isinstance(flown, ControllerError):
-                envelope.add(flown[0].curves, self.steps)
+                envelope.add(flown[0], self.steps)
             drawn = {f"sample_{f.name}": float(x) for f, x in zip(self.campaign.factors, sample, strict=True)}
             rows.append({"flight": flight, "seed": int(seed), **drawn, **self.outcome(flown)})
         return encode(self.campaign, rows, envelope)
@@ -138,7 +139,7 @@ class SampleRunner:
             flight = fly(components)
         except ControllerError as error:
             return error
-        return flight, self.level(flight.data())
+        return flight, self.level(flight)
 
     def _components(self, flight: int, sample: Sequence[float]) -> Components:
         if names := self.campaign.perturbed:

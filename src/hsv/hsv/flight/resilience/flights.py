@@ -73,17 +73,17 @@ class SubjectRunner:
         self._subject, self._moment = subject, moment
         unchanged = parse_scenario(subject.file(moment, 0), subject.name)
         self._variants = FlightVariants(unchanged, subject.design, subject.library)
-        self._without: dict[int, FlightData] = {}
+        self._without: dict[int, Flight] = {}
 
     def fly(self, vehicle: int, fault: TriedFault | None = None, value: float = 0.0) -> Flight:
         """Fly with a fault, or without."""
         text = self._subject.file(self._moment, vehicle, fault, value)
         return fly(self._variants.components(parse_scenario(text, self._subject.name)))
 
-    def without(self, vehicle: int) -> FlightData:
+    def without(self, vehicle: int) -> Flight:
         """Return the flight without a fault for comparison."""
         if vehicle not in self._without:
-            self._without[vehicle] = self.fly(vehicle).data()
+            self._without[vehicle] = self.fly(vehicle)
         return self._without[vehicle]
 
     def outcome(self, severity: str, vehicle: int, fault: TriedFault, value: float) -> FlownFault:
@@ -93,9 +93,9 @@ class SubjectRunner:
         except ControllerError as error:
             return FlownFault(severity, value, vehicle, False, None, None, None, None, str(error))
         survived = flight.status is FlightStatus.FINISHED
-        data, start = flight.data(), self._subject.start(self._moment)
-        attitude, altitude, recovery = distances(data, without, start)
-        loss = None if survived else float(data.time[-1]) - start
+        start = self._subject.start(self._moment)
+        attitude, altitude, recovery = distances(flight, without, start)
+        loss = None if survived else float(flight.time[-1]) - start
         return FlownFault(severity, value, vehicle, survived, attitude, altitude, recovery, loss, None)
 
     def survives(self, fault: TriedFault, severity: float) -> bool:
@@ -113,7 +113,7 @@ def distances(flight: FlightData, without: FlightData, start: float) -> tuple[fl
     """
     rows = min(len(flight.time), len(without.time))
     after = np.flatnonzero(flight.time[:rows] >= start - 1e-9)
-    apart = np.abs(flight.state[after] - without.state[after])
+    apart = np.abs(flight.history.state[after] - without.history.state[after])
     attitude, altitude = apart[:, _ATTITUDE].max(axis=1), apart[:, _ALTITUDE]
     # NaN counts as outside.
     outside = np.flatnonzero(~((attitude <= ATTITUDE_BAND) & (altitude <= ALTITUDE_BAND)))
