@@ -55,7 +55,7 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
 
     Arguments and errors are those of :func:`hsv.design.baseline.design_baseline`. DesignError is also raised if
     ``inputs`` has no adjustable factor or an option that an adjustable design does not allow, or if the nominal plan
-    exceeds the inputs tightened for the factor 1.
+    exceeds the inputs tightened for tau = 1.
     """
     tau = _checked(inputs).array()
     tell = progress or (lambda stage, done, total: None)
@@ -70,7 +70,7 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
     full = full_state_report(inputs, design, gains.model.whole, columns)
     tell("common Lyapunov function", 2, 2)
 
-    # The relaxed bounds for K' follow from two sets: Z for W at the factor 1, and Z' for W' at the factor tau.
+    # The relaxed bounds for K' follow from two sets: Z for W with tau = 1, and Z' for W' with the tau of the design.
     one = replace(design, tau=np.ones(N_RIGID), tau_minimum=np.ones(N_RIGID))
     at_one: Progress = lambda stage, *done: tell(f"{stage}, tau = 1", *done)  # noqa: E731
     complete = measured_set(one, Region(one, inputs, 1.0), inputs, at_one)
@@ -171,7 +171,7 @@ def relaxed_bound(
     either is the distance from the target's ``trim_input`` (2) to the nearer bound (paper eq. 53).
 
     Raises:
-        DesignError: The trim input is not inside the tightened bounds at tau = 1 or at the factor.
+        DesignError: The trim input is not inside the tightened bounds for tau = 1 or for the tau of the design.
     """
     before, after = complete.symmetric(trim_input), incomplete.symmetric(trim_input)
     for name, room in (("U minus F Z at tau = 1", before), ("U minus F' Z'", after)):
@@ -181,12 +181,12 @@ def relaxed_bound(
 
 
 def room_at_one(design: ControlDesign, vehicle: Vehicle, tube: dict[str, Any]) -> np.ndarray:
-    """Return the smaller margin (2), one per input, of the nominal plan to the inputs tightened for the factor 1.
+    """Return the margin (2) of the nominal plan to the bounds tightened for tau = 1, at the nearer bound of each input.
 
     ``tube`` is the report on the tube of ``design``; it contains the plan, the invariant set and the disturbance set.
 
     Raises:
-        DesignError: The feedback at the factor 1 needs the whole range of an input.
+        DesignError: For tau = 1 the feedback needs the whole range of an input.
     """
     one = replace(design, tau_minimum=np.ones(N_RIGID))
     problem = tube_problem(one, vehicle, DisturbanceSet.from_report(tube["disturbance"]["channels"]))

@@ -42,7 +42,7 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
 
     Args:
         inputs: Design inputs, from :func:`hsv.design.inputs.read_inputs`.
-        progress: Called with each stage, the parts of it that are done, and their total number.
+        progress: Called with the name of a stage, the number of its parts that are done, and their total number.
 
     Raises:
         DesignError: A problem has no solution, a solution fails when recomputed, or the nominal plan does not fit into
@@ -141,7 +141,7 @@ def nominal_problem(inputs: DesignInputs, polytope: Polytope, input_bound: np.nd
 
 
 def nominal_family(inputs: DesignInputs, problem: NominalProblem, progress: Progress) -> list[NominalGain]:
-    """Return one nominal gain for each scale of the design's step, outermost first; errors as :func:`nested_gains`."""
+    """Return one nominal gain for each scale of the design's step, outermost first; errors of :func:`nested_gains`."""
     deviation = initial_deviation(inputs)
     return nested_gains(
         problem,

@@ -71,7 +71,7 @@ def load_certified(path: Path) -> CertifiedDesign:
 class Plan:
     """The plan (nominal trajectory) of the simulated ``flight`` of the nominal vehicle, with k steps.
 
-    Bounds of it are multiplied by the factor :attr:`inflation`, as those of the disturbance set are.
+    Methods that return bounds multiply them by :attr:`inflation`, like the bounds of the disturbance set.
     """
 
     subject: CertifiedDesign
@@ -103,14 +103,14 @@ class Plan:
         return np.asarray(self.inflation * np.abs(self.states).max(axis=0))
 
     def change(self, steps: np.ndarray) -> np.ndarray:
-        """Return the largest change (5) of each rigid state of the plan over its number of ``steps`` (5), inflated."""
+        """Return the largest change (5) of each rigid state of the plan over ``steps`` (5, a number each), inflated."""
         pairs = [(self.states[n:, i], self.states[: len(self.states) - n, i]) for i, n in enumerate(steps)]
         return np.array([self.inflation * np.abs(later - before).max() for later, before in pairs])
 
     def scheduling(self, errors: np.ndarray) -> np.ndarray:
         """Return by how much measurement ``errors`` (2: m, m/s) widen the channels (7) of the disturbance set.
 
-        The nominal model is scheduled with the measured altitude and velocity. An error of theirs changes the next x_n
+        The nominal model is scheduled with the measured altitude and velocity. An error in them changes the next x_n
         by [A(p + error) - A(p)] x_n + [B(p + error) - B(p)] u_n. The result is the largest magnitude over the plan and
         the four combinations of signs, by channel, inflated.
         """
@@ -129,7 +129,7 @@ class Plan:
         return self.inflation * largest
 
     def remeasured(self, equipment: Mapping[str, Any]) -> np.ndarray:
-        """Return by how much disturbances with ``equipment`` exceed the bounds (7) of the disturbance set, at least 0.
+        """Return by how much the disturbances in flights with ``equipment`` exceed their certified bounds (7); or 0.
 
         Sensor noise moves the elevator, and the model does not explain all of the response. The unexplained part is
         measured in flights of the nominal vehicle and 32 corners, and inflated. ``equipment``: flat sensor parameters.

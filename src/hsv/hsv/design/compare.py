@@ -47,7 +47,7 @@ def compare_sets(design: ControlDesign, problem: TubeProblem, inputs: InvariantS
     """Return the rows of the ellipsoid, the star norms and the counter-examples, in this order.
 
     Args:
-        design: Gains and vertices.
+        design: Design; only the limits of its inputs are used.
         problem: Error system and disturbances.
         inputs: Scales of the sets, and contractions to try for the ellipsoid.
     """

@@ -4,9 +4,10 @@ The error of the polytopic model over one period, with the commanded input u, is
 
     Delta(k) = x(k+1) - phi_T(x_r(k), u_r(k)) - A(p) (x(k) - x_r(k)) - B(p) (u(k) - u_r(k)).
 
-The nominal vehicle takes the reference to phi_T = x_r(k+1) + d_r(k); where the reference is constant, this is x_r (see
-:mod:`hsv.control.reference_trajectory`). The fault w = B(p) (P - I) u is known exactly: u in it is the *total*
-elevator, trim included. The rest, f = Delta - w, comes from linearisation, interpolation, parameters and flexibility.
+Here phi_T is the flow of the nominal vehicle over one period: phi_T(x_r(k), u_r(k)) = x_r(k+1) + d_r(k) with the defect
+d_r, which is zero where the reference is constant (see :mod:`hsv.control.reference_trajectory`). The fault is known
+exactly: w = B(p) (P - I) u, with the effectiveness P and the *total* elevator in u, trim included. The rest,
+f = Delta - w, comes from linearisation, interpolation, parameters and flexibility.
 
 The structured set represents the rigid part of Delta completely: by three accelerations held over a period, by the lost
 elevator, which acts through the elevator's column B_e(p), and by residuals of altitude and pitch angle. The seventh
@@ -61,7 +62,7 @@ CHANNELS = (
 
 _FILTERED_NOMINAL = 4
 ACCELERATED, REMAINING = [1, 2, 4], [0, 3]
-"""Indices of the rigid states whose rates the acceleration channels are, and of those with a residual channel."""
+"""Indices of the rigid states whose derivatives the accelerations change, and of those with a residual channel."""
 
 
 def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
@@ -132,7 +133,7 @@ class ChannelModel:
     def errors(self, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
         """Return the tube error (n + 1, states) of ``flight`` and the feedback (n + 1, 2) due to the actuators' lag.
 
-        The tube error is e minus the effect of the lag behind the plan. For ideal actuators both effects are zero.
+        The tube error is e minus the effect of the lag behind the plan. Ideal actuators have no lag: the feedback is 0.
         """
         h = flight.history
         if self.actuators is None:
@@ -211,7 +212,7 @@ def scheduled(polytope: Polytope, points: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Membership:
-    """Largest ratio of a disturbance in a flight to its bound, with channel and step; at most 1: all are in the set."""
+    """Largest ratio of the disturbances of a flight to their bounds, with its channel and step; at most 1: inside."""
 
     ratio: float
     channel: str

@@ -46,11 +46,11 @@ class ErrorSystem:
     F_d: np.ndarray
     names: tuple[str, ...]
     unseen: int = 0
-    """Number of states that the controller does not know, at the end: those of actuators, and delayed samples."""
+    """Number of states at the end that the controller does not know: states of actuators, and delayed samples."""
 
     @property
     def seen(self) -> int:
-        """Number of states that the controller knows, at the beginning: rigid states and those of the notch filter."""
+        """Number of states at the beginning that the controller knows: rigid states, and states of the notch filter."""
         return len(self.names) - self.unseen
 
 
@@ -110,7 +110,7 @@ def _with_actuators(
 
 
 def union(first: ErrorSystem, *others: ErrorSystem) -> ErrorSystem:
-    """Return the error system that switches between the vertices of all systems, with F of the ``first``."""
+    """Return the error system that may switch between the vertices of all given systems, with F of the ``first``."""
     systems = (first, *others)
     A, B, G = (np.concatenate([getattr(s, name) for s in systems]) for name in ("A", "B", "G"))
     return replace(first, A=A, B=B, G=G)

@@ -39,14 +39,14 @@ from hsv.control.optimisation import (
 _NAME = "feedback gain F, LMI (24)"
 
 _LITERAL_CONDITION = 1e4
-"""Bound on the condition number of N, in whitened coordinates, if (24) is solved as printed; else N is unbounded."""
+"""Bound on the condition number of N in whitened coordinates, if (24) is solved as printed: it alone leaves N free."""
 
 _STRICT = 1e-6
 """Margin, in whitened coordinates, that replaces the strict inequality of (24)."""
 
 
 _CONDITION = 1e3
-"""Bound on the condition number of N of a common Lyapunov function, in whitened coordinates: the margin needs one."""
+"""Bound on the condition number of N in whitened coordinates; without it :func:`common_lyapunov` has no maximum."""
 
 
 def lyapunov_residuals(closed_loop: np.ndarray, N: np.ndarray, name: str) -> np.ndarray:
@@ -114,9 +114,9 @@ def feedback_gain(
     Args:
         A: (r, n, n) state matrices of the vertices.
         B: (r, n, m) input matrices of the vertices.
-        disturbance: (n, d) disturbance columns whose responses cost, SI per period.
-        state_scale: (n) deviations that cost equally, SI.
-        input_scale: (m) inputs that cost as much, SI.
+        disturbance: (n, d) disturbance columns whose responses are penalised, SI per period.
+        state_scale: (n) deviations of the states that cost equally, SI.
+        input_scale: (m) inputs that cost as much as these deviations, SI.
         method: ``"guaranteed_cost"`` or ``"feasibility"``.
 
     Raises:

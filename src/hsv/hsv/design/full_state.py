@@ -37,7 +37,7 @@ def full_state_report(
         columns: (5, d) disturbance columns for which the structured gain was computed.
 
     Raises:
-        DesignError: No full-state gain.
+        DesignError: There is no full-state gain.
     """
     notch = Filter(*series(continuous(design.notch)))
     kept = [*range(N_RIGID), *range(N_STATES, N_STATES + len(notch.B))]

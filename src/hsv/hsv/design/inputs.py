@@ -160,7 +160,7 @@ class FeedbackInputs(_Table):
 
 
 class NominalInputs(_Table):
-    """Inputs of the nominal gains K (paper eq. 32 to eq. 35), one for each of ``scales`` times the step to target."""
+    """Inputs of the nominal gains K (paper eq. 32 to eq. 35): one for the step to target, times each of ``scales``."""
 
     interpolated: bool | None = None
     """True: the gain is interpolated between two ellipsoids. False or None: it is switched."""
@@ -220,7 +220,7 @@ class DisturbanceInputs(_Table):
     inflation: Number = Field(ge=1.0)
     """Factor on all measured bounds."""
     share: Number = Field(gt=0.0, le=1.0)
-    """Share of the inflated set that the invariant set is certified for."""
+    """Share of the inflated disturbance set for which the invariant set is certified."""
     ramp: RampInputs | None = None
     """Ramp of the commands from the nominal start to the target; None: a step at t = 0."""
 
@@ -229,7 +229,7 @@ class InvariantSetInputs(_Table):
     """Inputs of the invariant set (paper eq. 25 to eq. 28); the scales weigh its half-widths and its feedback."""
 
     method: Literal["ellipsoid", "star_norms"]
-    """"ellipsoid": one for all disturbances. "star_norms": in addition one for each output and disturbance channel."""
+    """"ellipsoid": one ellipsoid for all disturbances; "star_norms": also one for each output and channel."""
     contraction: list[Annotated[float, Field(gt=0.0, lt=1.0)]] = Field(min_length=1, max_length=20)
     """Values of the multiplier lam of the S-procedure to try for the ellipsoid."""
     state_scale: RigidScale
@@ -289,7 +289,7 @@ def _vehicle_values(vehicle: Vehicle | None) -> dict[str, Any] | None:
 
 
 def _vehicle(value: Any, info: ValidationInfo) -> Vehicle | None:
-    """Return the vehicle of a name, a path or (SI) a table; None for the default one, which old designs do not name."""
+    """Return the vehicle of a name, path or table (SI); None: the default vehicle, which old designs do not name."""
     if info.context == _SI:
         return Vehicle.from_parameters(value)
     if not isinstance(value, str):
@@ -340,8 +340,8 @@ class DesignInputs(_Table):
     def error_scale(self) -> np.ndarray:
         """Return the scales (5 + 2 s) of the errors of the rigid states and of s filter sections, SI.
 
-        Those of the rigid states are the scales of F. The two states of a section have the scale of the pitch rate
-        divided by the pole frequency and by its square: the amplitudes that this rate excites there, roughly.
+        Those of the rigid states are the scales of F. Those of the two states of a section are the scale of the pitch
+        rate divided by the pole frequency, and by its square: roughly the amplitudes that this pitch rate excites.
         """
         rigid = self.feedback.state_scale.array()
         filters = [rigid[-1] / section.pole_frequency**power for section in self.notch for power in (1, 2)]

@@ -51,15 +51,15 @@ class Region:
         self._bounds = inputs.flown_vehicle.uncertainty
 
     def corners(self) -> list[dict[str, float]]:
-        """Return the parameter changes of the nominal vehicle (none) and of every corner of the region."""
+        """Return the parameter changes of the nominal vehicle, which has none, and of every corner of the region."""
         return corners(self._bounds, self.share)
 
     def screening(self) -> list[Corner]:
-        """Return the parameter changes of the nominal vehicle (none) and of 32 corners."""
+        """Return the parameter changes of the nominal vehicle, which has none, and of 32 corners of the region."""
         return screening_corners(self._bounds, self.share)
 
     def fraction(self) -> list[dict[str, float]]:
-        """Return those of the nominal vehicle and of a quarter of the corners; of fewer than ten parameters, of all."""
+        """Return the parameter changes of the nominal vehicle and a quarter of the corners (few parameters: all)."""
         return fraction(self._bounds, self.share)
 
     def fly(self, corner: Corner) -> Flight:
@@ -76,7 +76,7 @@ class Region:
         over: Sequence[Corner],
         progress: Callable[[int], None] = lambda done: None,
     ) -> list[Result]:
-        """Simulate the flights of the corners ``over`` and return ``job`` of each, in order; errors as :meth:`fly`."""
+        """Simulate the flights of the corners ``over`` and return ``job`` of each, in order; errors of :meth:`fly`."""
         return fly_perturbed(self._parts, over, lambda corner, flight: job(_checked(corner, flight)), progress)
 
 

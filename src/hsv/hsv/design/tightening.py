@@ -20,7 +20,7 @@ from hsv.design.sets.invariant_set import InvariantSet
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS
 
 _KEPT_OFF = 0.05
-"""Distance of other plans from the largest inputs of the certified plans, as a share of the ranges of the latter.
+"""How far other plans stay below the largest inputs of the certified plans, as a share of the ranges of these inputs.
 
 Without this distance the acceleration channel reaches 1.02 of its bound."""
 
@@ -33,7 +33,7 @@ class TightenedInputs:
     upper: np.ndarray
 
     def margins(self, lowest: np.ndarray, highest: np.ndarray) -> np.ndarray:
-        """Return the margins (2 inputs; lower, upper side) of a plan with inputs from ``lowest`` to ``highest`` (2)."""
+        """Return the margins (2 inputs x lower, upper) of a plan with inputs from ``lowest`` to ``highest`` (2 each)."""
         return np.stack((lowest - self.lower, self.upper - highest), axis=1)
 
     def symmetric(self, trim_input: np.ndarray) -> np.ndarray:

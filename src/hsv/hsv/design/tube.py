@@ -110,7 +110,7 @@ def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, pr
 def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress) -> Tube:
     """Return the certified tube of ``design`` for its declared region, with evidence from flights at all corners.
 
-    The disturbances are measured at a quarter of the corners, so most of the flights in evidence are new.
+    The disturbances are measured at a quarter of the corners only, so most of these flights are independent of it.
 
     Raises:
         DesignError: As for :func:`measured_set`, or if the nominal plan exceeds the tightened bounds.
@@ -147,7 +147,7 @@ def flights_in_tube(
 
 @dataclass(frozen=True)
 class FlightEvidence:
-    """Evidence of one flight: largest ``level`` of its tube errors e, membership of its disturbances in W, metrics.
+    """Evidence of one flight: largest ``level`` of the tube error e, ``membership`` of the disturbances in W, metrics.
 
     ``ratios`` (n): largest |e - c| of each state over the half-width z of the set with centre c. ``lowest`` and
     ``highest`` (3): extremes of the total nominal inputs (2) and of the nominal pitch acceleration (rad/s^2).

@@ -54,7 +54,7 @@ def bounding_factors(design: ControlDesign) -> list[np.ndarray]:
 
 
 def tube_problem(design: ControlDesign, vehicle: Vehicle, disturbance: DisturbanceSet) -> TubeProblem:
-    """Return the error system of ``design`` for both :func:`bounding_factors`, under ``disturbance``."""
+    """Return the error system of ``design`` with the vertices for all :func:`bounding_factors`, and ``disturbance``."""
     model, polytope = ChannelModel(design, vehicle), design.polytope
     gain = design.feedback_gain[:, :N_RIGID]
     systems = [

@@ -100,9 +100,9 @@ class Measured:
 
 
 def entering(system: ErrorSystem) -> np.ndarray:
-    """Return the effect (r, n, 5) on e over a period of unit measurement errors of the rigid states.
+    """Return the changes (r, n, 5) of e over one period, at each vertex, due to unit errors of the 5 measured states.
 
-    They act through the feedback and the notch filter.
+    The measured rigid states act through the feedback and the notch filter.
     """
     columns = system.B @ system.F[:, :N_RIGID]
     filtered = np.array([name.startswith("filter_") for name in system.names])
@@ -177,7 +177,7 @@ def sensors(data: Struct, plan: Plan, reach: float = REACH, of: str = "sensor") 
     """Return the models of noise, bias, quantisation and latency of sensors, by name; those of size zero are omitted.
 
     Noise, Gauss-Markov biases, and random biases and scale factors are bounded by ``reach`` standard deviations, and
-    quantisation by half a quantum. Delays are modelled exactly. ``of``: first word of the names.
+    quantisation by half a quantum. Delays are modelled exactly. ``of``: prefix of the names.
     """
     rigid = slice(0, N_RIGID)
     scale = (np.abs(data.scale) + reach * data.scale_sigma)[rigid]
@@ -233,14 +233,14 @@ def described(
     density: str = "0 %",
     reach: float = REACH,
 ) -> Declared:
-    """Return the models described by options, by name, without those of size zero; and the effects without a bound.
+    """Return the models of non-zero size in options of ``hsv certify``, by name, and the effects without a bound.
 
     Args:
         subject: The design.
         sensor_set: Name of a published sensor set.
         bias: Constant biases of rigid states, each a text "state=quantity".
-        gust: Bound of the wind, with unit, for each of the directions forward and up.
-        turbulence: Standard deviation of the turbulence, with unit, in each of these directions.
+        gust: Bound of the wind forward and of the wind up, with unit.
+        turbulence: Standard deviation of the turbulence forward and up, with unit.
         density: Bound of the relative error of the density.
         reach: Number of standard deviations that counts as the bound of a normally distributed quantity.
 

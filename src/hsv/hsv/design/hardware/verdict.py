@@ -1,9 +1,9 @@
 """Verdict: whether a design remains certified with models of hardware and air in addition to its disturbances.
 
 Actuators add states. The invariant set is computed as in the design, for all vertices, and the nominal plan of the
-certificate must fit into the inputs tightened by it. The error system is linear: it knows no stops and rate limits of
-actuators. If no error in the set reaches them, the result also holds with these limits. Otherwise it holds for the same
-actuators without limits only.
+certificate must fit into the inputs tightened by it. The error system is linear: it ignores stops and rate limits of
+actuators. If no error in the set exceeds them, the result also holds with these limits. Otherwise it holds only for the
+same actuators without limits.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class Reach:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Verdict on a design with some models; ``half_width`` (5, rigid states) and ``feedback`` (2) of its set, SI.
+    """Verdict on a design with models of hardware and air: ``half_width`` (5, rigid) and ``feedback`` (2) of the set.
 
     ``room`` (2, 2): margins of the nominal plan to the tightened bounds of each input, lower and upper side, SI; if one
     is negative the plan does not fit. ``reason``: explanation in words, if the margins alone do not decide.
@@ -121,7 +121,7 @@ class Verdict:
         return self.room is not None and bool(self.room.min() > 0.0) and self.start <= 1.0
 
     def limited(self) -> Verdict:
-        """Return the verdict with the limits of the actuators: certified if this one is and no limit is exceeded."""
+        """Return the verdict on the actuators with limits: certified if this verdict is and no limit is exceeded."""
         limited = replace(self, name=f"{self.name}, limits of actuators", without_limits=self)
         if not (self.certified and all(reach.inactive for reach in self.reaches)):
             limited = replace(limited, half_width=None, feedback=None, room=None, shares=None)
@@ -150,7 +150,7 @@ def certified_with(
         subject: The design with its certificate.
         models: Models by name.
         actuators: Names, separated by commas, or "ideal"; empty: the actuators of the design.
-        progress: Called with the number of verdicts done and their total.
+        progress: Called with the name of the stage, the number of verdicts that are done, and their total number.
         unbounded: Names of effects without a known bound; for each of them, a negative verdict is added.
 
     Raises:
@@ -264,9 +264,9 @@ def _start(found: InvariantSet, error: np.ndarray) -> float:
 
 
 def reaches(found: InvariantSet, design: ControlDesign, plan: Plan) -> list[Reach]:
-    """Return the range of positions and rates of each actuator of ``design`` along ``plan``, for all errors in the set.
+    """Return the range of positions and rates of each actuator of ``design``, for all errors in the set ``found``.
 
-    ``found`` is the invariant set. Positions and rates are evaluated at every substep, where the limits act.
+    The errors add to the ``plan``. Positions and rates are evaluated at every substep, where the limits act.
     """
     system, disturbance, known = found.problem.system, found.problem.disturbance, design.actuator_sets
     flown, commands = plan.actuators(design)

@@ -12,7 +12,7 @@ from hsv.control.optimisation import spectral_radii
 from hsv.design.tube_problem import TubeProblem
 
 _NEGLIGIBLE = 1e-6
-"""Share of the sum so far: the response of an output is cut off where one more step adds less."""
+"""The response of an output is cut off where one more step adds less than this share of the sum so far."""
 
 _LONGEST = 10_000
 """Maximum length of a sequence. A longer one may drive the error farther, but the value of this one is attained."""
@@ -22,7 +22,7 @@ _LONGEST = 10_000
 class CounterExamples:
     """For each output row, the constant vertex and the disturbance sequence that drive the output farthest.
 
-    ``half_range`` (7): half the difference of the outputs that the sequence and its mirror image reach from zero error,
+    ``half_range`` (7): half the difference of the outputs that the sequence and its opposite reach from zero error,
     SI; ``vertex`` (7): index; ``steps`` (7): length of the sequence. Rows as in :meth:`TubeProblem.output_rows`.
     """
 

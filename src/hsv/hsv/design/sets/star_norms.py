@@ -178,10 +178,10 @@ def star_norms(
 
 
 def _least(A: np.ndarray, g: np.ndarray, row: np.ndarray, contractions: Sequence[float]) -> tuple[np.ndarray, float]:
-    """Return the Q with the smallest bound of ``row``, and its contraction.
+    """Return a Q (n, n) with a small bound of ``row``, and its contraction.
 
-    The contractions are tried in the order of a lower bound of row Q row', and the first with a solution is taken. The
-    lower bound is the largest value with the Gramian of a single vertex, below which no Q common to all vertices is.
+    The contractions are tried in the order of a lower bound of row Q row'; the first with a solution is taken. The
+    lower bound is the largest value that the Gramian of a single vertex gives: no Q common to all vertices is below it.
     """
     if not g.any():
         return np.zeros(A.shape[1:]), contractions[0]
@@ -230,7 +230,7 @@ def _coordinates(A: np.ndarray, g: np.ndarray, contraction: float) -> np.ndarray
 
 
 def _gramians(A: np.ndarray, held: np.ndarray, contraction: float) -> np.ndarray:
-    """Return the Gramian (r, n, n) of each A (r, n, n): Q with Q = A Q A' / lam + ``held`` / (1 - lam)."""
+    """Return the Gramian (r, n, n) of each A (r, n, n): Q = A Q A' / c + ``held`` / (1 - c), c the ``contraction``."""
     power, gramian = A / np.sqrt(contraction), held / (1.0 - contraction)
 
     def diagonals(matrices: np.ndarray) -> np.ndarray:
