@@ -11,10 +11,10 @@
  * outputs of the other two.
  *
  * The equations are those of X. Yang, W. Lv, H. Mi, C. Hu, Y. Hu, "Tube-MPC Control via Notch Filter for Flexible
- * Air-Breathing Hypersonic Vehicle with Actuator Fault", 2022. They are in the headers, which are those of the bench. x is
- * the measured state; x_r and u_r are the reference of the step, and d_r is its defect: the state to which x_r(k) and
- * u_r(k) lead in a period, less x_r(k + 1), zero where the reference stands still. The caller of tube_law limits u to
- * U (eq. 29), tube_data.minimum to tube_data.maximum. Of core.h and real.h, which are those of the bench, only the
+ * Air-Breathing Hypersonic Vehicle with Actuator Fault", 2022. They are in the headers, which are those of the bench.
+ * x is the measured state; x_r and u_r are the reference of the step, and d_r is its defect: the state to which x_r(k)
+ * and u_r(k) lead in a period, less x_r(k + 1), zero where the reference stands still. The caller of tube_law limits u
+ * to U (eq. 29), tube_data.minimum to tube_data.maximum. Of core.h and real.h, which are those of the bench, only the
  * types hsv_notch, hsv_polytope, hsv_nominal and hsv_tube and the number type double are used here.
  *
  *   cc -std=c99 -O3 -ffp-contract=off -shared -fPIC -o controller.so controller.c

@@ -2,18 +2,18 @@
  *
  *   order 1: dp/dt = omega (c - p),   order 2: d2p/dt2 = omega^2 (c - p) - 2 zeta omega dp/dt
  *
- * with the command c held (parameters and order of limits: Zipfel's CADAC GHAME6, Wiese's generic hypersonic vehicle).
- * Actuators and vehicle move on substeps of a quarter of the control period; over a substep the vehicle sees the mean
- * of the two end positions. An ideal actuator reaches its command at once.
+ * with position p and command c, which is held (parameters and order of the limits: Zipfel's CADAC GHAME6, Wiese's
+ * generic hypersonic vehicle). Actuators and vehicle are advanced by substeps, a quarter of the control period; over a
+ * substep the vehicle sees the mean of the two end positions. An ideal actuator reaches its command at once.
  *
- * Order of effects: dynamics with the limits after faults; scale, bias, drift and oscillation of the effector; faults
- * that replace its position, of which the last in the list prevails; the stops. */
+ * Effects act in this order: dynamics, with limits that faults may have narrowed; scale, bias, drift and oscillation of
+ * the effector; faults that replace its position, of which the last in the list prevails; the stops. */
 #pragma once
 #include "faults.h"
 
 enum { POSITION, RATE };
 
-/* Write F11, F12, F21, F22 of the transition over h (s) of (position - command, rate); an order of 0 has none. */
+/* Write F11, F12, F21, F22, the transition of (position - command, rate) over h (s); it is not used for order 0. */
 void hsv_actuator_map(int64_t order, double frequency, double damping, double h, double *map)
 {
     if (order == 1) {
@@ -30,7 +30,7 @@ void hsv_actuator_map(int64_t order, double frequency, double damping, double h,
     map[3] = decay * (cosine - damping * frequency * scaled);
 }
 
-/* Write position, rate and mean position h (s) later, from "state" (position, rate). When a fault moves a stop, a
+/* Write position, rate and mean position h (s) later, from "state" (position, rate). If a fault moves a stop, a
  * position beyond it may stay or return, but not move further out. An equilibrium is kept to the bit. */
 void hsv_actuator_step(int64_t order, const double *map, const double *state, double command, double minimum_stop,
                        double maximum_stop, double rate_limit, double acceleration_limit, double h, double *out)
@@ -56,7 +56,8 @@ void hsv_actuator_step(int64_t order, const double *map, const double *state, do
     out[2] = order > 0 || rate_limit < INFINITY ? 0.5 * (position + moved) : moved;
 }
 
-/* Return the position of a faulty effector, "elapsed" (s) after the start of the fault and "since" (s) its onset. */
+/* Return the position of an effector with a fault, "elapsed" (s) after the start of the fault and "since" (s) after its
+ * last onset. */
 static double deflected(const hsv_fault *fault, const hsv_fault_memory *memory, double elapsed, double since,
                         double alpha, double position)
 {
@@ -74,14 +75,14 @@ static double deflected(const hsv_fault *fault, const hsv_fault_memory *memory, 
     }
     case LOCK: return memory->kept;
     case LOCK_AT: return p[0];
-    case FLOAT: /* at zero or aligned with the flow */ return -p[0] * alpha;
+    case FLOAT: /* zero, or aligned with the flow */ return -p[0] * alpha;
     case HARD_OVER: return memory->kept + p[0] * since;
     }
     return position;
 }
 
 /* Advance the actuators, state (2, 2), by "length" substeps, beginning at "substep" of step k; write the positions of
- * the effectors (2). */
+ * the effectors (2), which are means over that time. */
 void hsv_move_effectors(const hsv_actuators *actuators, double *state, hsv_faults *faults, int64_t k, double substep,
                         double length, const double *command, double alpha, double *effector)
 {
@@ -125,7 +126,7 @@ void hsv_move_effectors(const hsv_actuators *actuators, double *state, hsv_fault
             position = deflected(fault, memory, elapsed, since, alpha, position);
         }
         position = limited(position, actuators->minimum[channel], actuators->maximum[channel]);
-        /* An actuator whose position a fault replaces is held there, and continues from there afterwards. */
+        /* If a fault replaces the position, the actuator is held there and continues from there after the fault. */
         own[POSITION] = replaced ? position : moved[0];
         own[RATE] = replaced ? 0.0 : moved[1];
         effector[channel] = position;

@@ -3,21 +3,22 @@
  * Dryden turbulence (MIL-F-8785C, MIL-HDBK-1797) is white noise of unit density through
  *
  *   H_u(s) = sigma_u sqrt(2 tau_u) / (1 + tau_u s),
- *   H_w(s) = sigma_w sqrt(tau_w) (1 + sqrt(3) tau_w s) / (1 + tau_w s)^2,   tau = L / V.
+ *   H_w(s) = sigma_w sqrt(tau_w) (1 + sqrt(3) tau_w s) / (1 + tau_w s)^2,   tau = L / V,
  *
- * Both filters are discretised exactly over the distance flown in a period and are stationary from the first step. The
- * density varies as a Gauss-Markov process along the path. A gust has the (1 - cos) shape of MIL-F-8785C and CS-25.341;
- * its mean over a period is computed in closed form. */
+ * with the scale length L and the velocity V. Both filters are discretised exactly over the distance flown in a period
+ * and are stationary from the first step. The density varies as a Gauss-Markov process along the path. A gust has the
+ * (1 - cos) shape of MIL-F-8785C and CS-25.341; its mean over a period is computed in closed form. */
 #pragma once
 #include "noise.h"
 #include "vehicle.h"
 
-/* Memory: turbulence along the path, the two states of the turbulence across it and the variation of the density, each
- * in units of its sigma; then the distance (m) flown in each gust. */
+/* Memory: turbulence along the path, the two states of the turbulence across the path and the variation of the density,
+ * each in units of its sigma; then the distance (m) flown in each gust. */
 enum { ALONG, ACROSS_1, ACROSS_2, VARIATION, DISTANCE };
 
-/* Write, for H_w over the distance r L, the transition F (2, 2) and the three entries of the lower Cholesky factor of
- * I - F F'. The states are standard normal and uncorrelated; w = sigma / 2 (first + sqrt(3) second). */
+/* Write, for H_w over the distance r L, the transition F (2, 2) of its states and the three entries of the lower
+ * Cholesky factor of I - F F'. The states are standard normal and uncorrelated;
+ * w = sigma / 2 (first + sqrt(3) second). */
 void hsv_dryden_cross_map(double r, double *map)
 {
     const double decay = exponential(-r), square = decay * decay;
@@ -39,21 +40,21 @@ static double gust_integral(double x, double length, int64_t stays)
     return stays && x > end ? area + (x - end) : area;
 }
 
-/* Return the mean of a gust between two distances (m) from its start, relative to its maximum velocity. */
+/* Return the mean velocity of a gust between two distances (m) from its start, relative to its maximum. */
 double hsv_gust_mean(double begin, double end, double length, int64_t stays)
 {
     return (gust_integral(end, length, stays) - gust_integral(begin, length, stays)) / (end - begin);
 }
 
-/* Advance a standard Gauss-Markov process by r correlation lengths; step 0 draws its first value. */
+/* Advance a Gauss-Markov process of unit variance by r correlation lengths; step 0 draws its first value. */
 static void advance_markov(double *value, double r, int64_t k, int64_t seed, int64_t stream)
 {
     const double drawn = first_normal(seed, k, stream, 0), decay = exponential(-r);
     *value = k == 0 ? drawn : decay * *value + root(maximum(1.0 - decay * decay, 0.0)) * drawn;
 }
 
-/* Write the first three conditions of step k, forward and upward wind (m/s) and relative density, for an altitude (m)
- * and a speed (m/s). */
+/* Write the first three conditions for the period after step k, forward and upward wind (m/s) and relative density, at
+ * an altitude (m) and a speed (m/s). */
 void hsv_atmosphere_step(const hsv_atmosphere *air, double *memory, int64_t k, int64_t seed, double altitude,
                          double speed, double *conditions)
 {

@@ -1,4 +1,4 @@
-/* Derivatives by the complex step, exact to rounding because the square of the step is negligible. */
+/* Derivatives by the complex step; they are exact to rounding because the square of the step is negligible. */
 #define COMPLEX
 #include "vehicle.h"
 
@@ -27,8 +27,8 @@ void hsv_jacobian(const double *x, const double *u, const hsv_vehicle *p, double
     }
 }
 
-/* Write the states (count, 9) one period (count; s) after x (count, 9) with the inputs u (count, 2) held, and STEP
- * times their derivatives (count, 9, 12) by state, input and period; the caller divides weighted sums by STEP. */
+/* Write the states (count, 9) one period (count; s) after x (count, 9) with the inputs u (count, 2) held, and their
+ * derivatives (count, 9, 12) by state, input and period, multiplied by STEP; the caller divides by STEP. */
 void hsv_transitions(int64_t count, const double *x, const double *u, const double *period, const int64_t *substeps,
                      const hsv_vehicle *p, double *end, double *changes)
 {

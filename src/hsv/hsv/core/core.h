@@ -1,30 +1,30 @@
-/* Interface of the numeric core. cffi reads the text between the two marks, so that each struct is declared once.
- * hsv.core fills structs by the names of their fields. The comment after a pointer gives the shape of the array and
- * says whether it is optional (NULL); hsv.core checks the shape and sets the fields that count elements. Units are SI.
- */
+/* Interface of the numeric core. cffi reads the text between the marks "begin" and "end", so that each struct is
+ * declared only once. hsv.core fills structs by the names of their fields. The comment after a pointer gives the shape
+ * of its array and says whether it is optional (NULL); hsv.core checks the shape and sets the fields that count
+ * elements. Units are SI. */
 #pragma once
 #include <stdint.h>
 /* begin */
 typedef double number;
-/* Numbers of states, inputs, rigid-body states (which come first), and conditions of air and engine; maximum sections
- * of the notch filter and steps of a delay; number of integrated states. */
+/* Numbers of states, inputs, rigid-body states (the first of the states), and conditions of air and engine; maximum
+ * number of sections of the notch filter and of steps of a delay; number of states with integral action. */
 enum { STATES = 9, INPUTS = 2, RIGID = 5, CONDITIONS = 7, MAX_SECTIONS = 4, MAX_DELAY = 50, INTEGRATED = 2 };
-/* Columns of the history and of the auxiliary history, see hsv.flight.history; entries summed at a time. */
+/* Columns of the history and of the auxiliary history, see hsv.flight.history; entries of a model summed at a time. */
 enum { HISTORY = 25, AUXILIARY = 3, SUMS = 12 };
-enum { ACTED = 21 };         /* column of the history from which on the second half of a step writes */
+enum { ACTED = 21 };         /* first column of the history that the second half of a step writes */
 enum { SENSE = 1, ACT = 2 }; /* halves of a step, see loop.h */
 enum { ALTITUDE, VELOCITY, ALPHA, PITCH, PITCH_RATE, ETA_1, ETA_1_RATE, ETA_2, ETA_2_RATE };
 enum { FUEL, ELEVATOR };
 
 /* clang-format off */
-/* Types of faults in the order of composition: of the command, an actuator, an effector, the engine and a sensor. */
+/* Kinds of faults in the order of composition: of the command, an actuator, an effector, the engine and a sensor. */
 enum {
     LOSS, REVERSAL, DELAY, DEAD_ZONE, BACKLASH, BANDWIDTH, RATE_LIMIT, STOP_LIMIT,
     SCALE, BIAS, DRIFT, OSCILLATION, LOCK, LOCK_AT, FLOAT, HARD_OVER, SOLID_OSCILLATION,
     THRUST_LOSS, UNSTART, UNSTART_OUTSIDE,
     SENSOR_SCALE, SENSOR_NOISE, SENSOR_BIAS, SENSOR_RUNAWAY, SENSOR_DROP_OUT, SENSOR_FREEZE
 };
-enum { ALWAYS, PERIODIC, RANDOM };
+enum { ALWAYS, PERIODIC, RANDOM }; /* occurrence of a fault, see faults.h */
 enum { SSE2, AVX2, AVX512 }; /* instruction sets; on other processors than x86-64 the first is the only one */
 
 /* First of the 256 random streams of each block. Never change a number: random numbers of a flight depend on it. */
@@ -40,24 +40,24 @@ typedef struct {
 #include "vehicle_fields.h"
 } hsv_vehicle;
 
-/* Second-order sections in series. */
+/* Notch filter: second-order sections in series, see notch_filter.h. */
 typedef struct {
     const double *A; /* (sections <= 4, 2, 2) */
     const double *B; /* (sections, 2) */
     const double *C; /* (sections, 2) */
     const double *D; /* (sections) */
-    const double *G; /* (sections, 2) equilibrium for unit input */
+    const double *G; /* (sections, 2) states in equilibrium for unit input */
     int64_t sections;
 } hsv_notch;
 
-/* Weights of the vertices along a scheduling variable: cubic polynomials by piece, highest power first. */
+/* Weights of the vertices along a scheduling variable: a cubic polynomial per piece, highest power first. */
 typedef struct {
     const double *coefficients; /* (4, pieces, vertices) */
     const double *breakpoints;  /* (pieces + 1) */
     int64_t pieces, vertices;
 } hsv_axis;
 
-/* Polytopic model: the entries of [A_i, B_i] that are non-zero in some vertex, and their indices. */
+/* Polytopic model: the entries of [A_i, B_i] that are non-zero in at least one vertex, and their indices. */
 typedef struct {
     const double *S;        /* (vertices <= 64, size <= 108) */
     const int64_t *entries; /* (used <= 99) indices in the flattened [A_i, B_i] */
@@ -66,7 +66,7 @@ typedef struct {
     hsv_axis altitude, velocity;
 } hsv_polytope;
 
-/* Nominal law: nested gains and ellipsoids, outermost first. */
+/* Nominal law: nested gains and ellipsoids, outermost first, see nominal.h. */
 typedef struct {
     hsv_polytope polytope;
     const double *gains;      /* (count, 2, 9) */
@@ -74,7 +74,7 @@ typedef struct {
     int64_t count, interpolated;
 } hsv_nominal;
 
-/* Reference by step; row 0 belongs to step "first". */
+/* Reference x_r, u_r, d_r, a row for each step; row 0 belongs to step "first". */
 typedef struct {
     const double *state;  /* (rows, 9) */
     const double *input;  /* (rows, 2) */
@@ -82,13 +82,18 @@ typedef struct {
     int64_t first, rows;
 } hsv_reference;
 
-/* Estimator of the elevator effectiveness. */
+/* Estimator of the elevator effectiveness, see effectiveness.h. start: initial state; inertia, effect: bounds of the
+ * relative errors i and g; least: smallest P; bound, noise: bound of |v| relative to |e|, and in rad/s; offset: bound
+ * of |d| relative to |e|; learning: share of a new d in a step; drift: change of P per step; steps: number of steps
+ * that confirm a first fault. */
 typedef struct {
     hsv_vehicle vehicle;
     double start[9];
     double period, inertia, effect, least, bound, offset, learning, drift, noise, steps;
 } hsv_effectiveness;
 
+/* Tube law, see tube_law.h. planned: whether the law uses the nominal state; filtered: whether it filters the planned
+ * pitch rate; minimum, maximum: input limits; integral_rate: k (1/s) of the integral action, 0 for none. */
 typedef struct {
     const double *gains;   /* (count, 2, 9) F diag(tau) */
     const int64_t *starts; /* (count) first step of each gain */
@@ -99,12 +104,12 @@ typedef struct {
 } hsv_tube;
 
 typedef struct {
-    double planned[8], integral[2]; /* state s_n of the plan's notch filter; integral of the error */
-    double predicted[9], held[2];   /* effectiveness estimator: state of the previous step, input since then */
-    double known[9];
+    double planned[8], integral[2]; /* state s_n of the notch filter of the plan; integral of the error */
+    double predicted[9], held[2];   /* effectiveness estimator: state of the previous step, input held since then */
+    double known[9];                /* effectiveness estimator: its estimates */
 } hsv_tube_memory;
 
-/* Extended Kalman filter with constant gain. */
+/* State estimator: extended Kalman filter with constant gain, see estimator.h. */
 typedef struct {
     double gain[11][5], start[9], period;
     hsv_vehicle vehicle;
@@ -140,7 +145,7 @@ typedef struct {
 
 typedef struct {
     double lagged, drift, walk, bias, scale, held, given;
-    double queue[51]; /* delayed samples */
+    double queue[51]; /* samples that wait for the latency */
 } hsv_sensor_memory;
 
 typedef struct {
@@ -149,17 +154,17 @@ typedef struct {
     int64_t checksum, ideal;
 } hsv_link;
 
-/* A fault, and its memory. */
+/* A fault, and its memory, see faults.h. */
 typedef struct {
     double start, stop; /* steps [start, stop) */
     int64_t channel, code, occurrence;
-    double cycle[2]; /* period and duration in steps, or probabilities per step of disappearing and of returning */
+    double cycle[2]; /* period and duration (steps), or probability per step that it disappears and that it returns */
     double parameter[12];
 } hsv_fault;
 
 typedef struct {
     int64_t acting, away;
-    double last, onset, since, kept; /* last step and first step of action, step of unstart; kept value of the signal */
+    double last, onset, since, kept; /* last and first step in action, step of unstart, kept value of the signal */
     double queue[51];
 } hsv_fault_memory;
 
@@ -178,7 +183,7 @@ typedef struct {
     hsv_atmosphere atmosphere;
     hsv_sensors sensors;
     hsv_link link;
-    double late; /* delay of the command of a period, in substeps of the actuators */
+    double late; /* time from the start of a period to its command, in substeps */
     int64_t seed;
 } hsv_plant;
 
@@ -205,7 +210,7 @@ typedef struct {
     const double *par;          /* or NULL */
 } hsv_call;
 
-/* Invariant set of the tube: (e - c)' P (e - c) <= 1 for the errors of the rigid states and of the notch filter. */
+/* Invariant set of the tube: (e - c)' P (e - c) <= 1 for the errors e of the rigid states and of the notch filter. */
 typedef struct {
     hsv_notch notch;
     const double *shape;  /* (size, size) P */
@@ -213,7 +218,7 @@ typedef struct {
     int64_t size;
 } hsv_tube_set;
 
-/* Sampled actuators: a(k+1) = A a + B c, mean position over the period C a + D c. */
+/* Sampled actuators with the states a and commands c: a(k+1) = A a + B c, mean position over a period C a + D c. */
 typedef struct {
     const double *A; /* (states <= 4, states) */
     const double *B; /* (states, 2) */
@@ -222,7 +227,7 @@ typedef struct {
     int64_t states;
 } hsv_sampled;
 
-/* A flight: its systems, their memory, and its history. */
+/* A flight: its blocks, their memory, and its history. */
 typedef struct {
     double x[9]; /* initial state */
     const hsv_plant *plant;
@@ -238,16 +243,16 @@ typedef struct {
     int64_t payloads;
     hsv_faults *faults; /* of the command */
     hsv_call nominal_law, controller;
-    const double *commanded; /* (2) input from outside before the limits, or NULL; the same choice in a group */
-    const hsv_tube_set *set; /* NULL: the level is not computed */
+    const double *commanded; /* (2) external input before the limits, or NULL; in a group all or none have it */
+    const hsv_tube_set *set; /* NULL: the level (e - c)' P (e - c) is not computed */
     double *history;         /* (rows, 25) */
     double *auxiliary;       /* (rows, 3) */
     double *estimated;       /* (rows, 9), or NULL */
-    int64_t rows;            /* rows of the history; the first belongs to the first step of a call */
-    int64_t ended;           /* output: number of steps, if the flight diverges */
+    int64_t rows;            /* rows of the histories; the first is for the first step of a call */
+    int64_t ended;           /* output: number of steps flown if the flight diverges */
     int64_t returned;        /* output: return value of the controller */
     double answer[2];        /* output: input returned by the controller */
-    double worst;            /* output: largest level in the set */
+    double worst;            /* output: largest level of the flight */
 } hsv_flight;
 
 /* Elementary functions and random numbers. */
@@ -260,7 +265,7 @@ double hsv_logarithm(double x);
 void hsv_philox(const uint64_t *counter, const uint64_t *key, uint64_t *words);
 void hsv_uniforms(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair);
 void hsv_normals(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair);
-/* Vehicle; conditions may be NULL. Forces are lift, drag, thrust, moment, dynamic pressure and angle of attack. */
+/* Vehicle; conditions may be NULL. Forces: lift, drag, thrust, moment, dynamic pressure, air-relative alpha. */
 void hsv_derivative(const double *x, const double *u, const hsv_vehicle *p, const double *conditions, double *out);
 void hsv_complex_derivative(const double *x, const double *u, const hsv_vehicle *p, double *out);
 void hsv_forces(const double *x, const double *u, const hsv_vehicle *p, const double *conditions, double *out);
@@ -322,7 +327,7 @@ double hsv_effectiveness_step(const hsv_effectiveness *effectiveness, hsv_tube_m
 void hsv_air_relative(double velocity, double path_angle, double forward, double up, double *out);
 void hsv_effectiveness_bounds(const hsv_effectiveness *effectiveness, const double *step, double *bounds);
 double hsv_level(const double *P, int64_t size, const double *x);
-/* Flights: one, or one per lane of a register, over a range of steps. */
+/* Simulation of one flight, or of one flight per lane of a vector register, over a range of steps. */
 int hsv_widest(void);
 int64_t hsv_memory_size(int64_t flights);
 int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop,

@@ -1,4 +1,4 @@
-/* Selection of the instance of the loop by the instruction set of the processor. */
+/* Selection of an instance of the loop by instruction set and number of flights. */
 #include "core.h"
 
 typedef int64_t Fly(hsv_flight *const *flights, void *memory, int64_t start, int64_t stop, int halves);
@@ -9,6 +9,7 @@ extern Fly hsv_fly_avx2_single, hsv_fly_avx2, hsv_fly_avx512;
 extern const int64_t hsv_memory_avx2, hsv_memory_avx512;
 #endif
 
+/* Return the widest instruction set that this processor has and the core uses. */
 int hsv_widest(void)
 {
 #ifdef __x86_64__
@@ -19,7 +20,7 @@ int hsv_widest(void)
     return SSE2;
 }
 
-/* Return the size (bytes) of the memory of hsv_fly between calls for a group of flights. */
+/* Return the size (bytes) of the memory that hsv_fly keeps between calls, for 1, 4 or 8 flights. */
 int64_t hsv_memory_size(int64_t flights)
 {
 #ifdef __x86_64__
@@ -28,6 +29,7 @@ int64_t hsv_memory_size(int64_t flights)
     return flights > 0 ? hsv_memory_single : 0;
 }
 
+/* See "fly" in loop.h; return "start" if there is no instance for the instruction set and number of flights. */
 int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop,
                 int halves)
 {

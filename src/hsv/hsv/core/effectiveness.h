@@ -1,22 +1,21 @@
 /* Set-membership estimator of the elevator effectiveness P in flight, from the pitch rate.
  *
- * In every step the equations of motion of the nominal vehicle predict the pitch rate after the last period, with the
- * commanded elevator and with zero elevator. The difference is the effect e of a healthy elevator; y is the measured
- * pitch rate minus the prediction with zero elevator. A vehicle of the declared uncertainty satisfies
+ * In every step the equations of motion of the nominal vehicle predict the pitch rate at the end of the last period,
+ * with the commanded and with zero elevator. The difference is the effect e (rad/s) of a healthy elevator. y is the
+ * measured pitch rate minus the prediction with zero elevator. A vehicle with the declared uncertainty satisfies
  *
  *   (1 + i) D + b = P (1 + g) e + d + v,   y = D + b,
  *
- * where D is the measured change of the pitch rate, -b the change of the nominal vehicle with zero elevator, i and g
- * the relative errors of inertia and elevator, d a slow disturbance, and |v| is at most a declared share of |e| plus
- * noise. Every step gives an interval for P. An interval without P = 1 indicates a fault. Two hypotheses are then
- * tracked, each as the intersection of the intervals of the steps: a loss of effectiveness (y - d proportional to e)
- * and an offset (y - d - e constant). While a loss explains all steps, the command is divided by the middle of its
- * interval. */
+ * where D is the measured change of the pitch rate, -b the predicted change with zero elevator, i and g the relative
+ * errors of inertia and elevator, d a slow disturbance, and |v| at most a declared share of |e| plus noise. Every step
+ * gives an interval for P. An interval without P = 1 indicates a fault. Two hypotheses are then tracked, each by the
+ * intersection of its intervals in all steps: a loss of effectiveness (y - d proportional to e) and an offset
+ * (y - d - e constant). While a loss explains all steps, the command is divided by the middle of the interval of P. */
 #pragma once
 #include "vehicle.h"
 
-/* Estimates: P by which the command is divided, interval of P, interval of the offset (rad/s), disturbance estimated
- * with g = 0 and the effect in that step (rad/s), mode, number of steps that the hypotheses explain. */
+/* Estimates: P by which the command is divided, interval of P, interval of the offset (rad/s), disturbance d (rad/s) if
+ * g = 0, effect e (rad/s) in the last healthy step, mode, number of steps that the hypotheses explain. */
 enum { EFFECTIVENESS, LOW, HIGH, OFFSET_LOW, OFFSET_HIGH, DISTURBANCE, EFFECT, MODE, COUNT, KNOWN };
 /* Modes. LOST: a loss of effectiveness explains all steps since the fault. OTHER: only an offset does. PENDING: a new
  * hypothesis has not yet explained the CONFIRMED steps that it needs to replace another. */
@@ -26,15 +25,16 @@ typedef struct {
     real low, high;
 } Interval;
 
+/* Return the value limited to a magnitude. */
 static inline real within(real value, real greatest) { return minimum(maximum(value, -greatest), greatest); }
 
-/* Return the interval where the hypothesis holds, elsewhere an empty interval that stays empty when widened. */
+/* Return the interval in lanes where the hypothesis holds, else an empty interval that stays empty when widened. */
 static inline Interval kept_where(mask holds, real low, real high)
 {
     return (Interval){choose(holds, low, all(2.0)), choose(holds, high, all(-1.0))};
 }
 
-/* Write the interval of P given by one step, clipped to the range of P, and the interval of the offset. */
+/* Write the interval of P that one step gives, clipped to the range of P, and the interval of the offset (rad/s). */
 static inline void step_intervals(const hsv_effectiveness *data, real y, real e, real turn, real disturbance,
                                   real effect, Interval *loss, Interval *offset)
 {
@@ -45,17 +45,17 @@ static inline void step_intervals(const hsv_effectiveness *data, real y, real e,
     const real reach = margin / ((1.0 - g) * magnitude(e));
     const real middle = known - e, wide = margin + g * magnitude(e - effect);
     const real low = minimum(strong, weak) - reach, high = maximum(strong, weak) + reach;
-    /* A loss below the range of P cannot be compensated by division. */
+    /* An effectiveness below the range of P cannot be compensated by division. */
     *loss = kept_where(high >= data->least, minimum(maximum(low, all(data->least)), all(1.0)), minimum(high, all(1.0)));
     *offset = (Interval){middle - wide, middle + wide};
 }
 
-/* Update the estimates by one step, where the step is usable. */
+/* Update the estimates by one step in lanes where the step is usable; "turn" is D. */
 static inline void judge(const hsv_effectiveness *data, real *known, mask usable, int first, real y, real e, real turn)
 {
     const real mode = known[MODE];
     const mask healthy = mode == HEALTHY;
-    /* A flight starts healthy: a difference in the first step is a disturbance, up to its bound. */
+    /* A flight starts healthy: y - e in the first step is a disturbance, up to its bound. */
     const real greatest = data->offset * magnitude(e);
     real disturbance = first ? choose(healthy, within(y - e, greatest), known[DISTURBANCE]) : known[DISTURBANCE];
     const real effect = choose(healthy, e, known[EFFECT]);
@@ -100,10 +100,11 @@ static inline void judge(const hsv_effectiveness *data, real *known, mask usable
     for (int i = 0; i < KNOWN; i++) known[i] = choose(usable, update[i], known[i]);
 }
 
-/* Return the effectiveness by which the elevator command of step k is divided. A step has no effect on the estimates if
+/* Return the effectiveness by which the elevator command of step k is divided. A step does not change the estimates if
  * its measurement is not finite or the elevator has no effect.
  *
- * predicted: state of the previous step, measured rigid states and predicted elastic states; held: input since then. */
+ * predicted: state of the previous step, with measured rigid and predicted elastic states; held: input since then;
+ * known: the estimates; x: the measured state of step k. */
 static inline real effectiveness_step(const hsv_effectiveness *data, const Vehicle *vehicle, real *predicted,
                                       const real *held, real *known, int64_t k, const real *x)
 {

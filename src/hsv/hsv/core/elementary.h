@@ -1,17 +1,17 @@
 /* Elementary functions with the same bits on every processor.
  *
- * The functions of libm differ between machines in the last bit. The error of these functions is at most one unit in
- * the last place in the stated ranges; outside them the result is NaN.
+ * The functions of libm differ between machines in the last bit. The error of the functions here is at most one unit in
+ * the last place in the stated ranges; outside these ranges the result is NaN.
  *
- * sine_cosine and exponential accept a complex argument with an imaginary part whose square is negligible, for the
- * complex step. sine_cosine, exponential and arctangent2 accept vectors of lanes.
+ * sine_cosine and exponential accept the complex arguments of the complex step, whose imaginary part has a negligible
+ * square. sine_cosine, exponential and arctangent2 accept vectors of lanes.
  *
- * Sources: argument reduction after Cody and Waite; rounding errors after Dekker (1971) and Knuth; power series. */
+ * Sources: argument reduction by Cody and Waite; rounding errors by Dekker (1971) and Knuth; power series. */
 #pragma once
 #include "real.h"
 
-/* Largest magnitudes of arguments: of sine, cosine and tangent (rad); of the exponential; of the arctangent, for which
- * the inverse is the smallest non-zero magnitude. */
+/* Largest magnitudes of arguments: of sine, cosine and tangent (rad); of the exponential; of the arctangent, whose
+ * smallest non-zero magnitude is the inverse. */
 static const double ANGLE_RANGE = 1e5, EXPONENT_RANGE = 700.0, RATIO_RANGE = 1e140;
 /* The first 33 bits of pi / 2, the next 33 bits, the remainder; pi / 2, pi / 4 and log 2 as sums of two numbers. */
 static const double HALF_PI_1 = 1.5707963267341256, HALF_PI_2 = 6.077100506303966e-11,
@@ -72,7 +72,7 @@ static inline void quotient(plain high, plain low, plain by_high, plain by_low, 
     *rest = (((high - product) - error) + low - *q * by_low) / by_high;
 }
 
-/* 1 / (2k + 1), of the power series of arctangent and logarithm. */
+/* 1 / (2k + 1) for the power series of arctangent and logarithm. */
 static const double ODD_INVERSE[] = {1.0 / 1.0,  1.0 / 3.0,  1.0 / 5.0,  1.0 / 7.0,  1.0 / 9.0,  1.0 / 11.0,
                                      1.0 / 13.0, 1.0 / 15.0, 1.0 / 17.0, 1.0 / 19.0, 1.0 / 21.0, 1.0 / 23.0,
                                      1.0 / 25.0, 1.0 / 27.0, 1.0 / 29.0, 1.0 / 31.0, 1.0 / 33.0, 1.0 / 35.0,
@@ -123,6 +123,7 @@ void hsv_any_sine_cosine(double x, double *sine, double *cosine)
     *cosine = c + c_low;
 }
 
+/* Return tan x for |x| <= 1e5. */
 double hsv_tangent(double x)
 {
     if (!(__builtin_fabs(x) <= ANGLE_RANGE)) return NAN;
@@ -137,7 +138,7 @@ double hsv_tangent(double x)
 /* Return the angle from -pi / 2 to pi / 2 with the sine x, |x| <= 1. */
 double hsv_arcsine(double x)
 {
-    /* (2k)! / (4^k k!^2 (2k + 1)), k = 1 ... 25 */
+    /* coefficients (2k)! / (4^k k!^2 (2k + 1)) of x^(2k + 1), k = 1 ... 25 */
     static const double series[] = {0.16666666666666666,   0.075,
                                     0.044642857142857144,  0.030381944444444444,
                                     0.022372159090909092,  0.017352764423076924,
@@ -161,7 +162,7 @@ double hsv_arcsine(double x)
         angle = a + a * z * sum;
     else {
         const double r = __builtin_sqrt(z), product = r * r;
-        /* Rounding error of the root. */
+        /* rounding error of the root */
         double rest = r > 0.0 ? ((z - product) - product_error(r, r)) / (2.0 * r) : 0.0;
         rest += r * z * sum;
         double high, low;

@@ -2,15 +2,15 @@
  *
  *   x^-(k) = phi_T(x^(k-1), u(k-1) + b(k-1)),   [x^(k); b(k)] = [x^-(k); b(k-1)] + L (y(k) - x^-(k)),
  *
- * with phi_T the flow of the design's vehicle over a period, b an offset of each input that compensates model errors,
- * and L the steady-state gain at the initial trim of the flight (hsv.control.estimator). The filter uses the
- * measurement y of the rigid states; elastic states are predicted. */
+ * with phi_T the motion of the nominal vehicle over a period, b an offset of each input that compensates model errors,
+ * and L the steady-state gain at the initial trim of the flight (hsv.control.estimator). Only the five rigid states are
+ * measured (y, and x^- in the difference); L corrects the elastic states through them. */
 #pragma once
 #include "vehicle.h"
 
 enum { ESTIMATED = STATES + INPUTS };
 
-/* Write the estimate (9); "memory" (11) contains estimate and offsets of the previous step. Step 0 initialises it. */
+/* Write the estimate x^ (9); "memory" (11) is [x^; b] of the previous step. Step 0 initialises it. */
 static inline void estimate_step(const hsv_estimator *estimator, const Vehicle *vehicle, real *memory, int64_t k,
                                  const real *measurement, const real *command, real *estimate)
 {

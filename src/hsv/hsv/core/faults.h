@@ -1,7 +1,7 @@
 /* Occurrence of faults, and the faults of command and engine.
  *
- * A fault acts in the steps [start, stop): always, periodically, or as a two-state Markov chain. Rows are in the order
- * of composition, which is the order of the codes. Random numbers are drawn once per period.
+ * A fault acts in the steps [start, stop): always, periodically, or at random as a two-state Markov chain. Rows are in
+ * the order of composition, which is the order of the codes. Random numbers are drawn once per control period.
  *
  * Faults of the command: loss of effectiveness (paper eq. 14, eq. 15), reversal, delay, dead zone, backlash. Faults of
  * the engine: loss of thrust, unstarted inlet. Faults of actuators and effectors are in actuators.h, of sensors in
@@ -9,7 +9,7 @@
 #pragma once
 #include "noise.h"
 
-/* Determine which faults act in step k; return their number. */
+/* Determine which faults act in step k, in "acting" of their memory; return their number. */
 int64_t hsv_begin_faults(hsv_faults *faults, int64_t k, int64_t seed)
 {
     int64_t acting = 0;
@@ -39,6 +39,7 @@ int64_t hsv_begin_faults(hsv_faults *faults, int64_t k, int64_t seed)
     return acting;
 }
 
+/* Return the command as changed by a fault; at its onset, memory->kept is set to the command. */
 static double commanded(const hsv_fault *fault, hsv_fault_memory *memory, int64_t k, double period, double command)
 {
     double value = fault->parameter[0];
@@ -50,7 +51,7 @@ static double commanded(const hsv_fault *fault, hsv_fault_memory *memory, int64_
         if (elapsed < ramp) value = 1.0 + (value - 1.0) * (elapsed / ramp);
         return value * command;
     }
-    case REVERSAL: /* of the command (value 0), or of its change since the onset of the fault (value 1) */
+    case REVERSAL: /* of the whole command (value 0), or of its change since the onset (value 1) */
         return 2.0 * value * memory->kept - command;
     case DELAY: {
         const int64_t size = (int64_t)value + 1;
@@ -71,7 +72,7 @@ static double commanded(const hsv_fault *fault, hsv_fault_memory *memory, int64_
     return command;
 }
 
-/* Apply the faults to the command, which then reaches the actuators. */
+/* Apply the faults to the command "actuator" (2), which then reaches the actuators. */
 void hsv_apply_command_faults(hsv_faults *faults, int64_t k, int64_t seed, double *actuator)
 {
     if (hsv_begin_faults(faults, k, seed) == 0) return;
@@ -82,8 +83,8 @@ void hsv_apply_command_faults(hsv_faults *faults, int64_t k, int64_t seed, doubl
         }
 }
 
-/* Return whether the inlet is unstarted. It unstarts outside an ellipse of angle of attack and Mach number, or above a
- * limit of the equivalence ratio; it restarts with hysteresis, after a minimum time. */
+/* Return whether the inlet is unstarted. It unstarts outside an ellipse in angle of attack and Mach number, or above a
+ * limit of the equivalence ratio; it restarts with a hysteresis and not before a minimum time. */
 static int unstarted(const hsv_fault *fault, hsv_fault_memory *memory, int64_t k, double period, double alpha,
                      double mach, double fuel)
 {
@@ -101,8 +102,8 @@ static int unstarted(const hsv_fault *fault, hsv_fault_memory *memory, int64_t k
     return memory->kept == 1.0;
 }
 
-/* Write the factors of thrust, lift and drag and the increment of C_M, for the angle of attack (rad) and Mach number
- * relative to the air. Thrust factors multiply; with several unstarts the aerodynamic effects of the last one apply. */
+/* Write to "engine" the factors of thrust, lift and drag and the increment of C_M, for an angle of attack (rad) and a
+ * Mach number relative to the air. Thrust factors multiply; the last of several unstarts sets the other effects. */
 void hsv_apply_engine_faults(hsv_faults *faults, int64_t k, int64_t seed, double alpha, double mach, double fuel,
                              double *engine)
 {

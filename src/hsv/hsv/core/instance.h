@@ -1,4 +1,4 @@
-/* An instance of the loop: hsv_fly_NAME, and the size of its memory between calls. */
+/* An instance of the loop for NAME and LANES: hsv_fly_NAME, and hsv_memory_NAME, the size (bytes) of its memory. */
 #include "loop.h"
 #define JOINED_(a, b) a##b
 #define JOINED(a, b) JOINED_(a, b)

@@ -1,4 +1,4 @@
-/* Communication links of the loop with delay, loss and corruption of payloads.
+/* Communication links of the loop with delay, loss and corruption of their payloads, one payload a step.
  *
  * The receiver uses the last payload that arrived. Losses follow a two-state Gilbert channel (Gilbert 1960). Corruption
  * flips one bit of one number. The receiver detects it by a checksum, or if the number is not finite or exceeds
@@ -8,8 +8,8 @@
 
 #define LARGEST 1e6 /* SI */
 
-/* Memory: step of the last accepted payload, whether the previous payload was lost, whether a payload was ever sent,
- * the last accepted payload, then the payloads that may still arrive. */
+/* Memory: step in which the last accepted payload was sent, whether the previous payload was lost, whether a payload
+ * was ever sent; then the last accepted payload, and the payloads that may still arrive. */
 enum { NEWEST, LOSING, BEGUN, ACCEPTED };
 
 /* Fill a link with one payload, as if it had been sent in all earlier steps. */
@@ -20,7 +20,7 @@ void hsv_fill_link(double *memory, int64_t size, const double *payload, int64_t 
     memory[BEGUN] = 1.0;
 }
 
-/* Corrupt the arriving payload with the link's probability; return whether the receiver accepts it. */
+/* Corrupt the arriving payload (n) with the probability of the link; return whether the receiver accepts it. */
 static int passes(const hsv_link *link, double *payload, int64_t n, int64_t k, int64_t seed)
 {
     double drawn[2];
@@ -35,7 +35,7 @@ static int passes(const hsv_link *link, double *payload, int64_t n, int64_t k, i
     word ^= UINT64_C(1) << (bit % 64);
     memcpy(number, &word, sizeof word);
     if (magnitude(*number) <= LARGEST) return 1;
-    memcpy(number, &before, sizeof before); /* the payload may arrive a second time */
+    memcpy(number, &before, sizeof before); /* restored, because with jitter the payload may arrive a second time */
     return 0;
 }
 

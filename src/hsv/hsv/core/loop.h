@@ -1,20 +1,20 @@
-/* The closed loop: the order of a step, common to nodes, replay and flights.
+/* The closed loop: one step in the order that nodes, replay and flights have in common.
  *
  *   x(k)              state of the vehicle at t = k T
  *   y(k)              measurement of x(k)
  *   x^(k)             estimate of x(k), or y(k) without an estimator
- *   q_f(k), s(k)      notch filter (eq. 39), stepped with the pitch rate in x^(k)
- *   x_r, u_r, d_r     reference of the step and its defect
+ *   q_f(k), s(k)      output and state of the notch filter (eq. 39), whose input is the pitch rate in x^(k)
+ *   x_r, u_r, d_r     reference of step k and its defect
  *   u_n(k) = K x_n(k) nominal law (eq. 21; K by eq. 32 to eq. 35)
  *   u(k)              tube law or another controller, from x^(k), limited to U (eq. 36, eq. 29)
  *   x_n(k+1)          nominal system (eq. 20), scheduled by y(k)
  *   actuator(k)       u(k) after link and faults of the command (loss of effectiveness: eq. 14, eq. 15)
  *   x(k+1)            state of the plant with actuator(k) held over [k T, (k+1) T)
  *
- * x_n(0) = y(0) - x_r(0). A flight ends when its state leaves the range of the model.
+ * with x_n(0) = y(0) - x_r(0). A flight ends when its state leaves the range of the model.
  *
- * A step has two halves: "sense" ends with the nominal law, "act" begins with the input u(k). A program that computes
- * the input itself calls one half at a time. */
+ * A step has two halves: "sense" ends with the nominal law u_n(k), "act" begins with the input u(k). A program that
+ * computes u(k) itself calls one half at a time. */
 #pragma once
 #include "effectiveness.h"
 #include "estimator.h"
@@ -24,7 +24,7 @@
 #include "tube_law.h"
 
 typedef struct {
-    int equipped; /* whether any plant has non-ideal equipment */
+    int equipped; /* whether the plant of any lane has equipment that is not ideal */
     Vehicle vehicle, estimator_vehicle, tube_vehicle;
     TubeMemory tube;
     real predicted[STATES], known[KNOWN]; /* memory of the effectiveness estimator */
@@ -32,10 +32,11 @@ typedef struct {
     real x[STATES], measurement[STATES], estimator[ESTIMATED], notch[2 * MAX_SECTIONS];
     real x_n[STATES], u_n[INPUTS], gain_index, gain[INPUTS * STATES], u[INPUTS], actuator[INPUTS];
     real x_r[STATES], u_r[INPUTS], d_r[STATES];
-    real feedback_state[STATES], s[2 * MAX_SECTIONS], q_f; /* of the current step, for its second half */
-    int64_t row[LANES], active[LANES]; /* index of reference row and gain in each lane */
+    real feedback_state[STATES], s[2 * MAX_SECTIONS], q_f; /* results of the first half of a step for the second half */
+    int64_t row[LANES], active[LANES]; /* index of the loaded reference row and gain of each lane */
 } Loop;
 
+/* Write the measurement y(k), as it arrives over the link, in every lane. */
 static inline void measure_lanes(hsv_flight *const *flights, Loop *f, int64_t k)
 {
     if (!f->equipped) {
@@ -71,6 +72,7 @@ static inline void schedule_lanes(hsv_flight *const *flights, Loop *f, int64_t k
     }
 }
 
+/* Initialise the loop for step 0. All flights of a group have the estimator and the notch filter of the first one. */
 static inline void begin(hsv_flight *const *flights, Loop *f)
 {
     const hsv_flight *first = flights[0];
@@ -91,7 +93,7 @@ static inline void begin(hsv_flight *const *flights, Loop *f)
 }
 
 #if LANES == 1
-/* Call the external nominal law; return -1 on failure, else 0. */
+/* Call the external nominal law, which writes u_n and the index of its gain; return -1 on failure, else 0. */
 static inline int call_nominal_law(hsv_flight *flight, Loop *f, int64_t k)
 {
     const hsv_call *law = &flight->nominal_law;
@@ -113,7 +115,7 @@ static inline int call_controller(hsv_flight *flight, const Loop *f, int64_t k, 
     memcpy(next, f->x_n, sizeof f->x_n), next += STATES;
     memcpy(next, f->u_n, sizeof f->u_n), next += INPUTS;
     memcpy(next, f->s, 2 * (size_t)flight->notch->sections * sizeof *f->s);
-    u_unsaturated[0] = u_unsaturated[1] = NAN; /* so that an output that the controller does not set is noticed */
+    u_unsaturated[0] = u_unsaturated[1] = NAN; /* an output that the controller does not set is a failure */
     flight->returned = controller->function(k, in, u_unsaturated, controller->state, controller->par);
     memcpy(flight->answer, u_unsaturated, sizeof flight->answer);
     return flight->returned == 0 && is_finite(u_unsaturated[0]) && is_finite(u_unsaturated[1]) ? 0 : -1;
@@ -136,8 +138,8 @@ static inline int end_flights(hsv_flight *const *flights, const Loop *f, int64_t
     return flying == 0;
 }
 
-/* The first half of step k: advance the plants to x(k), measure, filter, and compute the nominal input. Write x, q_f, x_n
- * and u_n to row "line" of the histories. Return -1 if an external nominal law failed, else 0. */
+/* The first half of step k: advance the plants to x(k), measure, filter, and compute the nominal input. Write x, q_f,
+ * x_n and u_n to row "line" of the histories. Return -1 if an external nominal law failed, else 0. */
 static inline int sense(hsv_flight *const *flights, Loop *f, int64_t k, int64_t line)
 {
     const hsv_flight *first = flights[0];
@@ -182,9 +184,9 @@ static inline int sense(hsv_flight *const *flights, Loop *f, int64_t k, int64_t 
     return 0;
 }
 
-/* The second half of step k: the input u(k) by the tube law, an external controller or from outside, the next nominal
- * state, link and faults of the command. Write the rest of row "line". Return -1 if an external controller failed, 1 if
- * all flights have ended, else 0. */
+/* The second half of step k: compute u(k) by the tube law or an external controller, or take "commanded"; advance the
+ * nominal state; pass u(k) through the link and the faults of the command. Write the rest of row "line". Return -1 if
+ * an external controller failed, 1 if all flights have ended, else 0. */
 static inline int act(hsv_flight *const *flights, Loop *f, int64_t k, int64_t line)
 {
     const hsv_flight *first = flights[0];
@@ -232,9 +234,9 @@ static inline int act(hsv_flight *const *flights, Loop *f, int64_t k, int64_t li
     return end_flights(flights, f, k);
 }
 
-/* Simulate the steps start ... stop - 1, or one half of each, of a group of flights, which may differ in vehicle, seed,
- * faults, reference, gains of the tube law and parameters of the equipment only. Return the step after the last one, or
- * -1 - k if an external block failed in step k. */
+/* Simulate the steps start ... stop - 1, or one half of each, of a group of flights. The flights may differ only in
+ * vehicle, seed, faults, reference, gains of the tube law and parameters of the equipment. Return the step after the
+ * last one, or -1 - k if an external block failed in step k. */
 static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t stop, int halves)
 {
     for (int64_t k = start; k < stop; k++) {

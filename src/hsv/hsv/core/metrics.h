@@ -1,4 +1,4 @@
-/* Evaluation of flights for campaigns and certificates: level in the invariant set, curves of the metrics. */
+/* Evaluation of flights for campaigns and certificates: level in the invariant set, and curves for the metrics. */
 #pragma once
 #include "nominal.h"
 #include "notch_filter.h"
@@ -9,7 +9,8 @@ typedef struct {
     real worst;                                               /* largest level so far; NaN persists */
 } LevelMemory;
 
-/* Update the largest level (e - c)' P (e - c) by step k, with e = (x - x_r - x_n, s - s_n). */
+/* Update the largest level (e - c)' P (e - c) by step k, with e = (x - x_r - x_n, s - s_n) in the rigid states and the
+ * states of the notch filter. */
 static inline void level_step(const hsv_tube_set *set, LevelMemory *memory, int64_t k, const real *x, const real *x_r,
                               const real *x_n)
 {
@@ -31,6 +32,7 @@ static inline void level_step(const hsv_tube_set *set, LevelMemory *memory, int6
 }
 
 #ifdef BASE
+/* Return the largest level of x, x_n and x_r (steps, 9). */
 double hsv_worst_level(const hsv_tube_set *set, int64_t steps, const double *state, const double *deviation,
                        const double *reference)
 {
@@ -40,9 +42,9 @@ double hsv_worst_level(const hsv_tube_set *set, int64_t steps, const double *sta
     return memory.worst;
 }
 
-/* Write ten curves (10, stride) and the saturation (steps, 2) for some steps of a flight: errors of altitude and
- * velocity, angle of attack, pitch angle, elastic rates, inputs, and the absolute differences of angle of attack and
- * pitch angle from x_r + x_n. */
+/* Write ten curves (10, stride) and whether each input is saturated (steps, 2), for the steps of a flight. The curves
+ * are: errors of altitude and velocity, angle of attack, pitch angle, rates of the two elastic modes, the two inputs,
+ * and the absolute differences of angle of attack and pitch angle from x_r + x_n. */
 void hsv_curves(int64_t steps, int64_t stride, const double *history, const double *auxiliary, const double *reference,
                 double *curves, uint8_t *saturated)
 {

@@ -2,10 +2,10 @@
  *
  * The generator is Philox4x64-10 (Salmon, Moraes, Dror and Shaw 2011): a block of four words is a function of the
  * counter (step, stream, draw, 0) and the key (seed, 0), without a state. The numbers of a step therefore do not depend
- * on the order in which steps, blocks and flights are computed. numpy's Philox(counter=c, key=k) begins with the block
- * of c + 1. Normal numbers follow Box and Muller (1958).
+ * on the order in which steps, blocks and flights are computed. The sequence of numpy's Philox(counter=c, key=k)
+ * begins with the block of the counter c + 1. Normal numbers are computed by the method of Box and Muller (1958).
  *
- * Each stream belongs to one channel of one block: adding a block to a flight does not change the noise of others. */
+ * Each stream belongs to one channel of one block of the loop, so that another block does not change its numbers. */
 #pragma once
 #include "elementary.h"
 

@@ -1,21 +1,21 @@
-/* The nominal system: scheduled model and nested gains.
+/* The nominal system: the scheduled polytopic model and the nominal law with nested gains.
  *
  *   [A(p), B(p)] = sum_i w_i(p) [A_i, B_i]                    model at altitude and velocity p (eq. 11, eq. 12)
  *   x_n(k+1) = A(p) x_n(k) + B(p) u_n(k) + d_r(k)             nominal state (eq. 20, eq. 46)
- *   u_n = K_g x_n,  g the smallest ellipsoid with x_n' P_g x_n <= 1           nested gains (eq. 21)
+ *   u_n = K_g x_n, g of the smallest ellipsoid with x_n' P_g x_n <= 1         nested gains (eq. 21)
  *
- * The weights w_i are the tau_i of eq. 11; the design provides K_g and P_g = Q^-1 (eq. 32 to eq. 35). d_r is the defect
- * of the reference (hsv.control.reference_trajectory), p the measured altitude and velocity, clamped to the envelope.
- * Interpolated gains make u_n continuous: K = a K_g + (1 - a) K_(g+1) with x_n' (a P_g + (1 - a) P_(g+1)) x_n = 1 (Wan
+ * The weights w_i are called tau_i in eq. 11; the design provides K_g and P_g = Q^-1 (eq. 32 to eq. 35). d_r is the
+ * defect of the reference (hsv.control.reference_trajectory); p is measured and clamped to the envelope. With
+ * interpolated gains, u_n is continuous: K = a K_g + (1 - a) K_(g+1) with x_n' (a P_g + (1 - a) P_(g+1)) x_n = 1 (Wan
  * and Kothare, Automatica 39, 2003). */
 #pragma once
 #include "real.h"
 
-/* Relative tolerance of x' P x <= 1: by design the first deviation lies on the boundary of the outermost ellipsoid. */
+/* Tolerance of x' P x <= 1: by design the first deviation lies on the boundary of the outermost ellipsoid. */
 #define MEMBERSHIP_TOLERANCE 1e-6
 enum { MAX_VERTICES = 64, ENTRIES = STATES * (STATES + INPUTS), MAX_SIZE = 9 * SUMS };
 
-/* Return x' P x for P (size, size) and the first "size" entries of x. */
+/* Return the level x' P x of the first "size" entries of x in the ellipsoid with P (size, size). */
 static inline real level(const double *P, int64_t size, const real *x)
 {
     real total = all(0.0);
@@ -34,13 +34,13 @@ static inline real gain_times_state(const double *row, const real *x)
     return total;
 }
 
-/* Write u_n and the index of its gain, 0 for the outermost; return whether x_n lies in the family. Without gains u_n is
- * zero. */
+/* Write u_n and the index of its gain, 0 for the outermost; return whether x_n lies in any ellipsoid. If it does not,
+ * the outermost gain is used. Without gains u_n is zero. */
 static inline mask nominal_input(const hsv_nominal *nominal, const real *x_n, real *u_n, real *index)
 {
     const double boundary = 1.0 + MEMBERSHIP_TOLERANCE;
     const int count = (int)nominal->count;
-    real held = all(0.0), beyond = all(0.0); /* levels in the smallest ellipsoid with x_n and in the next smaller one */
+    real held = all(0.0), beyond = all(0.0); /* levels in the smallest ellipsoid with x_n and in the next smaller */
     mask inside = count > 0 ? never() : opposite(never());
     *index = all(0.0);
     for (int g = count - 1; g >= 0; g--) {
@@ -75,8 +75,8 @@ static inline int piece_of(const hsv_axis *axis, double value)
     return i;
 }
 
-/* Write the weights of the vertices along an axis; return whether p lies between its ends. NaN counts as the lower end.
- */
+/* Write the weights of the vertices along an axis; return whether p lies between its ends. A NaN gives the weights at
+ * the lower end. */
 static inline mask axis_weights(const hsv_axis *axis, real p, real *weights)
 {
     const double low = axis->breakpoints[0], high = axis->breakpoints[axis->pieces];
@@ -108,10 +108,10 @@ static inline mask vertex_weights(const hsv_polytope *polytope, real altitude, r
     return h_inside & v_inside;
 }
 
-/* Write the weighted sum of each entry over the vertices, in their order. */
+/* Write the weighted sum of each entry over the vertices, added in the order of the vertices. */
 static inline void weighted_entries(const hsv_polytope *polytope, const real *weights, real *S)
 {
-    /* SUMS sums at a time fit in the registers and hide the latency of the additions. */
+    /* SUMS sums at a time fit into the registers and hide the latency of the additions. */
     for (int64_t e = 0; e < polytope->size; e += SUMS) {
         real sums[SUMS];
         for (int i = 0; i < SUMS; i++) sums[i] = all(0.0);
@@ -121,7 +121,7 @@ static inline void weighted_entries(const hsv_polytope *polytope, const real *we
     }
 }
 
-/* Advance x_n by one step; return whether p is inside the envelope. */
+/* Advance x_n by one step; return whether altitude and velocity are inside the envelope. */
 static inline mask nominal_advance(const hsv_polytope *polytope, real altitude, real velocity, real *x_n,
                                    const real *u_n, const real *d_r)
 {

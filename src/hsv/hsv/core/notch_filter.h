@@ -1,12 +1,13 @@
-/* Notch filter of the pitch rate (paper eq. 38, eq. 39; q_f for q', s for x_q): second-order sections in series,
+/* Notch filter of the pitch rate (paper eq. 38, eq. 39; q' is q_f and x_q is s here): second-order sections in series,
  *
  *   q_f(k) = C s(k) + D q(k),   s(k+1) = A s(k) + B q(k),
  *
  * discretised by the bilinear rule with prewarping (hsv.control.notch_filter). The filter starts in the equilibrium for
- * its first input, s(0) = G q(0). */
+ * its first input: s(0) = G q(0). */
 #pragma once
 #include "real.h"
 
+/* Write the states s in equilibrium for a constant rate (rad/s). */
 static inline void notch_rest(const hsv_notch *notch, real rate, real *s)
 {
     for (int i = 0; i < notch->sections; i++) {

@@ -1,11 +1,11 @@
 /* Forces and moment of the air-breathing vehicle of Parker et al. (2007): curve fits (paper eq. 2, eq. 3).
  *
  *   L = q_bar S C_L(alpha, delta_e), D = q_bar S C_D(alpha, delta_e), M = z_T T + q_bar S c C_M(alpha, delta_e),
- *   T = C_T3 alpha^3 + C_T2 alpha^2 + C_T1 alpha + C_T0, each affine in the equivalence ratio phi (beta_1 ... beta_8),
- *   N_i(alpha, delta_e), dynamic pressure q_bar = rho V^2 / 2, density rho = rho_0 exp(-(h - h_0) / h_s).
+ *   T = C_T3 alpha^3 + C_T2 alpha^2 + C_T1 alpha + C_T0, each C_Ti affine in the fuel ratio phi (beta_1 ... beta_8),
+ *   dynamic pressure q_bar = rho V^2 / 2, density rho = rho_0 exp(-(h - h_0) / h_s).
  *
- * The thrust term of the moment and the exponent of the density differ from the printed equations; see docs/errata.md.
- * The earth is flat. Included by vehicle.h. */
+ * The generalised forces N_i are in vehicle.h. The thrust term of the moment and the exponent of the density differ
+ * from the printed equations, see docs/errata.md. The earth is flat. Included by vehicle.h. */
 static inline Forces parker_forces(real altitude, real velocity, real alpha, const real *u, const Vehicle *p)
 {
     const real fuel = u[FUEL], elevator = u[ELEVATOR];

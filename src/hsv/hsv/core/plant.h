@@ -1,8 +1,8 @@
 /* The vehicle with its actuators, sensors and air over one control period.
  *
- * Equipment is computed lane by lane in double precision; the equations of motion advance all lanes at once. With ideal
- * actuators, without delay and without an acting fault of actuator or effector, the effectors follow the command within
- * the stops. Otherwise actuators and vehicle move on the substeps of the actuators. */
+ * Equipment is computed one lane after the other; the equations of motion advance all lanes at once. If the actuators
+ * are ideal, the command is not delayed and no fault of an actuator or effector acts, the effectors follow the command
+ * within the stops. Otherwise actuators and vehicle are advanced by the substeps of the actuators. */
 #pragma once
 #include "vehicle.h"
 
@@ -14,18 +14,19 @@ enum { ACTUATOR_SUBSTEPS = 4 };
 #include "links.h"
 #include "sensors.h"
 
+/* Write the measurement (9) of the state x (9) in step k, as it arrives over the link. */
 void hsv_sense(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k, const double *x,
                double *measurement)
 {
     if (plant->sensors.ideal && faults->sensor.count == 0)
         for (int i = 0; i < STATES; i++)
-            measurement[i] = memory->sensors[i].given = x[i]; /* for a sensor that drops out later */
+            measurement[i] = memory->sensors[i].given = x[i]; /* "given" is needed if a sensor drops out later */
     else
         hsv_measure(&plant->sensors, memory->sensors, &faults->sensor, k, plant->seed, x, measurement);
     hsv_receive(&plant->link, memory->link, memory->payloads, k, plant->seed, measurement, STATES);
 }
 
-/* Update the conditions of air and engine for the period after step k. */
+/* Write the conditions of air and engine for the period after step k to the memory of the plant. */
 void hsv_plant_conditions(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k,
                           const double *x, double fuel)
 {
@@ -41,13 +42,13 @@ void hsv_plant_conditions(const hsv_plant *plant, hsv_plant_memory *memory, hsv_
 }
 #endif
 
-/* Return whether the air is still and the engine has no faults, so that the conditions are constant. */
+/* Return whether the air is still and the engine has no scheduled faults, so that the conditions are constant. */
 static inline int is_calm(const hsv_plant *plant, const hsv_plant_faults *faults)
 {
     return plant->atmosphere.still && faults->engine.count == 0;
 }
 
-/* Return whether a plant has equipment that is computed lane by lane. */
+/* Return whether a plant has equipment or faults that must be computed lane by lane. */
 static inline int is_equipped(const hsv_plant *plant, const hsv_plant_faults *faults)
 {
     const int ideal = plant->actuators.ideal && plant->sensors.ideal && plant->link.ideal && plant->late == 0.0;
@@ -61,11 +62,13 @@ static inline void gather_vehicle(const hsv_vehicle *p, int i, Vehicle *vehicle)
         lane(((plain *)vehicle)[j], i) = ((const double *)p)[j];
 }
 
+/* Copy "count" numbers from lane i. */
 static inline void read_lane(const real *from, int count, int i, double *to)
 {
     for (int j = 0; j < count; j++) to[j] = lane(from[j], i);
 }
 
+/* Copy "count" numbers to lane i. */
 static inline void write_lane(const double *from, int count, int i, real *to)
 {
     for (int j = 0; j < count; j++) lane(to[j], i) = from[j];
@@ -88,7 +91,7 @@ static inline void advance_moving(hsv_flight *const *flights, const Vehicle *veh
     advance(x, effector, vehicle, conditions, all(length * flights[0]->plant->actuators.substep), 1);
 }
 
-/* Advance the states x by one period after step k, with the input "actuator" of the actuators held. */
+/* Advance the states x by the period after step k, with "actuator", the input of the actuators, held. */
 static inline void advance_plants(hsv_flight *const *flights, const Vehicle *vehicle, int64_t k, const real *actuator,
                                   real *x)
 {
@@ -118,7 +121,7 @@ static inline void advance_plants(hsv_flight *const *flights, const Vehicle *veh
     }
     if (number > 0)
         for (int j = 0; j < ACTUATOR_SUBSTEPS; j++) {
-            /* Share of the substep in which the previous command still acts. */
+            /* Share of the substep during which the previous command still acts. */
             const double share = late - j < 0.0 ? 0.0 : late - j > 1.0 ? 1.0 : late - j;
             if (share > 0.0) advance_moving(flights, vehicle, moving, k, j, share, before, conditions, x);
             if (share < 1.0)

@@ -1,13 +1,13 @@
-/* The number type of the core.
+/* The type "real" of the numbers in the core.
  *
- * Each formula is written once, with the type "real", which is compiled as
+ * Each formula is written once, for the type "real". It is compiled with
  *
  *   double             for a single flight, for the nodes and for the exported controller,
  *   a vector register  of 4 (AVX2) or 8 (AVX-512) doubles for campaigns, one flight in each lane (LANES > 1),
  *   double _Complex    for derivatives by the complex step (COMPLEX).
  *
- * "plain" is the type of a real part, which can be compared. A "mask" is the result of a comparison. Vector types of C
- * have no ?:, && and !; choose, & and opposite replace them, and every reduces a mask to a single truth value.
+ * "plain" is the type of the real part of a "real"; it can be compared. A "mask" is the result of a comparison. Vector
+ * types have no ?:, && and ! in C; choose, & and opposite replace them. every and any reduce a mask to a truth value.
  *
  * Results are the same to the bit on every processor: the core uses only additions, subtractions, multiplications,
  * divisions and square roots of IEEE 754, in the order written, without fused operations (-ffp-contract=off). */
@@ -64,7 +64,7 @@ typedef int64_t mask __attribute__((vector_size(8 * LANES)));
 typedef uint64_t word __attribute__((vector_size(8 * LANES)));
 typedef real plain;
 static inline real real_part(real x) { return x; }
-/* x + {} would turn -0.0 into 0.0. */
+/* Return x in all lanes; adding x to zeros instead of subtracting zeros would turn -0.0 into 0.0. */
 static inline real all(double x) { return x - (real){0.0}; }
 static inline real choose(mask m, real a, real b) { return (real)((m & (mask)a) | (~m & (mask)b)); }
 static inline real select_real(mask m, real a, real b) { return choose(m, a, b); }
@@ -97,7 +97,7 @@ static inline double greatest_lane(real x)
 
 static inline mask is_finite(plain x) { return x - x == 0.0; }
 static inline mask never(void) { return (mask){0}; }
-/* A NaN in the first argument is returned. */
+/* If the first argument is NaN, it is returned. */
 static inline plain minimum(plain a, plain b) { return choose(b < a, b, a); }
 static inline plain maximum(plain a, plain b) { return choose(b > a, b, a); }
 static inline plain limited(plain x, double low, double high)

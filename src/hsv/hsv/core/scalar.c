@@ -1,4 +1,4 @@
-/* The core for one flight: the loop, single steps of its blocks, and all other functions of core.h. */
+/* The core for one flight: the loop, steps of its single blocks, and all other functions of core.h. */
 #define BASE
 #define NAME single
 #include "instance.h"

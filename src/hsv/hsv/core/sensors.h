@@ -1,15 +1,15 @@
-/* Sensors, one for each state:
+/* Sensors, one for each state x:
  *
  *   y = fault(clip(quantise(hold(delay(lag((1 + s) x) + b + n)))))
  *
- * with scale factor s, lag, bias b (constant, Gauss-Markov drift and random walk), white noise n, latency in samples,
- * hold of the last sample after a drop-out, quantisation, range and faults. An ideal sensor returns its state to the
+ * with scale error s, lag, bias b (constant, Gauss-Markov drift and random walk), white noise n, latency in samples,
+ * hold of the last sample during a drop-out, quantisation, range and faults. An ideal sensor returns its state to the
  * bit. In step 0 lags are in equilibrium and queues contain the first sample. */
 #pragma once
 #include "faults.h"
 #include "vehicle.h"
 
-/* Return bias plus noise of step k; constants are drawn in step 0. */
+/* Return the error b + n in step k; values that are constant in a flight are drawn in step 0. */
 static double sensor_error(const hsv_sensors *s, hsv_sensor_memory *m, int i, int64_t k, int64_t seed)
 {
     double drawn[2];
@@ -33,7 +33,7 @@ static double sensor_error(const hsv_sensors *s, hsv_sensor_memory *m, int i, in
     return error + m->walk;
 }
 
-/* Return the measurement of a healthy sensor. */
+/* Return the measurement of a sensor without faults; "error" is b + n. */
 static double sensor_sample(const hsv_sensors *s, hsv_sensor_memory *m, int i, int64_t k, int64_t seed, double x,
                             double error)
 {
@@ -53,7 +53,7 @@ static double sensor_sample(const hsv_sensors *s, hsv_sensor_memory *m, int i, i
     return m->held;
 }
 
-/* Return the measurement after a fault; "given" is the measurement of the previous step. */
+/* Return the measurement "value" as changed by a fault; "given" is the measurement of the previous step. */
 static double sensor_failed(const hsv_fault *fault, hsv_fault_memory *memory, int64_t k, int64_t seed, double period,
                             double value, double given)
 {
@@ -82,7 +82,7 @@ void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faul
 {
     const int64_t failing = hsv_begin_faults(faults, k, seed);
     double pitch_error = 0.0;
-    /* In reverse order, because the angle of attack needs the error of the pitch angle. */
+    /* In reverse order, because the angle of attack may need the error of the pitch angle, which comes after it. */
     for (int i = STATES - 1; i >= 0; i--) {
         measurement[i] = x[i];
         if (!sensors->on[i]) continue;

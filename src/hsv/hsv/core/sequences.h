@@ -1,11 +1,11 @@
-/* Sequences of steps: the plan of a governor, and simulations of the design along trajectories and random sequences. */
+/* Simulations over many steps: the plan of the governor, filters along trajectories, and random sequences. */
 #pragma once
 #include "nominal.h"
 #include "noise.h"
 #include "notch_filter.h"
 #include "vehicle.h"
 
-/* Write [A(p), B(p)] (9, 11), flattened (eq. 12); return whether p is inside the envelope. */
+/* Write [A(p), B(p)] (9, 11) row by row (eq. 12), p the altitude and velocity; return whether p is in the envelope. */
 int hsv_schedule(const hsv_polytope *polytope, double altitude, double velocity, double *S)
 {
     double weights[MAX_VERTICES], entries[MAX_SIZE];
@@ -16,8 +16,8 @@ int hsv_schedule(const hsv_polytope *polytope, double altitude, double velocity,
     return inside;
 }
 
-/* Write the plan u_r + u_n (steps, 2) and x_n (steps, 9) from step "first" on, with the initial x_n "start". The model
- * is scheduled by x_r + x_n. Return whether x_n stays in the family. */
+/* Write the plan u_r + u_n (steps, 2) and x_n (steps, 9) from step "first" on, where x_n is "start". The model is
+ * scheduled by x_r + x_n. Return whether x_n stays in the ellipsoids of the nominal law. */
 int hsv_plan(const hsv_nominal *nominal, const hsv_reference *reference, int64_t first, int64_t steps,
              const double *start, double *plan, double *deviation)
 {
@@ -37,8 +37,8 @@ int hsv_plan(const hsv_nominal *nominal, const hsv_reference *reference, int64_t
     return held;
 }
 
-/* Filter the rates (steps), from the equilibrium for the first one; write the filtered rates (steps) and the filter
- * states (steps, 2 sections) before each step. */
+/* Filter the rates (steps), from the equilibrium for the first one; write the filtered rates (steps) and the states of
+ * the filter (steps, 2 sections) before each step. */
 void hsv_notch_along(const hsv_notch *notch, int64_t steps, const double *rate, double *filtered, double *states)
 {
     double s[2 * MAX_SECTIONS] = {0};
@@ -50,7 +50,7 @@ void hsv_notch_along(const hsv_notch *notch, int64_t steps, const double *rate, 
     }
 }
 
-/* Add C a + D c to the output (2), and replace a by A a + B c. */
+/* Add C a + D c to the output (2), and replace the state a by A a + B c. */
 static void respond_once(const hsv_sampled *f, const double *c, double *a, double *output)
 {
     const int64_t n = f->states;
@@ -66,8 +66,8 @@ static void respond_once(const hsv_sampled *f, const double *c, double *a, doubl
     memcpy(a, new, (size_t)n * sizeof *a);
 }
 
-/* Write the actuator states (steps, states) before each step and the mean positions (steps, 2) for commands (steps, 2).
- */
+/* Write the actuator states (steps, states) before each step and the mean positions (steps, 2) for the commands
+ * (steps, 2). */
 void hsv_respond(const hsv_sampled *actuators, int64_t steps, const double *commands, double *before, double *means)
 {
     double a[4] = {0};
@@ -78,10 +78,11 @@ void hsv_respond(const hsv_sampled *actuators, int64_t steps, const double *comm
     }
 }
 
-/* Write the response of the closed loop to the lag of the plan: error (steps, 5 + filter + actuator states), initially
+/* Write the response of the closed loop to the lag of the plan: errors (steps, 5 + filter + actuator states), initially
  * zero, and feedback (steps, 2); see hsv.design.error_system.
  *
- * gain (2, 5): F; scheduled (steps, 2): altitude (m) and velocity (m/s) of the model; lag (steps, 2). */
+ * gain (2, 5): F; scheduled (steps, 2): altitude (m) and velocity (m/s) that schedule the model; lag (steps, 2): mean
+ * position of actuators that are driven by the plan, minus the plan. */
 void hsv_lag_response(const hsv_polytope *polytope, const double *gain, const hsv_notch *notch,
                       const hsv_sampled *actuators, int64_t steps, const double *scheduled, const double *lag,
                       double *errors, double *feedback)
@@ -112,7 +113,7 @@ void hsv_lag_response(const hsv_polytope *polytope, const double *gain, const hs
     }
 }
 
-/* Random sequences of vertices and disturbances as a test of an ellipsoid, see hsv.design.sets.sampling. */
+/* Test of an ellipsoid by random sequences of vertices and disturbances, see hsv.design.sets.sampling. */
 enum { MAX_WIDTH = 32 };
 #define GOLDEN UINT64_C(0x9E3779B97F4A7C15)
 
@@ -136,7 +137,8 @@ static void add_column(const double *column, double value, int64_t width, double
     for (int64_t i = 0; i < width; i++) sum[i] += column[i] * value;
 }
 
-/* Write the next v at a vertex, whose rows are the columns of the n states, of the disturbances, and a constant one. */
+/* Write the successor of v at a vertex. The rows of "vertex" are matrix columns: for the n states, for the
+ * disturbances, which are 1 or -1 by their bit in "signs", and a constant one. */
 static void advance_sequence(const double *vertex, int64_t rows, int64_t width, int64_t n, uint64_t signs,
                              const double *v, double *new)
 {
@@ -145,7 +147,7 @@ static void advance_sequence(const double *vertex, int64_t rows, int64_t width, 
         add_column(vertex + width * j, j < n ? v[j] : j == rows - 1 || (signs >> j & 1) ? 1.0 : -1.0, width, new);
 }
 
-/* Return the signs of the disturbances that push v outwards, chosen greedily channel by channel. */
+/* Return the signs of the disturbances that make the successor of v long, chosen greedily channel by channel. */
 static uint64_t outward(const double *vertex, int64_t rows, int64_t width, int64_t n, const double *v, double *new)
 {
     uint64_t signs = 0;
@@ -160,10 +162,11 @@ static uint64_t outward(const double *vertex, int64_t rows, int64_t width, int64
     return signs;
 }
 
-/* Simulate the sequences first ... end - 1, whose kind is their number mod 4 (independent, held, switching,
- * adversarial), from "begin" (width) or from the boundary. Update the largest levels "worst" (4, 2) by kind and start.
+/* Simulate the sequences first ... end - 1 and update the largest levels |v|^2, "worst" (4, 2) by kind and start.
  *
- * columns (vertices, rows, width). */
+ * The kind is the number of the sequence mod 4: vertex and signs are drawn in every step (0), once (1), at random times
+ * (2), or the vertex at random times and the signs greedily (3; in some the vertex as well). A sequence starts from
+ * "begin" (width) or from a random point on the boundary, |v| = 1. columns (vertices, rows, width). */
 void hsv_sample_sequences(int64_t vertices, int64_t rows, int64_t width, const double *columns, int64_t n,
                           const double *begin, int64_t first, int64_t end, int64_t steps, uint64_t seed, double *worst)
 {

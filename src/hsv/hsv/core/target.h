@@ -1,4 +1,4 @@
-/* Functions between BEGIN_TARGET and END_TARGET are compiled for the named instruction set. */
+/* BEGIN_TARGET and END_TARGET enclose functions that are compiled for the named instruction sets. */
 #pragma once
 #include <immintrin.h>
 #define PRAGMA(...) _Pragma(#__VA_ARGS__)

@@ -1,4 +1,4 @@
-/* Trims (paper eq. 5), rows of the reference, and the steady-state gain of the estimator.
+/* Trims (paper eq. 5), the reference, and the steady-state gain of the estimator.
  *
  * They are computed before a flight, but the flight depends on their last bits. LAPACK is not used because the order of
  * its sums depends on the processor. */
@@ -34,13 +34,13 @@ void hsv_solve(int64_t n, int64_t m, double *A, double *b)
         }
 }
 
-/* Compute the trim x (9), u (2) at the altitude and velocity in x; return the largest residual, SI per second.
+/* Write the trim x (9), u (2) at the altitude and velocity given in x; return its largest residual (SI per second).
  *
  * Newton's method with exact derivatives solves dV/dt = acceleration (m/s^2), dalpha/dt = 0 and dq/dt = 0 for "unknown"
- * (3): angle of attack, equivalence ratio and elevator. "unknown" contains the initial guess and then the best
+ * (3): angle of attack, equivalence ratio and elevator. "unknown" contains the initial guess and, on return, the best
  * solution. theta is alpha plus the path angle (rad); the pitch rate (rad/s) is that of a steady pull-up. The elastic
- * coordinates are N_i / omega_i^2: at trim the pitching moment is zero, so that inertial coupling has no effect.
- * "rigid" has no coupling. */
+ * coordinates are N_i / omega_i^2: at trim the pitching moment is zero, so that inertial coupling has no effect, and
+ * "rigid", the vehicle without coupling, suffices. */
 double hsv_balance(const hsv_vehicle *rigid, double path_angle, double acceleration, double pitch_rate, double *unknown,
                    double *x, double *u)
 {
@@ -59,7 +59,7 @@ double hsv_balance(const hsv_vehicle *rigid, double path_angle, double accelerat
         rates[VELOCITY] -= acceleration;
         const double size =
             maximum(maximum(magnitude(rates[VELOCITY]), magnitude(rates[ALPHA])), magnitude(rates[PITCH_RATE]));
-        if (!is_finite(size) || (size >= best && best < converged)) /* converged to rounding errors */
+        if (!is_finite(size) || (size >= best && best < converged)) /* converged up to rounding errors */
             break;
         if (size < best) {
             memcpy(unknown, trial, sizeof trial);
@@ -67,7 +67,7 @@ double hsv_balance(const hsv_vehicle *rigid, double path_angle, double accelerat
         }
         hsv_jacobian(x, u, rigid, A, B);
         for (int i = 0; i < 3; i++) {
-            /* The path angle is given: pitch angle and angle of attack change together. */
+            /* The path angle is given, so that pitch angle and angle of attack change together. */
             slope[3 * i] = A[STATES * rows[i] + ALPHA] + A[STATES * rows[i] + PITCH];
             for (int j = 0; j < INPUTS; j++) slope[3 * i + 1 + j] = B[INPUTS * rows[i] + j];
             right[i] = rates[rows[i]];
@@ -77,7 +77,7 @@ double hsv_balance(const hsv_vehicle *rigid, double path_angle, double accelerat
     }
     x[ALPHA] = unknown[0], x[PITCH] = unknown[0] + path_angle;
     u[FUEL] = unknown[1], u[ELEVATOR] = unknown[2];
-    /* At zero elastic coordinates the elastic accelerations of the decoupled model equal the generalised forces. */
+    /* At zero elastic coordinates, the elastic accelerations of the decoupled model are the generalised forces N_i. */
     derivative(x, u, vehicle, NULL, rates);
     x[ETA_1] = rates[ETA_1_RATE] / (rigid->natural_frequency_1 * rigid->natural_frequency_1);
     x[ETA_2] = rates[ETA_2_RATE] / (rigid->natural_frequency_2 * rigid->natural_frequency_2);
@@ -86,8 +86,9 @@ double hsv_balance(const hsv_vehicle *rigid, double path_angle, double accelerat
 
 static int equal(const double *a, const double *b) { return a[0] == b[0] && a[1] == b[1]; }
 
-/* Write x_r, u_r, d_r and the residuals of the trims for commands of altitude and velocity (rows, 2), their rates
- * (rows, 2), and the rate of the climb rate, "bend" (rows). */
+/* Write x_r (rows, 9), u_r (rows, 2), the defect d_r (rows, 9) and the residuals of the trims (rows), for commands of
+ * altitude and velocity (rows, 2), their rates (rows, 2), and the vertical acceleration "bend" (rows). A row of d_r is
+ * the state one period after x_r with u_r held, minus the next x_r. "guess" (3) starts Newton's method. */
 void hsv_reference_rows(const hsv_vehicle *rigid, int64_t rows, const double *command, const double *rate,
                         const double *bend, const double *guess, double period, int64_t substeps, double *state,
                         double *input, double *defect, double *imbalance)
@@ -108,7 +109,7 @@ void hsv_reference_rows(const hsv_vehicle *rigid, int64_t rows, const double *co
             imbalance[k] = INFINITY;
             continue;
         }
-        /* The previous trim would be a better guess, but the result would then depend on it in the last bits. */
+        /* The previous trim would be a better guess, but the last bits of the result would then depend on it. */
         double unknown[3] = {guess[0], guess[1], guess[2]};
         const double turn = bend[k] / (now[1] * root(1.0 - sine * sine));
         imbalance[k] = hsv_balance(rigid, hsv_arcsine(sine), climb[1], turn, unknown, x, u);
@@ -134,7 +135,7 @@ static void multiply(int n, int m, int p, const double *A, const double *B, doub
 }
 
 /* Write the transition matrix F (11, 11) of states and held inputs over a period (s), by the power series, for
- * continuous-time A (9, 9) and B (9, 2) whose eigenvalues are at most a few per period. */
+ * continuous-time A (9, 9) and B (9, 2). The eigenvalues of A times the period must be at most a few. */
 void hsv_transition(const double *A, const double *B, double period, double *F)
 {
     const int n = ESTIMATED;
@@ -154,10 +155,11 @@ void hsv_transition(const double *A, const double *B, double period, double *F)
     }
 }
 
-/* Iterate the Riccati equation to the steady-state gain (11, 5) of states and input offsets; return the iterations.
+/* Iterate the Riccati equation and write the steady-state gain (11, 5) of states and input offsets; return the number
+ * of iterations.
  *
- * process (11): standard deviation of the process noise per period; noise (5): standard deviation of the measurements;
- * settled: relative change of the gain per iteration at which to stop. */
+ * process (11): standard deviation of the process noise in a period; noise (5): standard deviation of the measurements;
+ * settled: relative change of the gain in an iteration at which to stop. */
 int64_t hsv_steady_gain(const double *A, const double *B, double period, const double *process, const double *noise,
                         int64_t iterations, double settled, double *gain)
 {

@@ -2,10 +2,10 @@
  *
  *   u = F diag(tau) (x - x_r - x_n) + u_n + u_r,   limited to U (eq. 29)
  *
- * The pitch rate in x is the filtered rate q_f; if the design requires it, the pitch rate of x_r + x_n is filtered as
- * well (eq. 48). Two extensions of the paper's law are off by default: integral action on the errors of altitude and
- * velocity, k F diag(tau) integral of e, and division of the elevator command by its estimated effectiveness
- * (effectiveness.h).
+ * with a factor tau for each rigid state. The pitch rate in x is the filtered rate q_f; if the design requires it, the
+ * pitch rate of x_r + x_n is filtered as well (eq. 48). Two extensions of the paper's law are off by default: integral
+ * action on the errors e of altitude and velocity, k F diag(tau) integral of e, and division of the elevator command by
+ * the estimated effectiveness of the elevator (effectiveness.h).
  *
  * Robust MPC, the comparison in the paper (section 5.2), has a nominal gain K in place of F and no x_n and u_n
  * ("planned" is 0). */
@@ -13,10 +13,11 @@
 #include "notch_filter.h"
 
 typedef struct {
-    real planned[2 * MAX_SECTIONS]; /* state s_n of the plan's notch filter */
+    real planned[2 * MAX_SECTIONS]; /* state s_n of the notch filter of the plan */
     real integral[INTEGRATED];
 } TubeMemory;
 
+/* Return the index of the gain in step k. */
 static inline int64_t active_gain(const hsv_tube *tube, int64_t k)
 {
     int64_t index = 0;
@@ -24,13 +25,13 @@ static inline int64_t active_gain(const hsv_tube *tube, int64_t k)
     return index;
 }
 
-/* Write the feedback (2), the unsaturated input (2) and the limited input (2). "gain" (2, 9) is F diag(tau) in this
- * step, "effectiveness" that of the elevator, 1 if it is not estimated.
+/* Write the feedback (2), the unsaturated input (2) and the limited input u (2). "gain" (2, 9) is F diag(tau) in this
+ * step, "effectiveness" that of the elevator, 1 if it is not estimated; s is the state of the notch filter in the loop.
  *
- * The notch filter of the plan starts from the state s of the filter in the loop, which is exact for x = x_r + x_n. It
- * is stepped if the loop has a notch filter and the law or the monitor needs it. The integral is frozen while an input
- * is saturated. If the sum is not finite, the input of the reference is used, so that the actuators always receive a
- * number. */
+ * The notch filter of the plan, whose input is the pitch rate of x_r + x_n, starts from s, which is exact for
+ * x = x_r + x_n. It is stepped if the loop has a notch filter and the law or the monitor needs it. The integral is kept
+ * while an input is saturated. If an input is not finite, the input of the reference replaces it, so that the actuators
+ * always receive a number. */
 static inline void tube_step(const hsv_tube *tube, TubeMemory *memory, const real *gain, real effectiveness, int64_t k,
                              int monitored, int64_t filter_states, const real *x, real q_f, const real *x_r,
                              const real *u_r, const real *x_n, const real *u_n, const real *s, real *u_feedback,

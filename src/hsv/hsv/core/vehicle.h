@@ -7,13 +7,14 @@
  *   dq/dt     = (M + psi_1 eta_1'' + psi_2 eta_2'') / I_yy
  *   k_i eta_i'' = -2 zeta_i omega_i eta_i' - omega_i^2 eta_i + N_i - psi_i M / I_yy - psi_1 psi_2 eta_j'' / I_yy
  *
- * with k_i = 1 + psi_i^2 / I_yy (eq. 1); without inertial coupling, psi_1 = psi_2 = 0, it is the decoupled model
- * (eq. 4). Lift L, drag D, thrust T and moment M follow from the structure of the vehicle: parker.h or winged_cone.h. On
- * the round earth of the latter, V^2 / r is subtracted from g in dalpha/dt. A rigid vehicle has N_i = psi_i = 0.
+ * with k_i = 1 + psi_i^2 / I_yy and j the other mode (eq. 1). Without inertial coupling, psi_1 = psi_2 = 0, this is the
+ * decoupled model (eq. 4). Lift L, drag D, thrust T and moment M depend on the structure of the vehicle: parker.h or
+ * winged_cone.h. On the round earth of the latter, V^2 / r is subtracted from g in dalpha/dt. N_1 and N_2, the
+ * generalised forces, are quadratic in alpha, N_2 also affine in delta_e; a rigid vehicle has N_i = psi_i = 0.
  *
  * State x: altitude h (m), velocity V (m/s), angle of attack alpha (rad), pitch angle theta (rad), pitch rate q
  * (rad/s), eta_1 (kg^0.5 m) and its rate, eta_2 and its rate. Input u: equivalence ratio phi (1), elevator delta_e
- * (rad). V and alpha are inertial; moving air acts through the conditions, see forces_in. */
+ * (rad). V and alpha are inertial, that is relative to still air; wind acts through the conditions, see forces_in. */
 #pragma once
 #include "elementary.h"
 
@@ -31,13 +32,13 @@ typedef struct {
     real lift, drag, thrust, moment, pressure; /* N, N, N, N m, Pa */
 } Forces;
 
-/* The structures, each a header with its equations. A further one has a number here, a case in the functions below and
- * an entry in hsv.model.dynamics.STRUCTURES. */
+/* The structures of vehicles; each has a header with its equations. A new one needs a number here, a case in the
+ * functions below and an entry in hsv.model.dynamics.STRUCTURES. */
 enum { PARKER, WINGED_CONE };
 #include "parker.h"
 #include "winged_cone.h"
 
-/* All flights of a group of lanes have one structure. */
+/* Return the structure, which all flights of a group of lanes have in common. */
 static inline int structure(const Vehicle *p) { return (int)lane(p->structure, 0); }
 
 /* Return the forces at an altitude (m), a speed (m/s) and an angle of attack (rad) relative to still air, a pitch rate
@@ -50,7 +51,7 @@ static inline Forces forces(real altitude, real velocity, real alpha, real rate,
     }
 }
 
-/* Return the acceleration of gravity (m/s^2); write its part that a circular path around the planet takes up. */
+/* Return the acceleration of gravity (m/s^2); write its relief V^2 / r (m/s^2) on a round planet, else 0. */
 static inline real gravity(real altitude, real velocity, const Vehicle *p, real *relief)
 {
     if (structure(p) == WINGED_CONE) return winged_cone_gravity(altitude, velocity, p, relief);
@@ -59,8 +60,8 @@ static inline real gravity(real altitude, real velocity, const Vehicle *p, real 
 }
 
 #ifndef COMPLEX
-/* Return the speed of sound (m/s) at a geometric altitude (m). Structures whose equations do not have it: that of the US
- * Standard Atmosphere 1976, up to 47 km of geopotential altitude. */
+/* Return the speed of sound (m/s) at a geometric altitude (m). If the equations of the structure do not contain it, it
+ * is that of the US Standard Atmosphere 1976, valid up to a geopotential altitude of 47 km. */
 static inline real speed_of_sound(real altitude, const Vehicle *p)
 {
     if (structure(p) == WINGED_CONE) return winged_cone_sound(altitude, p);
@@ -72,10 +73,11 @@ static inline real speed_of_sound(real altitude, const Vehicle *p)
 }
 
 typedef struct {
-    real speed, turn, sine, cosine; /* V_a (m/s); e = gamma_a - gamma (rad), its sine and cosine */
+    real speed, turn, sine, cosine; /* V_a (m/s); gamma_a - gamma (rad), its sine and cosine */
 } AirRelative;
 
-/* Return the velocity relative to the air for a wind (forward, up; m/s) and the inertial path angle theta - alpha. */
+/* Return speed V_a and path angle gamma_a relative to the air, for a wind (forward, up; m/s) and the inertial path
+ * angle gamma = theta - alpha (rad). */
 static inline AirRelative air_relative(real velocity, real path_angle, real forward, real up)
 {
     real sine, cosine;
@@ -90,7 +92,8 @@ static inline AirRelative air_relative(real velocity, real path_angle, real forw
 }
 
 /* Return the forces under the conditions of air and engine, and write the angle of attack relative to the air (rad).
- * Lift and drag are rotated by the angle between the two paths: the result is across and along the inertial path. */
+ * Lift and drag are rotated from the air-relative to the inertial path: they are returned perpendicular and parallel to
+ * the inertial velocity. */
 static inline Forces forces_in(const real *conditions, const real *x, const real *u, const Vehicle *p, real *alpha)
 {
     const AirRelative air =
@@ -112,7 +115,7 @@ static inline Forces forces_in(const real *conditions, const real *x, const real
 }
 #endif
 
-/* Write dx/dt for the conditions of air and engine; NULL: still air and a healthy engine. */
+/* Write dx/dt (9) under the conditions of air and engine; NULL: still air and a healthy engine. */
 static inline void derivative(const real *x, const real *u, const Vehicle *p, const real *conditions, real *out)
 {
     const real velocity = x[VELOCITY], elevator = u[ELEVATOR];
@@ -131,7 +134,7 @@ static inline void derivative(const real *x, const real *u, const Vehicle *p, co
                          p->elastic_force_2_elevator * elevator + p->elastic_force_2_zero;
     const plain psi_1 = p->inertial_coupling_1, psi_2 = p->inertial_coupling_2;
     const plain omega_1 = p->natural_frequency_1, omega_2 = p->natural_frequency_2;
-    /* Solve the 2x2 system of the elastic accelerations; couplings and moment are divided by the moment of inertia. */
+    /* Solve the 2x2 system of the elastic accelerations; c_1, c_2 and "angular" contain 1 / I_yy. */
     const plain c_1 = psi_1 / p->moment_of_inertia, c_2 = psi_2 / p->moment_of_inertia;
     const real angular = f.moment / p->moment_of_inertia;
     const plain k_1 = 1.0 + psi_1 * c_1, k_2 = 1.0 + psi_2 * c_2, k_12 = psi_1 * c_2;
@@ -159,7 +162,7 @@ static inline void derivative(const real *x, const real *u, const Vehicle *p, co
     out[ETA_2_RATE] = acceleration_2;
 }
 
-/* Advance x by one period (s) with u and the conditions held, in classical Runge-Kutta steps. */
+/* Advance x by one period (s) with u and the conditions held, by classical Runge-Kutta steps of fourth order. */
 static inline void advance(real *x, const real *u, const Vehicle *p, const real *conditions, real period,
                            int64_t substeps)
 {
@@ -180,7 +183,7 @@ static inline void advance(real *x, const real *u, const Vehicle *p, const real 
 }
 
 #ifndef COMPLEX
-/* Return whether the state is finite and its angles are inside the range of the curve fits. */
+/* Return whether the state is finite, its velocity positive, and its angles are within the limit (rad). */
 static inline mask in_model_range(const real *x, double angle_limit)
 {
     mask inside = x[VELOCITY] > 0.0;

@@ -9,11 +9,11 @@ number thrust_beta_5, thrust_beta_6, thrust_beta_7, thrust_beta_8;
 number elastic_force_1_alpha_squared, elastic_force_1_alpha, elastic_force_1_zero;
 number elastic_force_2_alpha_squared, elastic_force_2_alpha, elastic_force_2_elevator, elastic_force_2_zero;
 number damping_ratio_1, damping_ratio_2, natural_frequency_1, natural_frequency_2;
-/* The choice of inertial coupling, and limits */
+/* Chosen inertial coupling, and limits */
 number inertial_coupling_1, inertial_coupling_2;
 number fuel_equivalence_ratio_minimum, fuel_equivalence_ratio_maximum;
 number elevator_deflection_minimum, elevator_deflection_maximum, angle_limit;
-/* Those of the Winged-Cone alone */
+/* Constants of the Winged-Cone only */
 number gravitational_parameter, planet_radius, sound_speed_curvature, sound_speed_slope, sound_speed_zero;
 number lift_alpha_mach, drag_scale, drag_mach_squared, drag_mach, thrust_scale, thrust_mach, thrust_fuel;
 number moment_scale, moment_mach, moment_mach_decay;

@@ -1,19 +1,23 @@
-/* Forces and moment of the Winged-Cone, rigid, whose coefficients depend on the Mach number M = V / a (Wang and Stengel,
- * J. Guidance, Control, and Dynamics 23(4), 2000; the vehicle of NASA TM-102610).
+/* Forces and moment of the rigid Winged-Cone (Wang and Stengel, J. Guidance, Control, and Dynamics 23(4), 2000; the
+ * vehicle of NASA TM-102610). The coefficients depend on the Mach number M = V / a. In
+ *
+ *   L = q_bar S C_L,  D = q_bar S C_D,  T = q_bar S C_T,  moment q_bar S c C_M,  q_bar = rho V^2 / 2,
+ *
+ * the coefficients are
  *
  *   C_L = alpha (c_0 + c_1 / M),  C_D = c_D (a_2 alpha^2 + a_1 alpha + 1) (m_2 M^2 + m_1 M + 1),
  *   C_T = c_T (1 + c_M / M) (1 + e) phi, and c_T (1 + c_M / M) (1 + e phi) for phi > 1,
  *   C_M = c_m (b_M - exp(-M / M_0)) (b_2 alpha^2 + b_1 alpha + b_0) + c_e (delta_e - alpha)
  *       + c q / (2 V) (d_M M + d_0) (d_2 alpha^2 + d_1 alpha + d_q),
  *
- * density rho = rho_0 exp(-(h - h_0) / h_s), speed of sound a = s_2 h^2 + s_1 h + s_0, gravity mu / r^2 and its
+ * with density rho = rho_0 exp(-(h - h_0) / h_s), speed of sound a = s_2 h^2 + s_1 h + s_0, gravity mu / r^2 and its
  * centrifugal relief V^2 / r, r = R + h. The thrust has no moment. Included by vehicle.h. */
 static inline real winged_cone_sound(real altitude, const Vehicle *p)
 {
     return (p->sound_speed_curvature * altitude + p->sound_speed_slope) * altitude + p->sound_speed_zero;
 }
 
-/* A function of its own: inlined, it would take registers from Parker's equations. */
+/* Not inlined, because it would take registers from Parker's equations. */
 static __attribute__((noinline)) Forces winged_cone_forces(real altitude, real velocity, real alpha, real rate,
                                                            const real *u, const Vehicle *p)
 {
@@ -41,7 +45,7 @@ static __attribute__((noinline)) Forces winged_cone_forces(real altitude, real v
     return f;
 }
 
-/* Return the acceleration of gravity (m/s^2) and write its centrifugal relief. */
+/* Return the acceleration of gravity (m/s^2) and write its centrifugal relief (m/s^2). */
 static inline real winged_cone_gravity(real altitude, real velocity, const Vehicle *p, real *relief)
 {
     const real radius = p->planet_radius + altitude;

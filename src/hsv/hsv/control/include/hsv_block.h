@@ -101,7 +101,7 @@ enum { HSV_FUEL_EQUIVALENCE_RATIO, HSV_ELEVATOR_DEFLECTION, HSV_INPUTS };
 
 /* Where a controller finds what it is given. */
 enum {
-    HSV_ESTIMATE = 0,                                        /* x, measured or estimated, with the unfiltered pitch rate */
+    HSV_ESTIMATE = 0,                                        /* x, measured or estimated, pitch rate not filtered */
     HSV_FILTERED_PITCH_RATE = HSV_ESTIMATE + HSV_STATES,     /* q_f */
     HSV_REFERENCE = HSV_FILTERED_PITCH_RATE + 1,             /* x_r */
     HSV_REFERENCE_INPUT = HSV_REFERENCE + HSV_STATES,        /* u_r */
