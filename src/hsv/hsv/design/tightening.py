@@ -33,7 +33,7 @@ class TightenedInputs:
     upper: np.ndarray
 
     def margins(self, lowest: np.ndarray, highest: np.ndarray) -> np.ndarray:
-        """Return the margins (2 inputs x lower, upper) of a plan with inputs from ``lowest`` to ``highest`` (2 each)."""
+        """Return the margins (2 inputs x lower, upper) of a plan with inputs ``lowest`` to ``highest`` (2 each)."""
         return np.stack((lowest - self.lower, self.upper - highest), axis=1)
 
     def symmetric(self, trim_input: np.ndarray) -> np.ndarray:

@@ -179,7 +179,11 @@ class _Measured:
         return limit
 
     def value(self, row: Row, vehicle: Vehicle) -> float:
-        """Return the number (SI) of a row for a kind of vehicle; :func:`worst` treats lost vehicles."""
+        """Return the number (SI) that a row measures for a kind of vehicle: uncertain, nominal or worst.
+
+        The worst value over all vehicles is the smallest if the row has a lower threshold, else the largest, and then
+        infinite if a vehicle is lost. A row with ``beyond`` counts the vehicles whose value exceeds this limit instead.
+        """
         if vehicle == "uncertain":
             return float(self._of_flights(row, self.evidence.uncertain))
         if row.flight:
