@@ -67,7 +67,7 @@ def responses(problem: TubeProblem, row: np.ndarray) -> np.ndarray:
         share = np.abs(found[-1]) @ half_width
         total += share
         left = np.einsum("in,inm->im", left, A)
-        # The slow poles are real, so the remainder decays no faster than before.
+        # The slow poles are real, so a small share is not merely the zero crossing of an oscillation.
         if len(found) % 100 == 0 and np.all(share <= _NEGLIGIBLE * total):
             break
     return np.array(found)
