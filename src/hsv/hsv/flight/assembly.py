@@ -1,4 +1,4 @@
-"""Assembly of the loop from flat parameters, for simulation, checks and replay."""
+"""Assembly of the closed loop from flat parameters (values by dotted name), for simulation, checks and replay."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ _FIELDS = {
     r"^parameter (integral|robust_mpc)\.": r"\1.",
     r"^parameter reference\.blend\b": "reference.blend",
 }
-"""Names of parameters in a scenario."""
+"""Patterns of parameter names in error messages, and the fields of a scenario that replace them."""
 
 
 def scenario_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the flat parameters of ``scenario`` with those of a custom controller, which is loaded."""
+    """Return the flat parameters of ``scenario`` and of its custom controller, whose class is imported."""
     return scenario.parameters() | own_parameters(scenario)
 
 
 def own_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the flat parameters of a custom controller, which is loaded; a shipped one or a node has none."""
+    """Return the flat parameters of a custom controller, whose class is imported; empty for a shipped one or a node."""
     if scenario.controller in SHIPPED_CONTROLLERS:
         return {}
     if scenario.controller.startswith(NODE):
@@ -54,7 +54,7 @@ def own_parameters(scenario: Scenario) -> dict[str, Any]:
 
 
 def design_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the parameters in the file of the scenario's design, which is checked; empty if it has none."""
+    """Check the design of ``scenario`` and return the parameters in its file; empty without a design."""
     if not scenario.design:
         return {}
     path = find_design(scenario.design)
@@ -63,21 +63,21 @@ def design_parameters(scenario: Scenario) -> dict[str, Any]:
 
 
 def flight_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the design's parameters, overridden by those of ``scenario``; :func:`assemble` checks them."""
+    """Return the flat parameters of the design, overridden by those of ``scenario``; :func:`assemble` checks them."""
     return {**design_parameters(scenario), **scenario_parameters(scenario)}
 
 
 def assemble(values: Mapping[str, Any], design: ControlDesign | None = None) -> Components:
-    """Return the five components that these parameters describe; ``design`` is the one in them, if it is known."""
+    """Return the five components for the flat parameters ``values``; ``design`` is the one in them, if parsed."""
     design = design or design_of(values)
     return Components(**{block.name: block.build(values, design) for block in LOOP})
 
 
 def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> Components:
-    """Return the components that fly ``scenario``, with ``design`` or, by default, with the scenario's own.
+    """Return the components of the loop that flies ``scenario``, with ``design`` or else with the scenario's own.
 
     Raises:
-        ScenarioError: Names the field that is wrong, or what is wrong with the design.
+        ScenarioError: A field or the design is wrong; the message names it.
     """
     with blamed_on(scenario):
         if design is None and scenario.design:
@@ -97,7 +97,7 @@ def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> 
 
 @contextmanager
 def blamed_on(scenario: Scenario) -> Iterator[None]:
-    """Turn errors of components into a ``ScenarioError``, with the scenario's names of the parameters."""
+    """Turn errors of components into a ``ScenarioError`` that names fields of the scenario, not parameters."""
     try:
         yield
     except HsvError as error:
@@ -112,12 +112,12 @@ def blamed_on(scenario: Scenario) -> Iterator[None]:
 def uncovered_of(
     scenario: Scenario, design: ControlDesign | None, certificate: Mapping[str, Any] | None = None
 ) -> list[str]:
-    """Return the parts of ``scenario`` that no certificate covers, one entry each; empty if all of it is covered.
+    """Return a message for each property of ``scenario`` that the certificate does not cover; empty if all are covered.
 
-    The certificate is by default that next to the scenario's design, if there is one.
+    The default ``certificate`` is in the file next to the scenario's design, if that file exists.
 
     Raises:
-        DesignError: The scenario's design is not there, or its certificate cannot be read.
+        DesignError: The scenario's design does not exist, or its certificate cannot be read.
     """
     if certificate is None and scenario.design:
         path = certificate_path(find_design(scenario.design))

@@ -1,7 +1,7 @@
 """The closed loop as a table of blocks: their inputs, outputs and order in a period.
 
 Stepwise flight, nodes, replay, recorder and parameter pages use this table. The compiled loop of
-:mod:`hsv.flight.closed_loop` has the same order; tests compare the two to the bit.
+:mod:`hsv.flight.closed_loop` has the same order; tests compare the two bit by bit.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInpu
 from hsv.model import signals as types
 from hsv.model.signals import N_INPUTS, PITCH_RATE, SignalType
 
-if TYPE_CHECKING:  # a node imports only its own component
+if TYPE_CHECKING:  # at run time, a node imports only its own component
     from hsv.control.design import ControlDesign
     from hsv.control.nominal_trajectory import NominalTrajectory
     from hsv.control.notch_filter import NotchFilter
@@ -29,9 +29,9 @@ if TYPE_CHECKING:  # a node imports only its own component
 
 
 class Signals(SimpleNamespace):
-    """Signals between the blocks in a step, SI, by their names in :mod:`hsv.model.signals`; each block writes its own.
+    """Signals between the blocks in a step, SI, by their names in :mod:`hsv.model.signals`.
 
-    Further attributes are the step, its control period T (s), and its simulated time in messages.
+    Each block writes its outputs. The other attributes are the step, the control period (s), and the simulated time.
     """
 
     step = -1
@@ -41,7 +41,7 @@ class Signals(SimpleNamespace):
     status = 0
     """:class:`hsv.model.plant.FlightStatus` of the state"""
     command = np.zeros(N_INPUTS)
-    """Input u (2); until the controller has been stepped, that of the previous step (zero before step 0)"""
+    """Command u (2); until the controller is stepped, the command of the previous step, or zero before step 0"""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Block:
     """Inputs of the same step, with direct feedthrough to the outputs."""
     outputs: tuple[SignalType, ...]
     step: Callable[[Any, Signals], None]
-    """Function that steps the component on the signals."""
+    """Function that steps a component: it reads its inputs from the signals and writes its outputs to them."""
     delayed: tuple[SignalType, ...] = ()
     """Inputs of the previous step."""
     state: tuple[SignalType, ...] = ()
@@ -64,7 +64,7 @@ class Block:
     """Whether the component is built from a control design."""
 
     def build(self, values: Mapping[str, Any], design: ControlDesign | None = None) -> Any:
-        """Return the component of flat parameters; ``design`` is the one in them, if it is known."""
+        """Return the component for the flat parameters ``values``; ``design`` is the one in them, if parsed."""
         module, _, path = self.built_by.partition(":")
         build = attrgetter(path)(import_module(module))
         return build(values, design) if self.designed else build(values)
@@ -125,7 +125,7 @@ NOTCH_FILTER = Block(
     inputs=(types.MEASUREMENT,),
     outputs=(types.ESTIMATE, types.FILTERED_PITCH_RATE, types.FILTER_STATE),
     step=_filter,
-    delayed=(types.COMMAND,),  # input of the estimator; without one the node does not subscribe to it
+    delayed=(types.COMMAND,),  # for the estimator; a node without an estimator does not subscribe to it
     state=(types.FILTER_STATE,),
 )
 NOMINAL_TRAJECTORY = Block(
@@ -167,7 +167,7 @@ LOOP = (VEHICLE, NOTCH_FILTER, NOMINAL_TRAJECTORY, CONTROLLER, FAULT_INJECTOR)
 
 
 def steps(components: Components) -> Iterator[Signals]:
-    """Simulate ``components`` from the start and yield the signals of every step; the object is the same each time."""
+    """Simulate ``components`` from the start and yield the signals after every step, always in the same object."""
     signals = Signals()
     for block in LOOP:
         getattr(components, block.name).reset()

@@ -44,7 +44,7 @@ class Components:
 
 
 def fly(components: Components) -> Flight:
-    """Simulate ``components`` from the initial trim of the plant for its duration, or until the state diverges.
+    """Return the flight of ``components`` from the initial trim of the plant for its duration, or until divergence.
 
     The core calls back into Python for a nominal law that optimises in flight and for a custom Python controller.
     Flights with such a block run one at a time, because the block has a single state. With a controller in a shared
@@ -73,16 +73,19 @@ def is_ideal(components: Components) -> bool:
 
 @contextmanager
 def watched(controller: Controller, rows: int) -> Iterator[tuple[History, Callable[..., Any]]]:
-    """Yield the shared history (rows) of a library's flights, and the function that requests a flight.
+    """Yield the memory for a flight of a controller in a library, and the function that sends a request to its process.
 
-    A flight that makes no progress is aborted with an error that names the step.
+    The memory is a history of ``rows`` steps, shared with the child process that runs the library.
+
+    Raises:
+        ControllerError: The child process crashed or made no progress; the message names the step.
     """
     library = controller.library
     with library.sharing(rows * History.numbers()) as memory:
         history = History.over(memory, rows)
 
         def begun() -> int:
-            # The core writes the pitch rate of a step before it calls the controller.
+            # The core writes the filtered pitch rate of a step before it calls the controller.
             return int(np.count_nonzero(~np.isnan(history.filtered_pitch_rate)))
 
         history.filtered_pitch_rate[:] = np.nan
@@ -126,14 +129,14 @@ def fly_into(history: History, components: Components) -> tuple[int, dict[str, S
 
 
 NO_CALL = Struct("hsv_call", function=None, state=None, par=None)
-"""Placeholder for an external block: the law of the core is used."""
+"""Call of no external block: the core uses its own law."""
 
 
 def flight_struct(components: Components, history: History, **others: Any) -> Struct:
-    """Return the struct of a flight for the core, before its first step; ``history`` is its output.
+    """Return the core's struct of a flight before its first step; the core writes the flight to ``history``.
 
-    ``others``: calls of an external nominal law or controller, the array of commands from outside, and the invariant
-    set whose level is computed.
+    ``others`` replace fields of the struct: ``nominal_law`` and ``controller`` call external laws, ``commanded``
+    (2) is an external input before saturation, and ``set`` is the invariant set in which the error's level is computed.
     """
     plant, notch, injector = components.plant, components.notch_filter, components.fault_injector
     nominal, controller = components.nominal_trajectory, components.controller

@@ -23,32 +23,31 @@ if TYPE_CHECKING:
 
 
 def _along(name: str, meaning: str) -> property:
-    """Return a property with a part of the reference over the steps of a flight."""
+    """Return a property of :class:`Flight`: the array ``name`` of its reference, with one row per step."""
     return property(lambda flight: getattr(flight.trajectory.along(len(flight.history.signals)), name), doc=meaning)
 
 
 @dataclass(frozen=True, repr=False)
 class Flight(FlightData):
-    """A simulated flight, with its control period (s), its reference for all times, and its final status."""
+    """A simulated flight, with its control period (s), its reference trajectory and its final status."""
 
     period: float
     trajectory: ReferenceTrajectory
     status: FlightStatus
     law_times: Mapping[str, Sequence[float]] = field(default_factory=dict)
-    """Wall times (s) of the steps of the nominal law and the controller, if they are in Python; those in the core are
-    not measured one by one."""
+    """Wall times (s) of every step of the nominal law and the controller, by block; only laws in Python are measured"""
 
-    reference_input = _along("input", "u_r (n + 1, 2)")
-    defect = _along("defect", "d_r (n + 1, 9), see :mod:`hsv.control.reference_trajectory`")
+    reference_input = _along("input", "Reference input u_r (n + 1, 2)")
+    defect = _along("defect", "Defect d_r (n + 1, 9), see :mod:`hsv.control.reference_trajectory`")
 
     @property
     def plan(self) -> np.ndarray:
-        """u_n + u_r (n + 1, 2)."""
+        """The input u_r + u_n (n + 1, 2) of the nominal trajectory."""
         return np.asarray(self.history.nominal_input + self.reference_input)
 
     @property
     def fingerprint(self) -> str:
-        """The digest of all bits of the history, see :mod:`hsv.flight.fingerprint`."""
+        """The digest of all bits of ``history.signals``, see :mod:`hsv.flight.fingerprint`."""
         return fingerprint(self.history.signals)
 
     def __repr__(self) -> str:
@@ -56,9 +55,9 @@ class Flight(FlightData):
         return f"<Flight of {steps * self.period:g} s, {steps} steps, {self.status.name.lower()}, {self.fingerprint}>"
 
     def to_frame(self) -> DataFrame:
-        """Return all signals as a table over time (s), a column a number: ``state.altitude``, ``command.elevator_...``.
+        """Return all signals as a table with one row per step; the index is time (s).
 
-        The units (SI) of the columns are in ``attrs["units"]``.
+        A column has a name such as ``state.altitude``. The units (SI) of the columns are in ``attrs["units"]``.
         """
         from pandas import DataFrame, Index
 
@@ -80,14 +79,14 @@ class Flight(FlightData):
 
 
 def step_statistics(seconds: Sequence[float]) -> dict[str, float]:
-    """Return median, 99th percentile and maximum of wall times, in ms, by the nearest rank."""
+    """Return median, 99th percentile and maximum, in ms, of wall times in ``seconds``; percentiles by nearest rank."""
     ordered = np.sort(seconds)
     shares = {"median_ms": 0.5, "p99_ms": 0.99, "max_ms": 1.0}
     return {name: 1e3 * float(ordered[round(share * (len(ordered) - 1))]) for name, share in shares.items()}
 
 
 def step_times_in_words(step_times: dict[str, Any]) -> str:
-    """Return the wall times of the control law on one line: by node, and of the loop as a whole where it is known."""
+    """Return one line of text with the wall times of the laws by node, and of a step of the whole loop if known."""
     times = [
         f"{name} {times['median_ms']:.3g} ms in the median, 99 % {times['p99_ms']:.3g}, largest {times['max_ms']:.3g}"
         for name, times in step_times["nodes"].items()
@@ -98,7 +97,7 @@ def step_times_in_words(step_times: dict[str, Any]) -> str:
 
 
 def flight_of(components: Components, history: History) -> Flight:
-    """Return the flight of ``components`` with its ``history``."""
+    """Return the flight that ``components`` have flown, with this ``history``."""
     plant = components.plant
     diverged = not in_model_range(history.state[-1], plant.vehicle.angle_limit)
     status = FlightStatus.DIVERGED if diverged else FlightStatus.FINISHED
@@ -108,6 +107,6 @@ def flight_of(components: Components, history: History) -> Flight:
 
 
 def fault_start(components: Components, rows: int) -> float | None:
-    """Return the start (s) of the first fault within a flight of ``rows`` steps, None without one."""
+    """Return the time (s) at which the first fault starts, None if no fault starts within ``rows`` steps."""
     first = min((row.start for row in components.fault_injector.known), default=NEVER)
     return first * components.plant.period if first < rows else None

@@ -1,4 +1,4 @@
-"""Scenarios with governed commands: the same flight along the fastest reference that its design has room for."""
+"""Scenarios with governed commands: the same flight along the fastest reference that its design permits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hsv.flight.scenario import load_scenario, scenario_table, scenario_text
 
 @dataclass(frozen=True)
 class GovernedScenario:
-    """The text of a scenario with governed commands, their reference, and the bounds that its plan keeps."""
+    """A scenario with governed commands: its text, its reference, and the bounds that the nominal plan keeps."""
 
     text: str
     reference: GovernedReference
@@ -26,11 +26,11 @@ class GovernedScenario:
 
 
 def governed(name: str, blend: float) -> GovernedScenario:
-    """Return the scenario ``name`` (or path) with its commands governed, corners blended over twice ``blend`` (s).
+    """Return the scenario ``name`` (or path) with governed commands; corners are blended over twice ``blend`` (s).
 
     Raises:
         ScenarioError: There is no such scenario, or it cannot be flown.
-        GovernorError: It has no certified plan to govern, or a command for which nothing fits.
+        GovernorError: Controller, design or nominal law do not certify a plan, or no reference fits a command.
     """
     scenario = load_scenario(name)
     components = assemble_flight(scenario)

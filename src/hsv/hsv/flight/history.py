@@ -10,24 +10,24 @@ import numpy as np
 from hsv.model.signals import N_INPUTS, N_STATES
 
 X, Q_F, X_N, U_N, U, ACTUATOR, SIGNAL_COLUMNS = accumulate((0, N_STATES, 1, N_STATES, N_INPUTS, N_INPUTS, N_INPUTS))
-"""First columns of x, q_f, x_n, u_n, command u and actuator input in :attr:`History.signals`; then their number."""
+"""First column of x, q_f, x_n, u_n, command u and actuator input in :attr:`History.signals`, and the total number."""
 
 GAIN_INDEX, U_UNSATURATED, AUXILIARY_COLUMNS = accumulate((0, 1, N_INPUTS))
-"""First columns of gain index and unsaturated input in :attr:`History.auxiliary`, and the total number."""
+"""First column of gain index and unsaturated input in :attr:`History.auxiliary`, and the total number."""
 
 
 def _signals(first: int, end: int, meaning: str) -> property:
-    """Return a property with some columns of :attr:`History.signals`."""
+    """Return a property of :class:`History`: the columns ``first`` to ``end`` - 1 of its ``signals``."""
     return property(lambda history: history.signals[:, first:end], doc=meaning)
 
 
 class _Matrices(NamedTuple):
     signals: np.ndarray
-    """(n + 1, 25): the signals of the fingerprint"""
+    """(n + 1, 25): x, q_f, x_n, u_n, u and actuator input, which the fingerprint digests"""
     auxiliary: np.ndarray
-    """(n + 1, 3): auxiliary signals"""
+    """(n + 1, 3): index of the nominal gain, 0 for the outermost ellipsoid, and unsaturated input"""
     estimated: np.ndarray | None
-    """(n + 1, 9): measured or estimated state, None if that is the state itself"""
+    """(n + 1, 9): state that the controller receives, measured or estimated; None if it is the true state"""
 
 
 class History(_Matrices):
@@ -35,7 +35,7 @@ class History(_Matrices):
 
     @classmethod
     def empty(cls, rows: int, *, estimated: bool = True) -> History:
-        """Return an empty history of ``rows`` steps, with the measured or estimated state if ``estimated``."""
+        """Return a history of ``rows`` uninitialised steps; ``estimated`` adds an estimate besides the true state."""
         numbers = cls.numbers() if estimated else SIGNAL_COLUMNS + AUXILIARY_COLUMNS
         return cls.over(np.empty(rows * numbers), rows, estimated=estimated)
 
@@ -50,7 +50,7 @@ class History(_Matrices):
 
     @classmethod
     def over(cls, memory: np.ndarray, rows: int, *, estimated: bool = True) -> History:
-        """Return a history of ``rows`` steps in ``memory`` (..., numbers), one matrix after the other."""
+        """Return a history of ``rows`` steps in ``memory``, whose last axis holds one matrix after the other."""
         matrices, start = [], 0
         for width in (SIGNAL_COLUMNS, AUXILIARY_COLUMNS, N_STATES)[: 3 if estimated else 2]:
             stop = start + rows * width
@@ -60,21 +60,21 @@ class History(_Matrices):
 
     @staticmethod
     def numbers() -> int:
-        """Return the number of values of a step."""
+        """Return the number of values per step, with an estimated state."""
         return SIGNAL_COLUMNS + AUXILIARY_COLUMNS + N_STATES
 
     state = _signals(X, Q_F, "State x (n + 1, 9)")
-    filtered_pitch_rate = property(lambda self: self.signals[:, Q_F], doc="q_f (n + 1), rad/s")
-    deviation = _signals(X_N, U_N, "x_n (n + 1, 9)")
-    nominal_input = _signals(U_N, U, "u_n (n + 1, 2)")
-    command = _signals(U, ACTUATOR, "Input u (n + 1, 2)")
-    actuator = _signals(ACTUATOR, SIGNAL_COLUMNS, "Input of the actuators (n + 1, 2)")
-    gain_index = property(lambda self: self.auxiliary[:, GAIN_INDEX], doc="Index in the nested family (n + 1)")
-    u_unsaturated = property(lambda self: self.auxiliary[:, U_UNSATURATED:], doc="Input before saturation (n + 1, 2)")
+    filtered_pitch_rate = property(lambda self: self.signals[:, Q_F], doc="Filtered pitch rate q_f (n + 1), rad/s")
+    deviation = _signals(X_N, U_N, "Nominal deviation x_n (n + 1, 9)")
+    nominal_input = _signals(U_N, U, "Nominal input u_n (n + 1, 2)")
+    command = _signals(U, ACTUATOR, "Command u (n + 1, 2), limited to the input range")
+    actuator = _signals(ACTUATOR, SIGNAL_COLUMNS, "Command after link and command faults (n + 1, 2)")
+    gain_index = property(lambda self: self.auxiliary[:, GAIN_INDEX], doc="Index of the nominal gain (n + 1)")
+    u_unsaturated = property(lambda self: self.auxiliary[:, U_UNSATURATED:], doc="Command before saturation (n + 1, 2)")
 
     @property
     def estimate(self) -> np.ndarray:
-        """State that the controller receives (n + 1, 9): measured, or estimated if an estimator is enabled."""
+        """The state that the controller receives (n + 1, 9): measured, or estimated if an estimator is enabled."""
         return self.state if self.estimated is None else self.estimated
 
     def columns(self) -> dict[str, np.ndarray]:
@@ -103,4 +103,4 @@ SIGNALS = (
     "command",
     "actuator",
 )
-"""Signals of a :class:`History`, in the order of the loop."""
+"""Names of the signals of a :class:`History`, in the order in which the loop computes them."""

@@ -1,4 +1,4 @@
-"""The metrics of a flight, for recorded flights and for flights in one process."""
+"""The data of a simulated or recorded flight, and the metrics that are computed from them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DECAY_LEVEL = 0.05
 """Largest magnitude of a decayed elastic rate, as a share of its peak after the fault."""
 
 PRE_FAULT_WINDOW = 5.0
-"""Length of the window before the fault over which the mean is taken, s."""
+"""Length of the window before the fault over which the mean attitude is taken, s."""
 
 
 class Group(StrEnum):
@@ -45,7 +45,10 @@ class Metric:
 
 
 def _tracking(axis: str, symbol: str, unit: str, integral: str) -> dict[str, Metric]:
-    """Return the metrics of an axis: its name, symbol and unit (SI), and the unit of the integral of its error."""
+    """Return the definitions of the tracking metrics of one axis, altitude or velocity, by name.
+
+    ``symbol`` and ``unit`` (SI) are those of the axis; ``integral`` is the unit of its error integrated over time.
+    """
     error = f"{symbol} - {symbol}_r"
     settled = f"last time before the fault that {axis} is more than 2 % of the step off"
     over = f"largest excess over the {axis} step before the fault, share of the step"
@@ -90,7 +93,7 @@ METRICS = {
     "elevator_deflection_maximum": Metric("rad", "largest command", Group.inputs),
     "saturated_steps": Metric("1", "steps in which a command was limited", Group.inputs, counted=True),
 }
-"""All metrics in the order of the files."""
+"""The definitions of all metrics by name, in the order in which files contain them."""
 
 CRITERIA = (
     "altitude_end_error",
@@ -100,11 +103,11 @@ CRITERIA = (
     "elastic_decay_time",
     "saturated_steps",
 )
-"""The metrics by which the paper judges a flight; a report names those for which the scenario has no limit."""
+"""The metrics by which the paper judges a flight. A report names those for which the scenario has no limit."""
 
 
 def in_words(name: str) -> str:
-    """Return the display name of a metric or of another identifier: the same words."""
+    """Return the ``name`` of a metric, or another identifier, as words separated by spaces."""
     return name.replace("_", " ")
 
 
@@ -125,7 +128,7 @@ class FlightData:
     """Simulated time (n + 1), s"""
     history: History
     reference: np.ndarray
-    """x_r (n + 1, 9)"""
+    """Reference state x_r (n + 1, 9)"""
     fault_start: float | None
     """Time of the first fault (s), None without a fault"""
 
@@ -143,7 +146,7 @@ class FlightData:
         """The curves (10, n + 1) from which metrics are computed, SI.
 
         Errors of altitude and velocity, angle of attack, pitch angle, the two elastic rates, the two commands, and the
-        absolute differences of angle of attack and pitch angle from reference + nominal.
+        absolute differences of angle of attack and pitch angle from x_r + x_n.
         """
         return self._evaluated[0]
 
@@ -159,7 +162,10 @@ class FlightData:
 
 
 def _metrics(flight: FlightData) -> dict[str, float]:
-    """Return the metrics of a flight, SI, without those that it does not define (no step, no fault)."""
+    """Return the metrics of a flight, SI, by name, in the order of :data:`METRICS`.
+
+    Metrics of a step, a fault or an elastic mode are omitted if the flight has none.
+    """
     values: dict[str, float] = {}
     time, curves = flight.time, flight.curves
     faultless = len(time) if flight.fault_start is None else int(np.searchsorted(time, flight.fault_start - 1e-9))
@@ -193,7 +199,11 @@ def _metrics(flight: FlightData) -> dict[str, float]:
 
 
 def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
-    """Return rise time (s), settling time (s) and overshoot of a step response; the first error is the step size."""
+    """Return rise time (s), settling time (s) and overshoot (share of the step) of a step response, by name.
+
+    ``time`` (n) is in seconds, ``error`` (n) is the tracking error; its first value is the size of the step. A time
+    that is not reached is omitted. Without a step the result is empty.
+    """
     if len(time) < 2 or abs(error[0]) < 1e-6:
         return {}
     done = 1.0 - error / error[0]
@@ -207,6 +217,9 @@ def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
 
 
 def _decay_time(time: np.ndarray, magnitude: np.ndarray) -> float:
-    """Return the time (s) at which ``magnitude`` last exceeds the decay level of its peak; NaN counts as above."""
+    """Return the time (s) after ``time[0]`` at which ``magnitude`` last exceeds :data:`DECAY_LEVEL` times its peak.
+
+    A magnitude that is NaN counts as above the level.
+    """
     above = np.nonzero(~(magnitude <= DECAY_LEVEL * np.max(magnitude)))[0]
     return float(time[above[-1]] - time[0]) if len(above) else 0.0

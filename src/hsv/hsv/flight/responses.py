@@ -1,4 +1,4 @@
-"""Linear responses along a flight: of the notch filter, and of the error to the lag of the plan."""
+"""Linear responses along a flight: of the notch filter, and of the tube error to the lag of the actuators."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from hsv.model.signals import N_INPUTS, N_RIGID
 
 
 def along_filter(notch: Struct, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return ``rate`` (k) filtered, from rest for its first value, and the filter's states (k, s) before each step."""
+    """Return the output (k) of the notch filter for the pitch ``rate`` (k), and its states (k, s) before each step.
+
+    The filter starts at the equilibrium for the first rate; s is twice its number of sections.
+    """
     filtered, states = np.empty(len(rate)), np.empty((len(rate), 2 * len(notch.D)))
     lib.hsv_notch_along(notch.pointer, len(rate), *map(doubles, (vector(rate), filtered, states)))
     return filtered, states
@@ -24,10 +27,17 @@ def lag_response(
     scheduled: np.ndarray,
     lag: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the effect of the plan's lag on e (k, n) and on the feedback (k, 2), in closed loop, from zero.
+    """Return the response of the error e (k, n) and of the feedback (k, 2) to the lag of the plan, from zero.
 
-    ``gain`` (2, 5): F, with its factor; ``scheduled`` (k, 2): altitude and velocity of the flight; ``lag`` (k, 2): mean
-    position of actuators driven by the plan, less the plan.
+    The loop is closed. The n states of e are those of the rigid body (5), the notch filter and the actuators.
+
+    Args:
+        polytope: Model of the vehicle.
+        gain: (2, 5) feedback gain, tau F.
+        notch: Notch filter.
+        actuators: Sampled actuators.
+        scheduled: (k, 2) altitude (m) and velocity (m/s) of the flight.
+        lag: (k, 2) mean positions of actuators driven by the plan, less the plan.
     """
     a, s, data = len(actuators.A), 2 * len(notch.D), polytope.data()
     errors, feedback = np.empty((len(lag), N_RIGID + s + a)), np.empty((len(lag), N_INPUTS))
