@@ -1,8 +1,8 @@
-"""Distributions in the place of numbers of a scenario, from which a campaign draws.
+"""Distributions that replace numbers in a scenario, and from which a campaign draws.
 
 In a file: ``{ uniform = ["-5 deg", "5 deg"] }``, least and largest value, or ``{ normal = ["0 ft", "10 ft"] }``, mean
-and standard deviation. A normal distribution ends at three standard deviations: what a campaign may come to fly is
-known, and checked, before its first flight. What is drawn has the same bits on every processor.
+and standard deviation. A normal distribution is truncated at three standard deviations, so that the extreme values can
+be checked before the first flight of a campaign. Drawn values have the same bits on every processor.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from hsv.base.units import parse_quantity, rounded
 from hsv.core.arithmetic import logarithm, of_each
 
 KINDS = {"uniform": "[least, largest]", "normal": "[mean, standard deviation]"}
-"""The distributions by the word that a file has for them, with their two values."""
+"""Kinds of distributions by their key in a file, each with the meaning of its two values."""
 
 TRUNCATION = 3.0
 """Standard deviations from the mean to either end of a normal distribution."""
 
 _BELOW = 0.0013498980316300946
-"""Share of a whole normal distribution below its mean less three standard deviations."""
+"""Probability that a normal variable is more than three standard deviations below its mean."""
 
 # Coefficients of the numerator and the denominator of a normal distribution's quantile, of the highest power first
 # (Wichura 1988, algorithm AS 241).
@@ -51,7 +51,10 @@ _TAIL = (
 
 
 def standard_quantiles(shares: np.ndarray) -> np.ndarray:
-    """Return the quantiles of the standard normal distribution at ``shares`` (n), 1e-10 to 1 - 1e-10, to 1e-15."""
+    """Return the quantiles (n) of the standard normal distribution at the probabilities ``shares`` (n).
+
+    The error is about 1e-15 for probabilities from 1e-10 to 1 - 1e-10.
+    """
     q = shares - 0.5
     middle = np.abs(q) <= 0.425
     tail = np.sqrt(-of_each(logarithm, np.where(q < 0.0, shares, 1.0 - shares))) - 1.6
@@ -77,12 +80,12 @@ class Distribution:
 
     @property
     def middle(self) -> float:
-        """Mean, rounded down for integers; the value when nothing is drawn."""
+        """The mean, rounded down for integers; it is the value of a single flight outside a campaign."""
         mean = (self.low + self.high) / 2.0
         return float(np.floor(mean)) if self.whole else rounded(mean)
 
     def quantiles(self, shares: np.ndarray) -> np.ndarray:
-        """Return the quantiles at ``shares`` (0 to 1), rounded to 15 digits."""
+        """Return the quantiles (n) at the probabilities ``shares`` (n), rounded to 15 digits."""
         if self.kind == "normal":
             deviation = (self.high - self.low) / (2.0 * TRUNCATION)
             values = (self.low + self.high) / 2.0 + deviation * standard_quantiles(
@@ -93,15 +96,15 @@ class Distribution:
             values = np.floor(self.low + (self.high - self.low + 1.0) * shares)
         else:
             values = self.low + (self.high - self.low) * shares
-        # As many digits as a scenario file keeps: a flight is then the same whichever way it is asked for.
+        # Rounded as in a scenario file, so that a flight of the campaign is the same when flown from such a file.
         return np.array([rounded(value) for value in np.where(shares == 1.0, self.high, values).tolist()])
 
 
 def read_distribution(given: Mapping[str, Any], unit: str, field: str, *, whole: bool = False) -> Distribution:
-    """Return the distribution written in the inline table of a scenario's ``field``, in place of a number in ``unit``.
+    """Return the distribution in the inline table ``given`` for a scenario's ``field``, whose numbers are in ``unit``.
 
     Raises:
-        QuantityError: Another kind, no pair of quantities in this unit, or one that is out of order or not whole.
+        QuantityError: Unknown kind, no pair of quantities in this unit, wrong order, or no integers although ``whole``.
     """
     forms = " or ".join(f"{{ {kind} = {pair} }}" for kind, pair in KINDS.items())
     if len(given) != 1 or next(iter(given)) not in KINDS:

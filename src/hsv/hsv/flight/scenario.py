@@ -50,14 +50,14 @@ from hsv.model.vehicle import DEFAULT_VEHICLE, SHIPPED_VEHICLES, vehicle_label, 
 
 
 class Scenario(Table):
-    """A flight: vehicle, initial point, commands, controller and its design, faults, and limits of metrics."""
+    """The description of a flight: vehicle, initial point, commands, controller, design, faults, limits of metrics."""
 
     name: str
     title: Annotated[str, Field(pattern=r"\S")]
     design: str = "baseline"
     """Name or path of the controller's design; empty: none"""
     controller: str = "tube_mpc"
-    """A registered name, ``package.module:Class``, or ``path/lib.so:symbol``, the path absolute"""
+    """A registered name, ``package.module:Class``, ``node:...``, or the absolute path of ``lib.so:symbol`` or an FMU"""
     duration: Time
     vehicle: VehicleTable = VehicleTable()
     initial: InitialTable
@@ -67,21 +67,22 @@ class Scenario(Table):
     seed: Annotated[StrictInt, Field(ge=0, le=SEED_PARAMETER.maximum)] = 0
     """Seed of all random numbers"""
     settings: dict[str, Any] = Field(default_factory=dict)
-    """Parameters of the components, SI, by their names in a file, where they are in the tables :data:`SETTINGS`"""
+    """Parameters of the components, SI, by their dotted names in a file, from the tables :data:`SETTINGS`"""
     own: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    """Tables of a custom controller, as written; only its class, which is not loaded here, knows their meaning"""
+    """Tables of a custom controller, as written in the file; only the class of the controller can interpret them"""
     limits: dict[str, float] = Field(default_factory=dict)
-    """Largest admissible magnitude of a metric, SI"""
+    """Largest admissible magnitudes of metrics, SI, by name"""
 
     @property
     def commands(self) -> Breakpoints:
-        """The commanded altitudes (m) and velocities (m/s)."""
+        """The breakpoints of the reference that the commands define: times (s), altitudes (m) and velocities (m/s)."""
         return breakpoints(self.initial.altitude, self.initial.velocity, self.command)
 
     def parameters(self) -> dict[str, Any]:
         """Return the flat parameters of this scenario, without those of a custom controller.
 
-        With those (:func:`hsv.flight.assembly.scenario_parameters`) and the design's they determine the flight.
+        They determine the flight together with the design and a custom controller's parameters, see
+        :func:`hsv.flight.assembly.scenario_parameters`.
         """
         values: dict[str, Any] = {
             "duration": self.duration,
@@ -98,7 +99,7 @@ class Scenario(Table):
         if self.tube.tau:
             values["feedback.tau"] = list(self.tube.tau)
         if self.tube.change:
-            # A flat parameter is a list of one type: five factors per change.
+            # A flat parameter is a list of numbers, so the five factors of all changes follow one another.
             values["tau_change.starts"] = [change.start for change in self.tube.change]
             values["tau_change.values"] = [
                 tau for change in self.tube.change for tau in rigid_factors(change.tau, "tube.change.tau").tolist()
@@ -114,10 +115,10 @@ class Scenario(Table):
 
 
 PERIOD = 0.02
-"""Control period, s, with which equipment is checked before the design is known; the result does not depend on it."""
+"""Control period (s) for checks of the equipment before the design is known; their result does not depend on it."""
 
 _FLOWN_NOTCH = {p.name.replace("notch.flown.", "notch."): p.name for p in FLOWN_NOTCH_PARAMETERS}
-"""Parameters of a notch filter that replaces the design's, by their names in a file."""
+"""Names of the parameters of a notch filter that replaces the design's, by their names in a scenario file."""
 
 _LOOP_PARAMETERS = ("reference.trim", "reference.blend", "notch.enabled", "nominal.law", "integral.rate")
 """Parameters of reference, filter and laws that a file sets; a design or the scenario's commands set the others."""
@@ -133,7 +134,7 @@ _PARAMETERS = (
 )
 
 SETTINGS = frozenset(parameter.name.partition(".")[0] for parameter in _PARAMETERS)
-"""Tables of the components: reference, notch filter, laws, hardware (ideal by default) and estimators."""
+"""Tables of a scenario file that set parameters of components: reference, filter, laws, hardware and estimators."""
 
 _LIMITS = tuple(
     Parameter(f"limits.{name}", 0.0, metric.meaning, metric.unit, 0.0, whole=metric.counted)
@@ -144,10 +145,10 @@ _NO_KEYS = ("name", "own", "settings")
 """Fields that are not keys of a file."""
 
 _CONTROLLER_TABLES = dict.fromkeys(("tube", "integral", "effectiveness"), "tube_mpc") | {"robust_mpc": "robust_mpc"}
-"""Tables that only one of the shipped controllers reads."""
+"""Tables that only one of the shipped controllers reads, each with the name of that controller."""
 
 REPLACED = ("limits",)
-"""Tables that a scenario does not share with the one it extends."""
+"""Tables that replace those of the extended scenario as a whole; all other tables are merged."""
 
 
 def scenario_names() -> list[str]:
@@ -156,12 +157,12 @@ def scenario_names() -> list[str]:
 
 
 def scenario_text(name: str) -> str:
-    """Return the text of a scenario by name or path, with what it extends, and a vehicle that is not shipped.
+    """Return the complete TOML text of a scenario, given by name or path.
 
-    The path of a library is absolute.
+    It includes the scenarios that it extends and the vehicle, unless that is a shipped one. Library paths are absolute.
 
     Raises:
-        ScenarioError: No such scenario, file or vehicle, it cannot be read, or a path leads out of its folder.
+        ScenarioError: Scenario, file or vehicle does not exist or cannot be read, or a path leads out of its folder.
     """
     text = _own_text(name)
     own = scenario_table(text, name)
@@ -173,9 +174,9 @@ def scenario_text(name: str) -> str:
 
 
 def _located(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return the table of a file with paths relative to the working directory.
+    """Return the ``table`` of the scenario file ``name`` with paths relative to the working directory.
 
-    A named vehicle replaces the definition of the vehicle that the scenario would inherit.
+    The path of a library becomes absolute. A named vehicle replaces the vehicle definition of the extended scenario.
     """
     folder = Path(name).parent if is_path(name) else Path()
     controller, vehicle = table.get("controller"), table.get("vehicle", {})
@@ -192,7 +193,7 @@ def _located(table: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def _with_definition(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return a scenario with its vehicle written out, unless it is a shipped one."""
+    """Return the ``table`` of a scenario with the contents of its vehicle file, unless the vehicle is shipped."""
     vehicle = {key: value for key, value in table.get("vehicle", {}).items() if value is not None}
     place = vehicle.get("name", DEFAULT_VEHICLE)
     if "definition" not in vehicle and place not in SHIPPED_VEHICLES:
@@ -204,7 +205,7 @@ def _with_definition(table: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def _refused(name: str, why: object) -> ScenarioError:
-    """Return the error of a scenario, by name or path."""
+    """Return the error for the scenario ``name`` (or path) with the reason ``why``."""
     return ScenarioError(f"scenario {(Path(name).stem if is_path(name) else name)!r}: {why}")
 
 
@@ -220,7 +221,7 @@ def _own_text(name: str) -> str:
 
 
 def scenario_table(text: str, name: str) -> dict[str, Any]:
-    """Return the table of a scenario's ``text``; a vehicle given by its name becomes a table."""
+    """Return the contents of a scenario's TOML ``text``; a vehicle given by name alone becomes a table."""
     try:
         table = parse_toml(text)
     except DocumentError as error:
@@ -231,7 +232,7 @@ def scenario_table(text: str, name: str) -> dict[str, Any]:
 
 
 def _with_named_vehicle(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return a scenario in which the vehicle is a table, even if it is given by its name alone."""
+    """Return the ``table`` of a scenario with the vehicle as a table, even if it is given by name alone."""
     vehicle = table.get("vehicle", {})
     if isinstance(vehicle, str):
         vehicle = {"name": vehicle}
@@ -245,10 +246,10 @@ def _with_named_vehicle(table: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Scenario:
-    """Return a scenario by name or path, with fields changed, such as ``{"fault[0].start": "90 s"}``.
+    """Return a scenario by name or path, with ``changes`` of its fields such as ``{"fault[0].start": "90 s"}``.
 
     Raises:
-        ScenarioError: There is no such scenario, or a field is wrong, which is named with value and expectation.
+        ScenarioError: There is no such scenario, or a field is wrong; the message has field, value and expectation.
     """
     text = scenario_text(name)
     if changes:
@@ -265,7 +266,7 @@ def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Sce
 
 
 def set_field(table: dict[str, Any], field: str, value: object, name: str) -> None:
-    """Set a ``field`` of the scenario in ``table`` to a value as written in a file."""
+    """Set a ``field`` such as ``fault[0].start`` in the ``table`` of a scenario to a ``value`` as written in a file."""
     *path, key = (int(part) if part.isdecimal() else part for part in re.findall(r"[^.\[\]]+", field) or [""])
     place: Any = table
     for part in path:
@@ -281,14 +282,14 @@ def set_field(table: dict[str, Any], field: str, value: object, name: str) -> No
 
 
 def with_controller(text: str, controller: str, name: str) -> str:
-    """Return a scenario's ``text`` with another controller, without the tables of the former one."""
+    """Return a scenario's ``text`` with another ``controller``, without the tables of the previous controller."""
     table = scenario_table(text, name)
     kept = {key: value for key, value in table.items() if key not in (*_CONTROLLER_TABLES, *_custom_tables(table))}
     return tomli_w.dumps(kept | {"controller": controller})
 
 
 def parse_scenario(text: str, name: str) -> Scenario:
-    """Return the scenario written in ``text``, as :func:`scenario_text` returns it; errors as :func:`load_scenario`."""
+    """Return the scenario in ``text``, as :func:`scenario_text` returns it; errors as in :func:`load_scenario`."""
     scenario, drawn = scenario_at_means(scenario_table(text, name), name)
     if drawn:
         field = next(iter(drawn))
@@ -297,7 +298,7 @@ def parse_scenario(text: str, name: str) -> Scenario:
 
 
 def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[str, Distribution]]:
-    """Return the scenario in ``table`` with the mean of each distribution, and the distributions by field."""
+    """Return the scenario in ``table`` with distributions replaced by their means, and the distributions by field."""
     complete = table
     vehicle = table.get("vehicle", {})
     if is_path(vehicle.get("name", "")) and "definition" not in vehicle:
@@ -347,7 +348,7 @@ def _shipped() -> Any:
 
 
 def _custom_tables(table: dict[str, Any]) -> dict[str, Any]:
-    """Return the tables of a custom controller."""
+    """Return the tables that only a custom controller can read, by name; empty with a shipped controller."""
     if table.get("controller", Scenario.model_fields["controller"].default) in SHIPPED_CONTROLLERS:
         return {}
     known = Scenario.model_fields.keys() | SETTINGS
@@ -355,7 +356,7 @@ def _custom_tables(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def _check(scenario: Scenario, tables: Collection[str]) -> None:
-    """Refuse what contradicts itself in a scenario, whose file has these ``tables``."""
+    """Refuse a ``scenario`` whose fields contradict each other; ``tables`` are the top-level keys of its file."""
     if not scenario.design and scenario.controller in SHIPPED_CONTROLLERS:
         raise ScenarioError(f"design = '': expected one, {scenario.controller} flies with its gains")
     for name, value in scenario.vehicle.perturbation.items():
@@ -385,7 +386,10 @@ def _check(scenario: Scenario, tables: Collection[str]) -> None:
 
 
 def _check_starts(scenario: Scenario) -> None:
-    """Refuse what begins after the end of the flight, and simultaneous changes of tau; a ramp may end after it."""
+    """Refuse events that start after the flight's end, simultaneous changes of tau, and faults without a duration.
+
+    A ramp or a fault may end after the flight.
+    """
     changes = [change.start for change in scenario.tube.change]
     starts = {
         "command[{}].start": [command.start for command in scenario.command],
@@ -416,7 +420,7 @@ _DUE = {
     "greater_than_equal": "at least {ge}",
     "less_than_equal": "at most {le}",
 }
-"""Expectations by pydantic's type of a problem; the other types have a message of their own."""
+"""Expected values in words, by pydantic's type of error; for other types, pydantic's own message is used."""
 
 
 def _first_problem(error: ValidationError) -> str:
@@ -427,7 +431,7 @@ def _first_problem(error: ValidationError) -> str:
     if problem["type"] == "missing":
         return f"{field}: missing"
     if problem["type"] == "value_error":
-        # The message begins with the name of the field; its path is clearer.
+        # The message begins with the name of the field alone; replace it by the full path.
         _, equals, rest = str(problem["ctx"]["error"]).partition(" = ")
         return f"{field}{equals}{rest}"
     due = _DUE.get(problem["type"]) or problem["msg"].removeprefix("Input should be ")

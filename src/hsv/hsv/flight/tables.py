@@ -25,7 +25,7 @@ from hsv.model.vehicle import DEFAULT_VEHICLE, Vehicle, load_vehicle, parse_vehi
 
 @contextmanager
 def renamed(old: str, new: str) -> Iterator[None]:
-    """Turn the error of a parameter into that of a scenario, with another name of the field."""
+    """Turn a ``ParameterError`` into a ``ScenarioError``, with ``old`` in the message replaced by ``new``."""
     try:
         yield
     except ParameterError as error:
@@ -34,20 +34,20 @@ def renamed(old: str, new: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Reading:
-    """The context in which a scenario is validated."""
+    """The context of a scenario's validation: its vehicle, and the distributions found so far."""
 
     vehicle: Vehicle
     """The scenario's vehicle, with its flight envelope and its sets of inertial coupling"""
     drawn: dict[int, Distribution] = field(default_factory=dict)
-    """Distributions, by the identity of the table in which they are written"""
+    """Distributions by ``id()`` of the inline table in which each is written"""
 
     def distribution(self, table: dict[str, Any], unit: str, name: str, *, whole: bool = False) -> Distribution:
-        """Return the distribution in ``table``, and record it."""
+        """Return the distribution of the field ``name`` in its inline ``table``, in ``unit``, and record it."""
         found = self.drawn[id(table)] = read_distribution(table, unit, name, whole=whole)
         return found
 
     def number(self, parameter: Parameter, value: object, name: str) -> float:
-        """Return a number in a file, or the mean of a distribution in its place."""
+        """Return the ``value`` of a ``parameter`` in a file (SI), or the mean of a distribution in its place."""
         if not isinstance(value, dict):
             return read_number(parameter, value, name)
         drawn = self.distribution(value, parameter.unit or "1", name, whole=parameter.whole)
@@ -59,25 +59,25 @@ class Reading:
     def custom_value(self, name: str, value: object) -> Any:
         """Return an entry of a custom controller's table, with means in place of distributions.
 
-        Only the controller's class knows the unit; a distribution has that of its first value.
+        Only the controller's class knows the unit, so a distribution has the SI unit of its first value.
         """
         if isinstance(value, list):
             return [self.custom_value(name, entry) for entry in value]
         if not isinstance(value, dict):
             return value
         if value and all(isinstance(entry, str) for entry in value.values()):
-            return value  # names, no numbers
+            return value  # a table of texts, not a distribution
         pair = next(iter(value.values()), None)
         first = pair[0] if isinstance(pair, list) and pair else None
         drawn = self.distribution(value, si_unit_of(first), name)
         return written(drawn.middle, drawn.unit)
 
     def fault(self, name: str, row: dict[str, Any]) -> dict[str, Any]:
-        """Return a fault of a file in the form of :class:`FaultTable`, with its parameters in a nested table."""
+        """Return the ``row`` of a fault in the form of :class:`FaultTable`, with its parameters in a nested table."""
         common = {key: row[key] for key in FaultTable.model_fields if key in row and key != "parameters"}
         channel, kind = (row.get(key) for key in ("channel", "type"))
         if not (isinstance(channel, str) and isinstance(kind, str)):
-            return common  # the model refuses it
+            return common  # the validation of FaultTable refuses it
         with renamed("fault.", f"{name}."):
             known = {parameter.name: parameter.of(channel) for parameter in fault_parameters(channel, kind)}
         parameters = {}
@@ -104,10 +104,10 @@ def quantity(
     axis: str = "",
     bare: bool = True,
 ) -> BeforeValidator:
-    """Return a validator of a quantity within ``limits`` (SI), which are ``shown`` in words.
+    """Return a validator of a quantity within ``limits`` (SI), which error messages describe as ``shown``.
 
-    With an ``axis``, altitude or velocity, the limits are the envelope of the scenario's vehicle. Unless ``bare``, the
-    unit must be given: 5 might mean 5 %, and would be read as 500 %.
+    With an ``axis``, altitude or velocity, the limits are the envelope of the scenario's vehicle. Unless ``bare``, a
+    number without a unit is refused, because 5 might mean 5 % but would be read as 500 %.
     """
 
     def parse(text: object, info: ValidationInfo) -> float:
@@ -125,7 +125,7 @@ def quantity(
 
 
 def _numbers(given: object, info: ValidationInfo) -> tuple[float, ...]:
-    """Return one or several dimensionless numbers."""
+    """Return a dimensionless number, or a list of them, as a tuple."""
     texts = given if isinstance(given, list | tuple) else [given]
     if not texts:
         raise QuantityError(f"{info.field_name} = []: expected one value at least")
@@ -133,13 +133,13 @@ def _numbers(given: object, info: ValidationInfo) -> tuple[float, ...]:
 
 
 def envelope(limits: tuple[float, float], unit: str) -> str:
-    """Return the limits (SI) of the flight envelope on an axis with this SI ``unit`` in words, in feet."""
+    """Return the flight envelope on an axis as text in feet or ft/s; ``limits`` are in the SI ``unit`` of the axis."""
     low, high = (to_paper(limit, unit) for limit in limits)
     return f"{low[0]:.0f} {low[1]} to {high[0]:.0f} {high[1]}, the flight envelope"
 
 
 def _ends_and_mean(text: object, unit: str, info: ValidationInfo) -> tuple[tuple[float, float], float]:
-    """Return minimum, maximum and mean of a number or distribution, in ``unit``."""
+    """Return (minimum, maximum) and the mean of a number or distribution, in ``unit``."""
     name = str(info.field_name)
     if isinstance(text, dict):
         drawn = _reading(info).distribution(text, unit, name)
@@ -149,7 +149,7 @@ def _ends_and_mean(text: object, unit: str, info: ValidationInfo) -> tuple[tuple
 
 
 def _coupling(given: object, info: ValidationInfo) -> str:
-    """Return a set of inertial coupling of the scenario's vehicle, or a multiple of the derived set."""
+    """Return the checked name of a set of inertial coupling of the vehicle, or of a multiple of the derived set."""
     vehicle = _reading(info).vehicle
     if isinstance(given, dict):
         (least, _), given = _ends_and_mean(given, "1", info)
@@ -170,30 +170,30 @@ class Table(BaseModel):
 
 
 class VehicleTable(Table):
-    """The simulated vehicle; ``vehicle = "glider"`` in place of the table gives the name alone."""
+    """The simulated vehicle; a file may give its name alone, ``vehicle = "glider"``, in place of the table."""
 
     name: str = DEFAULT_VEHICLE
-    """Registered name or path of a file; the name of ``definition`` if there is one"""
+    """Registered name, or path of a file; with a ``definition``, the name of that vehicle"""
     definition: dict[str, Any] = Field(default_factory=dict)
-    """The contents of the vehicle's file, which travel with the scenario; empty for a shipped vehicle"""
+    """The contents of the vehicle's file, stored in the scenario; empty for a shipped vehicle"""
     model: Literal["CM", "DM"] = "CM"
     coupling: Coupling = ""
     perturbation: dict[str, Change] = Field(default_factory=dict)
 
     @cached_property
     def described(self) -> Vehicle:
-        """The vehicle itself."""
+        """The vehicle that this table names or defines."""
         return _defined(self.name, json.dumps(self.definition)) if self.definition else load_vehicle(self.name)
 
 
 @lru_cache(maxsize=8)
 def _defined(name: str, text: str) -> Vehicle:
-    # Every flight of a campaign reads its scenario anew.
+    # Cached, because every flight of a campaign reads its scenario anew.
     return parse_vehicle(json.loads(text), name)
 
 
 class InitialTable(Table):
-    """Start of the flight, in trim."""
+    """The trimmed initial condition of the flight: altitude (m) and velocity (m/s)."""
 
     altitude: Annotated[float, quantity("m", axis="altitude")]
     velocity: Annotated[float, quantity("m/s", axis="velocity")]
@@ -222,21 +222,21 @@ class CommandTable(Table):
 
 
 class TauChangeTable(Table):
-    """A change of the tube's factor in flight."""
+    """A change of the tube factor tau in flight."""
 
     start: Time
     tau: Numbers
 
 
 class TubeTable(Table):
-    """The tube's feedback: its factor (by default the design's) and changes of it; one value, or five."""
+    """The tube factor tau (default: the design's) and its changes; one value, or one for each of five rigid states."""
 
     tau: Numbers = ()
     change: tuple[TauChangeTable, ...] = ()
 
 
 class FaultTable(Table):
-    """A scheduled fault; in a file its parameters stand next to the other keys."""
+    """A scheduled fault; in a file, its parameters are keys next to the others."""
 
     channel: str
     type: str
@@ -247,7 +247,7 @@ class FaultTable(Table):
 
 
 class Breakpoints(NamedTuple):
-    """The reference: times (s), altitudes (m), velocities (m/s), linear between; two equal times are a step."""
+    """Breakpoints of the piecewise-linear reference: times (s), altitudes (m), velocities (m/s); equal times: step."""
 
     times: tuple[float, ...]
     altitudes: tuple[float, ...]
@@ -255,16 +255,16 @@ class Breakpoints(NamedTuple):
 
 
 def breakpoints(altitude: float, velocity: float, commands: Sequence[CommandTable]) -> Breakpoints:
-    """Return the reference from an initial ``altitude`` (m) and ``velocity`` (m/s) along the ``commands``.
+    """Return the breakpoints of the reference from ``altitude`` (m) and ``velocity`` (m/s) along the ``commands``.
 
-    A step at t = 0 is one breakpoint: the reference begins at its end.
+    A step at t = 0 is a single breakpoint: the reference begins with the value after the step.
     """
     rows: list[tuple[float, float, float]] = []
     for time in sorted({t for c in commands for t in (c.start, c.end)} or {0.0}):
         shares = [c.share(time) for c in commands]
         before = [0.0 if c.start == c.end == time else share for c, share in zip(commands, shares, strict=True)]
         for acting in [before, shares] if time > 0.0 and before != shares else [shares]:
-            # An explicit sum: from Python 3.12 on, sum() adds numbers with compensation.
+            # Not sum(), which from Python 3.12 on compensates rounding and would give other bits.
             climbed = gained = 0.0
             for share, c in zip(acting, commands, strict=True):
                 climbed += share * c.altitude_change
@@ -290,7 +290,7 @@ def check_envelope(reference: Breakpoints, commands: Sequence[CommandTable], veh
 
 
 def tables_in(value: object, name: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield every table in ``value``, with the name of its field."""
+    """Yield the field name and the contents of every table in ``value``, including nested tables."""
     if isinstance(value, dict):
         yield name, value
         for key, entry in value.items():
