@@ -1,4 +1,4 @@
-"""Compare two tracks of one topic: number, order and bytes of the messages, then every field."""
+"""Comparison of two recordings of one topic: number, order and bytes of the messages, then every field."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hsv.bags.definitions import deserialized
 
 @dataclass(frozen=True)
 class Difference:
-    """A field of a message that differs from the expected one."""
+    """A difference between two recordings of a topic: in a field, in the time of a message, or a missing message."""
 
     topic: str
     step: int
@@ -31,7 +31,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Result of a comparison of two tracks; ``first`` is None if all fields are equal within the tolerance."""
+    """Result of comparing two recordings of a topic; ``first`` is None if all messages agree."""
 
     topic: str
     expected_count: int
@@ -44,11 +44,11 @@ class Comparison:
     """Number of common messages that differ in padding only; DDS does not initialise padding."""
     first: Difference | None = None
     largest: dict[str, float] = field(default_factory=dict)
-    """Largest |a - b| of each field with a difference; NaN for a field that is not a number."""
+    """Largest absolute difference of each field that differs, by field; NaN for a field that is not a number."""
 
     @property
     def identical(self) -> bool:
-        """Whether the tracks are equal in all bytes except padding."""
+        """Whether both recordings have the same messages, equal in all bytes except padding."""
         return (
             self.expected_count == self.actual_count == self.common_count
             and self.different_bytes == self.different_padding
@@ -57,10 +57,10 @@ class Comparison:
 
 
 def compare(expected: Track, actual: Track, tolerance: float = 0.0) -> Comparison:
-    """Compare two tracks of one topic, message by message at equal times.
+    """Compare two recordings of one topic, message by message at equal times.
 
-    Floating-point numbers count as equal if |a - b| <= max(tolerance, tolerance max(|a|, |b|)), if both are NaN, or if
-    both are the same infinity. Integers, texts and lists must be the same; lists of messages are compared by element.
+    Floating-point numbers a and b are equal if |a - b| <= max(tolerance, tolerance max(|a|, |b|)), if both are NaN, or
+    if both are the same infinity. Integers and texts must be the same. Lists are compared element by element.
 
     Args:
         expected: Recorded messages.
@@ -97,7 +97,7 @@ def compare(expected: Track, actual: Track, tolerance: float = 0.0) -> Compariso
 
 
 def _apart(expected: Track, actual: Track) -> Difference:
-    """Return the first difference in time of two tracks: a time in only one of them, or a different order."""
+    """Return the first difference between the times of two recordings: a time that one lacks, or a different order."""
     ours, theirs = expected.times, actual.times
     only = np.setxor1d(ours, theirs)
     swapped = (a for a, b in zip(ours, theirs, strict=False) if a != b)
@@ -114,7 +114,7 @@ def _apart(expected: Track, actual: Track) -> Difference:
 
 
 def _content(track: Track, message: bytes) -> bytes:
-    """Return the message serialized anew from its fields, with zero padding."""
+    """Return the message serialized anew from its fields, with zero padding; unchanged if it cannot be decoded."""
     try:
         return bytes(track.types.serialize_cdr(deserialized(track.types, message, track.type), track.type))
     except SerdeError:

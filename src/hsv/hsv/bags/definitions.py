@@ -23,14 +23,14 @@ from hsv.base.errors import RecordingError
 SEPARATOR = "=" * 80
 """Line between the definitions of a type and of its dependencies."""
 TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
-"""Types of times: each has int32 sec and uint32 nanosec, which together are one number."""
+"""Types of a time and of a duration. Their fields, int32 sec and uint32 nanosec, are read as one number, in ns."""
 _FORMATS = {"bool": "?", "byte": "u1", "char": "u1", "float32": "<f4", "float64": "<f8"} | {
     f"{sign}int{bits}": f"<{code}{bits // 8}" for sign, code in (("", "i"), ("u", "u")) for bits in (8, 16, 32, 64)
 }
 
 MAX_SURPLUS = 64
-"""Maximum number of bytes behind a message. ``serialize_message`` of rmw_fastrtps leaves up to eight for every empty
-sequence of numbers of eight bytes, such as the parameters of a fault without any; DDS sends at most three."""
+"""Maximum number of surplus bytes after the end of a message. ``serialize_message`` of rmw_fastrtps leaves up to eight
+for every empty sequence of 8-byte numbers, such as the parameters of a fault that has none; DDS adds at most three."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,29 +41,29 @@ class Field:
     type: str
     """``package/msg/Type`` or the name of a base type."""
     format: str | None
-    """numpy format of a number; None for texts and messages."""
+    """numpy format of the number, or of an element of the array or sequence; None for texts and messages."""
     count: Literal["one", "array", "sequence"]
     length: int
     """Number of elements of an array; 0 otherwise."""
 
     @property
     def is_text(self) -> bool:
-        """Whether the field is a text, bounded or unbounded."""
+        """Whether the field is a text or a list of texts, bounded or unbounded."""
         return self.type == "string"
 
     @property
     def is_time(self) -> bool:
-        """Whether the field is a time or a duration."""
+        """Whether the field is a time, a duration, or a list of these."""
         return self.type in TIMES
 
     @property
     def is_message(self) -> bool:
-        """Whether the field is a nested message."""
+        """Whether the field is a nested message (a time is one, too) or a list of messages."""
         return "/" in self.type
 
 
 def fields_of(types: Typesdict, message_type: str) -> list[Field]:
-    """Return the fields of a type in their order."""
+    """Return the fields of a message type in the order of its definition; ``types`` has the parsed definitions."""
     return [_field(name, desc) for name, desc in types[message_type][1]]
 
 
@@ -73,7 +73,7 @@ def as_dict(types: Typesdict, message_type: str, message: object) -> dict[str, A
 
 
 def blank(store: Typestore, message_type: str) -> Any:
-    """Return a message of zeros, empty text and empty sequences."""
+    """Return a new message of a type, with zeros, empty texts and empty sequences."""
     values: dict[str, Any] = {}
     for field in fields_of(store.fielddefs, message_type):
         size = 1 if field.count == "one" else field.length
@@ -102,7 +102,7 @@ def _field(name: str, desc: FieldDesc) -> Field:
 
 
 def plain(types: Typesdict, field: Field, value: Any) -> Any:
-    """Return the value of a field of a deserialized message as in :func:`as_dict`."""
+    """Return the value of a message field as plain data: number, text, list or dictionary; a time in nanoseconds."""
     if field.count != "one":
         if field.format:
             return value.tolist()
@@ -144,12 +144,12 @@ def message_types(
 
 @cache
 def installed_types(message_type: str) -> Typestore:
-    """Return the definitions of an installed type and its dependencies."""
+    """Return the parsed definitions of an installed message type and its dependencies."""
     return message_types([(message_type, definition(message_type))], message_type)
 
 
 def deserialized(types: Typestore, message: bytes, message_type: str) -> Any:
-    """Return a deserialized message, or raise a SerdeError; bytes behind it are admitted up to :data:`MAX_SURPLUS`."""
+    """Return ``message`` (CDR) deserialized, without surplus bytes; raise a SerdeError if it does not fit the type."""
     try:
         return types.deserialize_cdr(message, message_type)
     except SerdeError:

@@ -34,7 +34,7 @@ DIAGNOSTICS = "diagnostics"
 ROSOUT = "/rosout"
 PARAMETER_EVENTS = "/parameter_events"
 WIRE_ALIGNMENT = 4
-"""Alignment of the length of messages sent over DDS, bytes; they are padded with zeros."""
+"""Alignment (bytes) to which the length of a message sent over DDS is padded with zeros."""
 INJECT_FAULT = "hsv/inject_fault"
 CLEAR_FAULT = "hsv/clear_fault"
 SET_COMMAND = "hsv/set_command"
@@ -58,8 +58,8 @@ TOPICS = {
     TUBE_STATUS: "hsv_msgs/msg/TubeStatus",
     ACTUATOR: "hsv_msgs/msg/Actuator",
 }
-"""Types of the step topics, which have exactly one message per step, in order of recording. A graph has those of its
-controller, see :func:`step_topics`."""
+"""Types of the step topics, which have exactly one message per step, in order of recording. Not every controller
+publishes the tube status, see :func:`step_topics`."""
 
 CARRIED: dict[str, dict[SignalType, str]] = {
     MEASUREMENT: {signals.MEASUREMENT: "state", signals.STATUS: "status"},
@@ -89,7 +89,7 @@ CARRIED: dict[str, dict[SignalType, str]] = {
 or the first of several consecutive numbers."""
 
 TOPIC_OF = {signal.name: topic for topic, carried in CARRIED.items() for signal in carried}
-"""The topic of each signal by name; the last one for a signal that later topics repeat."""
+"""The topic that contains each signal, by the signal's name; the last topic if several contain it."""
 
 LATCHED_TOPICS = {RUN: "hsv_msgs/msg/Run", READY: "hsv_msgs/msg/Ready", REFERENCE: "hsv_msgs/msg/Reference"}
 """Types of the latched topics, whose last message late subscribers receive."""
@@ -100,20 +100,20 @@ OTHER_TOPICS = {
     DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
     PARAMETER_EVENTS: "rcl_interfaces/msg/ParameterEvent",
 }
-"""Types of the other recorded topics, whose messages are recorded at the simulated time of their arrival.
+"""Types of the recorded topics that are not step topics; messages are recorded at the simulated time of arrival.
 
 Topics with a leading slash belong to ROS: they have the same name in every namespace.
 """
 
 TRANSIENT_LOCAL = (*LATCHED_TOPICS, ROSOUT)
-"""Topics whose publishers keep messages for late subscribers: the announcements, and the log of every ROS node."""
+"""Topics whose publishers keep messages for late subscribers: the latched ones, and the log of every ROS node."""
 
 LAST_STATE = "hsv/last_state"
 """Latched topic of the last state of a run, one message per run. Its status is finished, diverged, or running if the
 run was broken off. It is not recorded, because the bag contains the state."""
 
 INTERFACE_VERSION = 3
-"""Version of the messages and services, as in ``hsv_msgs/msg/Run``."""
+"""Version of the messages and services, as announced in ``hsv_msgs/msg/Run``."""
 
 EXIT_DIVERGED = 3
 """Exit code of the plant after a flight that left the range of the model."""
@@ -130,7 +130,7 @@ class NodeDescription:
     """A node by its role: its executable, and the step topics that it publishes and subscribes to."""
 
     name: str
-    """Role, and name of the node unless it is remapped."""
+    """Role of the node, and its name unless it is remapped."""
     package: str
     executable: str
     publishes: tuple[str, ...]
@@ -143,13 +143,13 @@ class NodeDescription:
     """
 
     announces: tuple[str, ...] = ()
-    """Further topics that only this role publishes, not in every step."""
+    """Further topics that only this role publishes, but not in every step."""
     block: Block | None = None
     """Block of the loop that the node steps, if any."""
     delayed: tuple[str, ...] = ()
     """Subscribed topics of which the node uses the message of the previous step."""
     foreign: bool = False
-    """Whether the node is external: it uses the messages only and does not announce itself."""
+    """Whether the node is external: not of this project, so that it has only the step topics and sends no ``Ready``."""
 
     @property
     def label(self) -> str:
@@ -195,7 +195,7 @@ PLANT = _stepping(
 _TUBE = _stepping(blocks.CONTROLLER, "hsv_ctrl", (COMMAND, TUBE_STATUS), (FILTERED_STATE, NOMINAL))
 
 CONTROLLER = replace(_TUBE, publishes=(COMMAND,))
-"""The node of a custom controller class, named by the parameter ``controller``."""
+"""The node that steps a custom controller class; the parameter ``controller`` names the class."""
 
 TUBE_MPC, ROBUST_MPC = (replace(_TUBE, name=name, executable=name) for name in ("tube_mpc", "robust_mpc"))
 """Controllers with their own node, which publish diagnostics of the tube as well."""
@@ -212,10 +212,10 @@ PLAYER = NodeDescription("player", "hsv_bringup", "player", (), ())
 """Process outside the graph that republishes a bag."""
 
 LIVE = NodeDescription("live", "hsv_bringup", "live", (), ())
-"""Process outside the graph that displays a running flight. No node waits for it; it ends with the others."""
+"""Process outside the graph that displays a running flight. No node waits for it; it ends when the nodes end."""
 
 CLIENT = NodeDescription("client", "hsv_bringup", "client", (), ())
-"""Process outside the graph: a command of ``hsv`` on a running graph."""
+"""Process outside the graph that runs a command of ``hsv`` on a running graph, such as ``hsv set``."""
 
 
 def controller_node(controller: str) -> NodeDescription:
@@ -260,7 +260,7 @@ def peers(me: NodeDescription, controller: str, recorded: bool, estimator: bool 
 def links(
     me: NodeDescription, controller: str, recorded: bool, estimator: bool = False
 ) -> list[tuple[str, NodeDescription]]:
-    """Return the (topic, other node) pairs that ``me`` must be matched with, those of the recorder if ``recorded``."""
+    """Return the pairs (topic, other node) between which DDS must connect ``me``; with the recorder if ``recorded``."""
     return [
         (topic, other)
         for topic in TOPICS

@@ -119,7 +119,7 @@ def _columns(bag: Bag, topic: str) -> tuple[dict[str, NDArray[Any]], dict[str, U
 
 
 def _fields(bag: Bag, topic: str) -> dict[str, tuple[NDArray[Any], str]]:
-    """Return one array per field with its units; fields of varying length are JSON."""
+    """Return each field of a topic, by name, as (array, unit); a field of varying length becomes JSON texts."""
     columns, units = _columns(bag, topic)
     fields = {}
     for name, column in columns.items():

@@ -15,17 +15,18 @@ from hsv.base.errors import DocumentError, RecordingError
 from hsv.base.files import read_bytes
 
 COMPRESSIONS = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
-"""First bytes of compressed data; MCAP files and messages in CDR begin differently."""
+"""Compressions by the first bytes of compressed data; MCAP files and messages in CDR begin differently."""
 _MAGIC = 4
 _NAME = re.compile(r".+\.mcap(?:\.zstd|\.zst|\.lz4)?")
 _NUMBER = re.compile(r"_(\d+)\.mcap")
 _MAX_FILES = 100_000
-"""File numbers from here on are dates or the like, not counters."""
+"""A number of this size or more in a file name is a date or the like, not the counter of a split bag."""
 _PART = 1024
-"""Bytes decompressed at a time, to at most 32 MiB, so that data before a damage are kept."""
+"""Compressed bytes that are unpacked at a time, to at most 32 MiB; so all data before a damage are kept."""
 
 MAX_UNPACKED, MAX_RATIO = 2**27, 32
-"""Bytes to which a file may unpack, or how many times its size if that is more; flights are compressed to a quarter."""
+"""Limits on the size of an unpacked file: bytes, or a multiple of the packed size if that is more. A flight is
+compressed to about a quarter."""
 
 
 def locked(stream: IO[bytes], *, shared: bool = False) -> bool:
@@ -98,7 +99,7 @@ def _number(name: str) -> int:
 class Unpacker:
     """A file of a bag, whose contents rosbag2 may have compressed: as a whole, in chunks, or message by message.
 
-    All that is unpacked of a file has a limit, because a few bytes can stand for gigabytes.
+    The total size of the unpacked data is limited, because a few compressed bytes can stand for gigabytes.
 
     Raises:
         RecordingError: The file cannot be read, or it unpacks to more than :data:`MAX_UNPACKED` bytes and
@@ -116,9 +117,9 @@ class Unpacker:
         """Contents of the file, as far as it can be unpacked"""
 
     def unpacked(self, data: bytes, compression: str | None = None) -> tuple[bytes, bool]:
-        """Return the content of data that may be compressed, up to the first damage, and whether that is all of it.
+        """Return the decompressed ``data``, up to the first damage, and whether they are complete.
 
-        ``compression`` is the name of the compression; None: as the data begin.
+        ``compression`` is zstd, lz4 or empty for none; None: recognised by the first bytes.
         """
         match COMPRESSIONS.get(data[:_MAGIC], "") if compression is None else compression:
             case "zstd":

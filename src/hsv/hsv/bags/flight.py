@@ -41,17 +41,17 @@ def labels(bags: Sequence[Bag]) -> list[str]:
 
 
 def state_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:
-    """Return x (n, 9) from the columns of a message with the fields of LongitudinalState."""
+    """Return the states x (n, 9), SI, from the columns of n messages with the fields of LongitudinalState."""
     return np.column_stack([columns[f"{prefix}{name}"] for name in STATE_NAMES])
 
 
 def input_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:
-    """Return u (n, 2) from the columns of a message with the fields of InputVector."""
+    """Return the inputs u (n, 2), fuel equivalence ratio and elevator (rad), from n messages with an InputVector."""
     return np.column_stack((columns[f"{prefix}fuel_equivalence_ratio"], columns[f"{prefix}elevator_deflection"]))
 
 
 def flight_data(bag: Bag) -> FlightData:
-    """Return the flight in ``bag`` for the steps contained in every topic; raise a RecordingError without any."""
+    """Return the flight in ``bag`` at the steps contained in every topic; raise a RecordingError if there are none."""
     rows = joined(bag, (STATE, NOMINAL, COMMAND))
     state, nominal, command = rows[STATE], rows[NOMINAL], rows[COMMAND]
     status = bag.columns(ACTUATOR)
@@ -92,12 +92,12 @@ def flight_fingerprint(bag: Bag) -> str | None:
 
 
 def equipment_topics(bag: Bag) -> list[str]:
-    """Return the topics in ``bag`` that the functions of this module read."""
+    """Return the topics in ``bag`` that show how sensors, links, effectors and air deviate from the ideal."""
     return [topic for topic in (STATE, MEASUREMENT, COMMAND, ACTUATOR, FORCES) if topic in bag.roles]
 
 
 def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the measurement error (n), SI, of each state with an error; ``topics`` have equal steps row by row."""
+    """Return the measurement error (n), SI, of each state with an error; all ``topics`` have the same n steps."""
     if MEASUREMENT not in topics:
         return {}
     errors = state_columns(topics[MEASUREMENT], "state.") - state_columns(topics[STATE])
@@ -105,7 +105,7 @@ def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def held(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return masks (n) of the steps in which a link held its old payload, for the links with such steps."""
+    """Return, by link, the mask (n) of the steps at which it repeated its last payload; other links are left out."""
     ends = {}
     if MEASUREMENT in topics:
         ends["measurement"] = state_columns(topics[STATE]), state_columns(topics[MEASUREMENT], "state.")
@@ -121,7 +121,10 @@ def _repeats(rows: np.ndarray) -> np.ndarray:
 
 
 def effectors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the positions (n), SI, over the period of each step, the last NaN, of effectors that do not follow."""
+    """Return the positions (n), SI, of effectors that deviate from their command, during the period after each step.
+
+    The last position is NaN, because the period after the last step is not flown.
+    """
     if ACTUATOR not in topics:
         return {}
     commanded = dict(zip(INPUT_NAMES, input_columns(topics[ACTUATOR]).T, strict=True))
@@ -130,13 +133,13 @@ def effectors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def moving_air(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the fields of :data:`CALM_AIR` that differ from calm air, as values (n) over the period of each step."""
+    """Return the fields (n) of :data:`CALM_AIR` that differ from calm air, during the period after each step."""
     air = {name: _over_the_period(topics, name) for name in CALM_AIR}
     return {name: y for name, y in air.items() if (np.isfinite(y) & (y != CALM_AIR[name])).any()}
 
 
 def _over_the_period(topics: Mapping[str, Columns], field: str) -> np.ndarray:
-    """Return a field of the forces (n) over the period that begins with each step; NaN if it is not recorded."""
+    """Return a field (n) of the forces during the period after each step; NaN if lost, empty if not recorded at all."""
     if FORCES not in topics or field not in topics[FORCES]:
         return np.empty(0)
     forces = topics[FORCES]

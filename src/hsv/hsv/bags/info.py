@@ -174,7 +174,7 @@ def _equipment(bag: Bag) -> dict[str, Any] | None:
 
 
 def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | None:
-    """Return messages about properties that the certificate in the bag does not cover, for the recorded faults."""
+    """Return a text for each property of the flight that its certificate does not cover; None without attachments."""
     try:
         sections = [ParameterSections.parse(bag.text(name), name) for name in ("design.yaml", "scenario.yaml")]
         values = sections[0].overlaid(sections[1]).of(TUBE_MPC.name)
@@ -186,7 +186,7 @@ def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | N
 
 
 def _step_times(bag: Bag) -> dict[str, Any] | None:
-    """Return the times (ms) that the nodes of the control law reported last, and the control period (ms)."""
+    """Return the step times (ms) that the control nodes reported last, and the control period (ms), or None."""
     statistics = ("median_ms", "p99_ms", "max_ms")
     nodes: dict[str, dict[str, float]] = {}
     try:
@@ -227,7 +227,10 @@ def _tube(bag: Bag) -> dict[str, Any]:
 
 
 def intervals(stamps: NDArray[np.int64], holds: NDArray[np.bool_]) -> list[dict[str, Any]]:
-    """Return the intervals in which a condition ``holds`` (n), each from its first step to the first step after it."""
+    """Return the intervals (s) in which a condition ``holds`` (n), given the ``stamps`` (n, ns) of the steps.
+
+    ``start_s`` is the first step of an interval and ``end_s`` the first step after it, None at the end of the bag.
+    """
     edges = np.diff(np.concatenate(([False], holds, [False])).astype(np.int8))
     return [
         {"start_s": float(stamps[first]) / 1e9, "end_s": float(stamps[over]) / 1e9 if over < len(stamps) else None}

@@ -1,7 +1,7 @@
-"""Parameters of the nodes' infrastructure: lockstep, pace, recorder and peer emulator.
+"""Parameters of the nodes' infrastructure: lockstep, pace, recorder, live view and peer emulator.
 
-The parameters of the components are in :mod:`hsv.graph.node_parameters`, which imports the components of all nodes. A
-node needs only this module, so that it starts faster.
+The tables of :mod:`hsv.graph.node_parameters` also have the parameters of the components, which that module imports.
+A node imports only this module and its own component, so that it starts faster.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ def stamp_in(message: bytes) -> int:
 
 
 class MessageError(RunError):
-    """Error of bytes that are not a message of the type, or of a type with an unexpected definition."""
+    """The bytes are not a message of the expected type, or the type has another definition than expected."""
 
 
 class Structure:
@@ -69,7 +69,7 @@ class Structure:
     """
 
     def __init__(self, store: Typesdict, message_type: str, message: bytes) -> None:
-        """Determine the layout of a ``message`` in CDR; refuse one that is not little-endian or too short."""
+        """Determine the layout from a ``message`` (CDR); raise a MessageError if it is big-endian or too short."""
         if message[:2] != _LITTLE_ENDIAN:
             raise MessageError(
                 f"{message_type}: CDR that begins with {message[:2].hex()}, expected 0001, little-endian"
@@ -108,10 +108,10 @@ class Structure:
         return body.view(self.dtype)[:, 0]
 
     def select(self, chosen: Mapping[str, tuple[str, int]]) -> np.dtype[Any]:
-        """Return a structured type of the same size with the chosen fields, paths and sizes by their new names.
+        """Return a structured type of the same size with only the ``chosen`` fields: (path, size) by new name.
 
-        A path leads to a number, a sequence of numbers (size :data:`VARYING`) or a message of so many numbers. A
-        MessageError names a field that the definition lacks.
+        The path is that of a number (size 1), of a sequence of numbers (size :data:`VARYING`), or of a nested message
+        or the first of several numbers (size: how many). A MessageError names a field that the definition lacks.
         """
         names, formats, offsets = list(self._places), [], []
         for path, size in chosen.values():
@@ -173,13 +173,13 @@ _SIZES: dict[SignalType, tuple[Callable[[int], bool], str]] = {
     types.GAIN: (lambda size: size in (0, N_INPUTS * N_STATES), f"{N_INPUTS * N_STATES}, or none"),
     types.ESTIMATE: (lambda size: size in (0, N_STATES), f"{N_STATES}, or none"),
 }
-"""Signals in sequences: test of the size, and description of the admitted sizes for error messages."""
+"""Signals that are sent as sequences: test of their size, and the admitted sizes in words for error messages."""
 
 _VALUES: dict[SignalType, Callable[[Signals], Any]] = {
     types.ESTIMATE: lambda signals: () if signals.estimate is signals.measurement else signals.estimate,
     types.GAIN: lambda signals: signals.gain.ravel(),
 }
-"""Functions that return the numbers to send for a signal, if they differ from its value."""
+"""Functions that return the numbers to send for a signal, for signals that are not sent as they are."""
 
 _TUBE = {
     "level": 1,
@@ -200,7 +200,7 @@ class StepMessages:
     """Conversion of the signals of a step to and from the messages of one topic."""
 
     def __init__(self, topic: str, store: Typestore | None = None) -> None:
-        """Prepare for a topic of a step; ``store`` has the definitions of its messages, by default the installed."""
+        """Prepare for a step ``topic`` (role); ``store`` has its definitions, by default the installed ones."""
         self.type = TOPICS[topic]
         self._store = store or installed_types(self.type)
         carried = CARRIED.get(topic, {})
@@ -223,11 +223,11 @@ class StepMessages:
         self._lengths: tuple[object, ...] | None = None
 
     def step(self, message: bytes) -> int:
-        """Return the step number of a message; it raises as :meth:`unpack`."""
+        """Return the step number of a message; raise a MessageError or SignalError if the message is invalid."""
         return int(self._numbers(message)[2])
 
     def unpack(self, message: bytes, signals: Signals) -> None:
-        """Set stamp, step and the needed signals from a message; on a MessageError or SignalError nothing is set."""
+        """Set stamp, step and needed signals from a message; raise a MessageError or SignalError before setting any."""
         seconds, nanoseconds, step, *values = self._numbers(message)
         found = dict(zip(self._needed, values, strict=True))
         if self._has_faults:
@@ -238,7 +238,7 @@ class StepMessages:
         vars(signals).update(found)
 
     def pack(self, signals: Signals) -> bytes:
-        """Return the message with the signals, padded as over DDS."""
+        """Return the message (CDR) with the values of ``signals``, padded as over DDS."""
         values = [value(signals) for _, value in self._sent.values()]
         lengths = [len(value) for value, (size, _) in zip(values, self._sent.values(), strict=True) if size == VARYING]
         faults = signals.active_faults if self._has_faults else ()
@@ -302,7 +302,7 @@ def _size(signal: SignalType) -> int:
 
 
 def fault_in(message: Any) -> Fault:
-    """Return the fault in a message Fault; a ParameterError names what is unknown or not admitted."""
+    """Return the fault in a message Fault; a ParameterError names an unknown or invalid channel, type or parameter."""
     from hsv.model.faults.table import Fault  # imported here because most nodes need no faults
 
     names, values = message.parameter_names, message.parameter_values
@@ -312,7 +312,7 @@ def fault_in(message: Any) -> Fault:
 
 
 def active_faults(message: Any) -> tuple[ActiveFault, ...]:
-    """Return the faults in a message Actuator with their first steps; a SignalError names what is wrong."""
+    """Return the active faults in a message Actuator with their first steps; a SignalError names an invalid one."""
     from hsv.model.faults.schedule import ActiveFault
 
     active, since = message.active, message.since

@@ -1,4 +1,4 @@
-"""Metadata of a bag for rosbag2 (version 9): metadata.yaml, and its copy as a record in the MCAP file."""
+"""Topics and metadata of a bag in the format of rosbag2 (version 9): metadata.yaml, and its copy in the MCAP file."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from hsv.base.errors import DocumentError
 from hsv.base.files import parse_yaml, read_text
 
 CUSTOM_DATA = "custom_data"
-"""Name of the MCAP metadata records with the custom data; later records add to earlier ones."""
+"""Name of the MCAP metadata records that hold the custom data; later records add to earlier ones."""
 ROSBAG2 = "rosbag2"
-"""Name of the MCAP metadata records of rosbag2."""
+"""Name of the MCAP metadata record in which rosbag2 keeps a copy of metadata.yaml."""
 SERIALIZED = "serialized_metadata"
-"""Key in the records of rosbag2 for the text of metadata.yaml without its root."""
+"""Key, in the MCAP metadata record of rosbag2, of the text of metadata.yaml without its root key."""
 FILE_NAME = "metadata.yaml"
 ROOT = "rosbag2_bagfile_information"
 VERSION = 9
 DISTRO = "jazzy"
 EMPTY_SPAN = 2**63 - 1, 0
-"""First and last time (ns) of a bag without messages in rosbag2."""
+"""First and last time (ns) that rosbag2 states for a bag without messages."""
 _INFINITE = QosTime(9223372036, 854775807)
 
 
@@ -63,14 +63,14 @@ class Topic:
 
 
 def usual_qos(depth: int = 10, *, latched: bool = False) -> Qos:
-    """Return a reliable profile; that of a ``latched`` topic keeps messages for late subscribers."""
+    """Return a reliable quality of service; if ``latched``, late subscribers receive the last ``depth`` messages."""
     durability = QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE
     limits = _INFINITE, _INFINITE, QosLiveliness.AUTOMATIC, _INFINITE, False
     return Qos(QosHistory.KEEP_LAST, depth, QosReliability.RELIABLE, durability, *limits)
 
 
 def recorded_qos(text: str, *, latched: bool) -> Qos:
-    """Return the first profile in the YAML text of an MCAP channel; what it lacks or misspells is as usual."""
+    """Return the first quality of service in an MCAP channel (YAML), with usual values for missing or invalid ones."""
     usual = usual_qos(latched=latched)
     try:
         first, *_ = parse_yaml(text)
@@ -87,7 +87,7 @@ def information(
 ) -> dict[str, Any]:
     """Return the metadata of a bag with one file, with all keys that rosbag2 requires.
 
-    ``span``: time of the first and the last message, ns; EMPTY_SPAN if there is none.
+    ``span`` is the time of the first and of the last message, ns, or EMPTY_SPAN if there are no messages.
     """
     start, duration = {"nanoseconds_since_epoch": span[0]}, {"nanoseconds": max(span[1] - span[0], 0)}
     count = sum(topic.count for topic in topics)
@@ -137,7 +137,7 @@ def write_metadata(directory: Path, values: Mapping[str, Any]) -> None:
 
 
 def read_metadata(directory: Path) -> dict[str, Any]:
-    """Return the contents of metadata.yaml below its root; empty if the file is missing or cannot be read."""
+    """Return the contents of metadata.yaml below its root key; empty if the file is missing or cannot be read."""
     try:
         values = parsed(read_text(directory / FILE_NAME)).get(ROOT)
     except DocumentError:
@@ -155,7 +155,7 @@ def parsed(text: str) -> dict[str, Any]:
 
 
 def custom_data(values: Mapping[str, Any]) -> dict[str, str]:
-    """Return the custom data in the metadata; empty if there is no mapping."""
+    """Return the custom data in the metadata as texts; empty if there are none."""
     found = values.get("custom_data")
     return {str(key): str(value) for key, value in found.items()} if isinstance(found, dict) else {}
 
@@ -167,7 +167,7 @@ def file_names(values: Mapping[str, Any]) -> list[str]:
 
 
 def message_counts(values: Mapping[str, Any]) -> dict[str, int]:
-    """Return the number of messages by file name in the metadata."""
+    """Return the number of messages in each file, by file name, as stated in the metadata."""
     files = values.get("files")
     entries = [entry for entry in files if isinstance(entry, dict)] if isinstance(files, list) else []
     counts = {str(entry.get("path")): entry.get("message_count") for entry in entries}

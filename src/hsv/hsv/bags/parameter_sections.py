@@ -24,7 +24,7 @@ class ParameterSections:
 
     @classmethod
     def gathered(cls, values: Mapping[str, Mapping[str, Any]]) -> Self:
-        """Return the parameters of the nodes in ``values``; equal values of all nodes are shared."""
+        """Return the parameters in ``values`` (by node, then name); a value that no node has differently is shared."""
         differing = differences(values)
         shared = {name: value for flat in values.values() for name, value in flat.items() if name not in differing}
         own = {node: {name: flat[name] for name in differing if name in flat} for node, flat in values.items()}
@@ -54,7 +54,7 @@ class ParameterSections:
         return set(self.shared).union(*self.own.values())
 
     def updated(self, values: Mapping[str, Any]) -> Self:
-        """Return the parameters with ``values`` replaced for every node."""
+        """Return the parameters with ``values`` (by name) set for every node."""
         own = {node: {n: v for n, v in flat.items() if n not in values} for node, flat in self.own.items()}
         return type(self)(self.shared | dict(values), own)
 
@@ -88,7 +88,8 @@ def differences(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, 
 def disagreements(values: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Return a message for each parameter that must be equal in all nodes of a graph and is not.
 
-    ``feedback.tau`` may differ, because only the controller uses it. For different designs only the digests are listed.
+    ``feedback.tau`` may differ, because only the controller uses it. If the designs differ, only their digests and
+    periods are listed.
     """
     differing = differences(values)
     differing.pop(TAU.name, None)

@@ -28,11 +28,11 @@ from hsv.bags.units import Units, units_of
 from hsv.base.errors import RecordingError
 
 _OURS = "/hsv/"
-"""Common prefix of this project's topics, unless they are remapped."""
+"""Part of the full name of this project's topics in any namespace, unless they are remapped."""
 _USUAL = {resolved(role): kind for role, kind in TYPES.items()}
-"""Types of the topics of a graph by their names without namespace and remapping."""
+"""Types of the topics of a graph by their default names, without namespace or remapping."""
 _STAMP_START, _STAMP_END = 4, 12
-"""Bytes of the stamp in the messages of a step: seconds and nanoseconds, four bytes each."""
+"""First byte of the stamp in a message of a step, and the byte after it: seconds and nanoseconds, four bytes each."""
 _BIG_ENDIAN = b"\x00\x00"
 
 
@@ -79,10 +79,10 @@ class Bag:
         self.folder = self.files[0].parent
         """The bag directory."""
         self.complete = not missing
-        """Whether the writer closed every file; a killed writer leaves a truncated file."""
+        """Whether no file is missing and the writer closed every file; a killed writer leaves a truncated file."""
         self.loss = Loss(files=missing)
         self.contradictions: list[str] = []
-        """Statements of metadata.yaml that contradict the files; the files count."""
+        """Texts on each statement of metadata.yaml that contradicts the files; the contents of the files are used."""
         self.attachments: dict[str, bytes] = {}
         self.media_types: dict[str, str] = {}
         """Media type of each attachment."""
@@ -96,7 +96,7 @@ class Bag:
         self.topics: dict[str, Topic] = {}
         """The topics by name, including topics without messages."""
         self.undecodable: dict[str, Topic] = {}
-        """Topics of others that are not ROS 2 messages in CDR; only a recovery copies them."""
+        """Topics of other programs whose messages are not ROS 2 messages in CDR; only a recovery copies them."""
         self._messages: dict[str, list[Message]] = defaultdict(list)
         self._columns: dict[str, Columns] = {}
         self._read()
@@ -125,11 +125,11 @@ class Bag:
         return np.asarray(stamps[np.maximum(before, 0)])
 
     def messages(self, topic: str) -> list[tuple[int, bytes]]:
-        """Return simulated time (ns) and CDR with its header of each recorded message of a topic."""
+        """Return each recorded message of a topic as a pair: simulated time (ns), and bytes in CDR with its header."""
         return list(zip(self.times(topic).tolist(), self._data(self.name_of(topic)), strict=True))
 
     def recorded(self) -> Iterator[tuple[str, Message]]:
-        """Yield topic and record of all messages, also of undecodable topics, in the order of their log times."""
+        """Yield (topic, MCAP record) of all messages, also of undecodable topics, in the order of their log times."""
         topics = ([(topic, message) for message in messages] for topic, messages in self._messages.items())
         return merge(*topics, key=lambda found: found[1].log_time)
 
@@ -146,7 +146,7 @@ class Bag:
         return units_of(found.definition, self.types.fielddefs, found.type)
 
     def decode(self, topic: str) -> Iterator[tuple[int, Any]]:
-        """Yield time (ns) and deserialized message of each message of a topic."""
+        """Yield each message of a topic as a pair: simulated time (ns), and deserialized message."""
         return self.track(topic).decode()
 
     def track(self, topic: str) -> Track:
@@ -158,7 +158,7 @@ class Bag:
         return Track(found.name, found.type, self.types, times, data, str(self.path))
 
     def text(self, name: str) -> str:
-        """Return an attachment as text; a RecordingError says that it is not in the bag or no text."""
+        """Return an attachment as text; raise a RecordingError if it is missing or not text."""
         if name not in self.attachments:
             raise RecordingError(f"{self.path}: no attachment {name}, expected a bag recorded by hsv run")
         try:
@@ -179,7 +179,7 @@ class Bag:
 
     @cached_property
     def types(self) -> Typestore:
-        """The message types by the definitions in the bag."""
+        """The message types, from the definitions in the bag."""
         ours: dict[str, str] = {}
         others: dict[str, str] = {}
         for name, topic in self.topics.items():
@@ -241,7 +241,7 @@ class Bag:
             self.loss.messages += max((scan.indexed if expected is None else expected) - found, orphans, 0)
             self.loss.attachments += max(statistics.attachment_count - attachments, 0) if statistics else 0
         for messages in self._messages.values():
-            messages.sort(key=lambda message: message.log_time)  # MCAP does not demand it of a file
+            messages.sort(key=lambda message: message.log_time)  # an MCAP file need not be sorted
         self.loss.counted &= not self.loss.files
         self.custom_data = self.custom_data or metadata.custom_data(recorded_by)
         self.distro = str(recorded_by.get("ros_distro") or DISTRO)
@@ -251,7 +251,11 @@ class Bag:
             topics.update((name, replace(topic, count=len(self._messages[name]))) for name, topic in topics.items())
 
     def _read_file(self, scan: Scan, unpacker: Unpacker) -> tuple[int, int, int, dict[str, Any]]:
-        """Add the contents of a file; return the numbers of messages, orphans, attachments, and rosbag2's metadata."""
+        """Add the contents of a file.
+
+        Returns:
+            Numbers of messages, of messages of unknown topics, and of attachments; and the metadata of rosbag2.
+        """
         schemas: dict[int, Schema] = {}
         channels: dict[int, Channel] = {}
         messages: list[Message] = []
@@ -262,7 +266,7 @@ class Bag:
                 case Message():
                     messages.append(record)
                 case Schema():
-                    schemas.setdefault(record.id, record)  # the first has the checksum of its chunk
+                    schemas.setdefault(record.id, record)  # the first one is protected by the checksum of its chunk
                 case Channel():
                     channels.setdefault(record.id, record)
                 case Attachment():
@@ -282,7 +286,7 @@ class Bag:
                 del channels[channel.id]  # its definition is lost or damaged
         read = orphans = 0
         for message in messages:
-            if message.channel_id not in channels:  # it is lost
+            if message.channel_id not in channels:  # the channel is lost
                 orphans += 1
             elif (data := unpacker.message(message.data)) is not None:
                 read += 1

@@ -21,7 +21,7 @@ RECOVERED = {"recovered": "true"}
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """Result of a recovery: the directory of the new bag, or of ``bag`` itself if it needs none, and its messages."""
+    """Result of a recovery; ``path`` is the directory of the new bag, or that of ``bag`` if it needed no change."""
 
     bag: Bag
     path: Path
@@ -98,7 +98,7 @@ def _has_its_metadata(bag: Bag, messages: int) -> bool:
 
 @contextmanager
 def _exclusively(files: list[Path]) -> Iterator[None]:
-    """Hold the locks of ``files``, which their recorder holds while it runs."""
+    """Lock ``files`` during the context; a RecordingError says that their recorder still runs."""
     with ExitStack() as stack:
         for file in files:
             try:

@@ -14,12 +14,12 @@ NAMESPACE_KEY, REMAPPED_KEY = "namespace", "remapped"
 graph with default names has neither."""
 
 TYPES = TOPICS | OTHER_TOPICS
-"""Type of the topic of each role."""
+"""Message type of the topic in each role."""
 _OURS = [role for role in TYPES if role.startswith("hsv/")]
 
 
 def naming(names: Mapping[str, str], namespace: str) -> dict[str, str]:
-    """Return the custom data for the ``names`` of topics by role in a graph in ``namespace``."""
+    """Return the custom data that record the topic ``names``, by role, of a graph; empty if all are default names."""
     remapped = {role: name for role, name in names.items() if name != resolved(role, namespace)}
     data = {NAMESPACE_KEY: namespace} if namespace != ROOT or remapped else {}
     return data | ({REMAPPED_KEY: json.dumps(remapped)} if remapped else {})

@@ -1,4 +1,4 @@
-"""Scan of an MCAP file that goes on after damages, where the readers of the ``mcap`` package end."""
+"""Scan of an MCAP file that goes on after damages, where the readers of the ``mcap`` package stop."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from hsv.bags.files import COMPRESSIONS, Unpacker
 
 _FRAME = struct.Struct("<BQ")
 """Opcode and length at the start of a record."""
-_CANDIDATE = re.compile(rb"(?=[\x06\x09\x0f].{5}\x00{3})", re.DOTALL)  # a chunk, an attachment, an end of data
-# What the package raises for wrong lengths and texts.
+_CANDIDATE = re.compile(rb"(?=[\x06\x09\x0f].{5}\x00{3})", re.DOTALL)
+"""Possible start of a chunk, of an attachment, or of the end of the data."""
+# Exceptions of the mcap package for wrong lengths and texts.
 _DAMAGE = (EndOfFile, struct.error, UnicodeDecodeError, OverflowError, MemoryError)
 _KINDS = {opcode: getattr(kinds, opcode.name.title().replace("_", "")) for opcode in Opcode}
 
@@ -86,7 +87,10 @@ class Scan:
         return next((at for at in candidates if _record(self._data, at)[1]), len(self._data))
 
     def _unpacked(self, chunk: kinds.Chunk) -> tuple[list[kinds.McapRecord], str]:
-        """Return the records of a chunk, up to a damage if it has no checksum, and what is damaged, if anything."""
+        """Return the records of a chunk, and a description of its damage, empty if it is intact.
+
+        A damaged chunk has no records, or those before the damage if it has no checksum.
+        """
         if chunk.compression not in ("", *COMPRESSIONS.values()):
             return [], f"a chunk (unsupported compression type {chunk.compression}, expected zstd, lz4 or none)"
         data, whole = self._file.unpacked(chunk.data, chunk.compression)
@@ -100,12 +104,12 @@ class Scan:
 
 
 def _record(data: memoryview, position: int) -> tuple[kinds.McapRecord | None, int]:
-    """Return the record at ``position`` (None for a private one) and its end, 0 unless its fields fill it."""
+    """Return the record at ``position``, None if it is private or damaged, and the offset of its end, 0 if damaged."""
     start = position + _FRAME.size
     opcode, length = _FRAME.unpack_from(data, position) if start <= len(data) else (0, 0)
     end = start + length
     if end > len(data) or opcode not in _KINDS:
-        return None, end if opcode >= 0x80 and end <= len(data) else 0  # from there on they are of other programs
+        return None, end if opcode >= 0x80 and end <= len(data) else 0  # opcodes from 0x80 on are private
     stream = ReadDataStream(BytesIO(data[start:end]))
     try:
         record = _KINDS[opcode].read(stream, *([length] if opcode == Opcode.MESSAGE else []))

@@ -65,7 +65,7 @@ def write_scene(bag: Bag, target: Path, exaggeration: float | None = None) -> No
 
 
 def _channels(writer: Writer, bag: Bag) -> dict[str, int]:
-    """Register every topic; return the channel numbers by topic."""
+    """Register every topic with ``writer``; return the channel ids by topic."""
     topics = list(bag.topics.values())
     for name, message in ((SCENE_TOPIC, scene(0)), (TRANSFORMS_TOPIC, frame_transforms(Sample(*[0.0] * 6), 0))):
         schema = message.get_schema()
@@ -76,7 +76,7 @@ def _channels(writer: Writer, bag: Bag) -> dict[str, int]:
 
 
 def _pictures(bag: Bag, exaggeration: float | None) -> list[Message]:
-    """Return the added messages, scene and frames, in order of time."""
+    """Return the messages to add in order of time: the scene, and the frames of the vehicle."""
     columns = joined(bag, list(dict.fromkeys((STATE, ACTUATOR, *equipment_topics(bag)))))
     stamps = columns[STATE]["header.stamp"].tolist()
     inputs = dict(zip(INPUT_NAMES, input_columns(columns[ACTUATOR]).T, strict=True))

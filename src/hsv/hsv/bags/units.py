@@ -23,9 +23,9 @@ _FIELD = re.compile(r"^\s*[\w/]+(?:\[[^\]]*\])?(?:<=\d+)?\s+(?P<name>\w+)\s*(?:#
 
 @dataclass(frozen=True)
 class Units:
-    """Units of the elements of a field: those of the ``first`` elements, then the ``others``, repeated.
+    """Units of the elements of a field: of the ``first`` elements, then ``others``, repeated for all further elements.
 
-    A number is a single element.
+    A number has a single element.
     """
 
     first: tuple[str, ...] = ()

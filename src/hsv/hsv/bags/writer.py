@@ -102,7 +102,7 @@ class BagWriter:
         return topic in self._channels
 
     def write(self, topic: str, time_ns: int, data: bytes, publish_time: int | None = None) -> None:
-        """Write a message in CDR; its log time is simulated (ns), its publish time the same by default.
+        """Write a message in CDR with the simulated time ``time_ns`` as log time, and by default also as publish time.
 
         Raises:
             RecordingError: The topic was not added, or the file cannot be written (no space left).
@@ -127,7 +127,7 @@ class BagWriter:
         """End the current chunk and pass it to the operating system, so that it survives the end of this process.
 
         Raises:
-            RecordingError: The file cannot be written, or is no longer where it was made.
+            RecordingError: The file cannot be written, or has been moved, removed or replaced.
         """
         with self._writing():
             self._writer.flush()

@@ -35,11 +35,11 @@ class ReplayedFlight:
 
 
 def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
-    """Repeat ``flight`` with the design stored in the results.
+    """Repeat a flight of a campaign, given by its number, in this process with the design stored in the results.
 
     Raises:
-        CampaignError: No such flight.
-        ParameterError: The results name code, and are not trusted.
+        CampaignError: There is no such flight.
+        ParameterError: The results name code to load, but are not trusted.
     """
     row, runner = results.row(flight), results.sample_runner
     try:
@@ -53,14 +53,14 @@ def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
 def replay_over_dds(
     results: Results, flight: int, bag: Path, progress: Callable[[int, int], None] = lambda step, steps: None
 ) -> ReplayedFlight:
-    """Repeat ``flight`` with the node processes, recorded to ``bag``, a new directory.
+    """Repeat a flight of a campaign, given by its number, with the node processes; record it to a new directory.
 
     ``progress`` is called with the step reached and the last step.
 
     Raises:
-        CampaignError, DesignError: No such flight, or the design is not what it was.
-        ParameterError: The results name code, or a design in another folder, and are not trusted.
-        RunError: A process failed; its last words are in the message.
+        CampaignError, DesignError: There is no such flight, or the design file has changed since or is missing.
+        ParameterError: The results name code or a design in another folder, but are not trusted.
+        RunError: A process failed; its last error line is in the message.
     """
     from hsv.bags.flight import equipment_topics, flight_data, flight_fingerprint, measurement_errors
     from hsv.bags.reader import Bag
@@ -74,7 +74,7 @@ def replay_over_dds(
     fly_graph(prepared, on_step=lambda step: progress(step, prepared.steps))
     recorded = Bag(bag)
     data = flight_data(recorded)
-    # Stamps are whole nanoseconds, the campaign's time is not: the last bit of an integral over time would differ.
+    # Stamps are rounded to nanoseconds, the campaign's times are not: integrals over time would differ in the last bit.
     data = replace(data, time=np.arange(len(data.time)) * runner.period)
     fingerprint = flight_fingerprint(recorded)
     repeated = runner.measured(data, runner.level(data), fingerprint)
@@ -94,7 +94,7 @@ def require_design(results: Results) -> None:
 
     Raises:
         CampaignError, DesignError: It holds another design, or is missing.
-        ParameterError: The results name one in another folder, and are not trusted.
+        ParameterError: The results name a design in another folder, but are not trusted.
     """
     name = results.campaign.scenario.design
     if not name:

@@ -1,4 +1,4 @@
-"""Locks of this machine: nodes, topics and run namespaces of a ROS domain, and ports, each held by one process.
+"""Locks on this machine for nodes, topics and namespaces of a ROS domain; and the ports of the live view.
 
 A lock is an abstract socket with the name of what it locks. Only one process can bind it, before it sends anything, and
 the kernel releases it when the process ends for whatever reason. Other machines of the domain do not see the lock.
@@ -24,8 +24,8 @@ def ros_domain() -> int:
     """Return the ROS domain of this process, in which nodes can find each other.
 
     Raises:
-        ParameterError: ROS_DOMAIN_ID is not such a number (rcl would read 025 as an octal one, and -1 as 0), discovery
-            is switched off, or there is no network.
+        ParameterError: ROS_DOMAIN_ID is not a decimal number up to :data:`LAST_DOMAIN` (rcl would read 025 as octal,
+            and -1 as 0), discovery is switched off, or the loopback network interface is down.
     """
     text = os.environ.get("ROS_DOMAIN_ID") or "0"
     if not re.fullmatch(r"0|[1-9][0-9]*", text) or int(text) > LAST_DOMAIN:
@@ -59,8 +59,8 @@ def claim(kind: str, domain: int, name: str) -> socket.socket | None:
 
 
 def is_published(domain: int, topic: str) -> bool:
-    """Tell whether a node of this machine has claimed ``topic``."""
-    # To bind it would refuse a node that claims it in the same instant.
+    """Return whether a node on this machine has claimed ``topic``, a full name."""
+    # Binding the name as a test would make a node fail that claims the topic at the same instant.
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asking:
         try:
             asking.connect(_address("topic", domain, topic))
@@ -70,27 +70,29 @@ def is_published(domain: int, topic: str) -> bool:
 
 
 def _address(kind: str, domain: int, name: str) -> str:
-    # The system takes 107 bytes.
+    # Hashed because Linux limits the address to 107 bytes.
     return f"\0hsv_{kind}_{domain}_{hashlib.sha256(name.encode()).hexdigest()}"
 
 
 def origins(port: int) -> list[str]:
-    """Return the origins of the page that is served on ``port``, as browsers name them."""
+    """Return the HTTP origins by which a browser may name the page served on ``port``."""
     return [f"http://{name}:{port}" for name in (HOST, "localhost")]
 
 
 def ports(first: int) -> tuple[int, int]:
-    """Return the ports of Foxglove's server and of the page: ``first`` and the next one, or with 0 any two free ones.
+    """Return the ports of Foxglove's server and of the live page: ``first`` and the next one, or (0, 0) if it is 0.
+
+    With port 0, a server takes any free port.
 
     Raises:
-        ParameterError: One of them is none, or in use.
+        ParameterError: A port is out of range or in use.
     """
     if not 0 <= first < 65535:
         raise ParameterError(f"live-port = {first}: expected 1 to 65534, or 0 for any free ones")
     chosen = (first, first + 1 if first else 0)
     for port in chosen:
         with socket.socket() as tried:
-            # What has just been left is free: the servers take it, too.
+            # Like the servers, accept a port that another process has just closed.
             tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
                 tried.bind((HOST, port))

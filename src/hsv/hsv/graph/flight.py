@@ -20,12 +20,13 @@ def fly_graph(
     on_step: Callable[[int], None] = lambda step: None,
     on_line: Callable[[str, str], None] = lambda node, text: None,
 ) -> None:
-    """Fly ``prepared`` with its processes, recorded to its bag; interrupted before the first step, it leaves no bag.
+    """Fly a prepared run with its node processes and record it to its bag.
 
-    The other arguments are those of :class:`hsv.graph.launcher.Launcher`.
+    A run that is interrupted before the first step leaves no bag. The other arguments are those of
+    :class:`hsv.graph.launcher.Launcher`.
 
     Raises:
-        RunError: A process failed or is not built, or the bag cannot be repaired; last words are in the message.
+        RunError: A process failed or is not built, or the bag cannot be repaired; the message has the last error line.
     """
     failures = []
     try:
@@ -43,17 +44,17 @@ def fly_graph(
 
 
 def close_bag(bag: Path, failures: Sequence[str] = ()) -> None:
-    """Finish the bag of a graph whose processes have ended; remove it where no recorder has come to write anything.
+    """Finish the bag of a graph whose processes have ended; remove it if no recorder has written anything.
 
     Raises:
-        RunError: There are ``failures`` of processes, or the bag cannot be repaired; names the bag where there is one.
+        RunError: There are ``failures`` of processes, or the bag cannot be repaired. The message names the bag, if any.
     """
     from hsv.bags.metadata import FILE_NAME
     from hsv.bags.recover import finalise
 
     words = list(failures)
     with suppress(OSError):
-        bag.rmdir()  # where no recorder has come to write anything
+        bag.rmdir()  # succeeds only if no recorder has written anything
     try:
         # A recorder that was killed could not finish its bag.
         if bag.is_dir() and not (bag / FILE_NAME).exists():

@@ -33,7 +33,8 @@ from hsv.graph.exclusive import claim, is_published, ros_domain
 from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
 
 GRACE = 20.0
-"""Time (s) between SIGTERM and SIGKILL for a process; only :data:`HUNG_AFTER` if it makes no progress."""
+"""Time (s) that processes have to end after SIGINT, and a fifth of it after SIGTERM; without progress they only have
+:data:`HUNG_AFTER`."""
 
 WARNING = "[WARN] "
 """Prefix of warnings of ROS nodes and of the launcher."""
@@ -46,7 +47,7 @@ _FLYING = (PLANT, COMPOSED)
 
 
 def executable(node: NodeDescription) -> Path:
-    """Return the executable of ``node`` by the rule of ``ros2 run``.
+    """Return the path of the executable of ``node``, found below AMENT_PREFIX_PATH as by ``ros2 run``.
 
     Raises:
         RunError: The package is not built or the workspace is not sourced.
@@ -62,28 +63,28 @@ def executable(node: NodeDescription) -> Path:
 
 
 def become(node: NodeDescription, words: Sequence[str], namespace: str = "") -> NoReturn:
-    """Run the executable of ``node`` with these ``words``, in a namespace if one is given, in place of this process.
+    """Replace this process by the executable of ``node``, with the arguments ``words`` and in ``namespace`` if given.
 
-    Ctrl-C and SIGTERM wait until it takes them (:func:`hsv.base.processes.take_signals`): in the midst of its imports
-    they would end it with a traceback.
+    Ctrl-C and SIGTERM stay blocked until the node handles them (:func:`hsv.base.processes.take_signals`). During its
+    imports they would end it with a traceback.
 
     Raises:
-        KeyboardInterrupt: One came during an import.
-        RunError: See :func:`executable`.
-        ParameterError: ``namespace`` is none.
+        KeyboardInterrupt: An interrupt during an import of this process had been postponed.
+        RunError: The executable was not found, see :func:`executable`.
+        ParameterError: ``namespace`` is not a valid namespace.
     """
     remapped = ["--ros-args", "-r", f"__ns:={checked_namespace(namespace)}"] if namespace else []
     path = str(executable(node))
     left, _ = signal.setitimer(signal.ITIMER_REAL, 0.0)
     if left > 0.0:
-        raise KeyboardInterrupt  # which was to come later: the timer would end the program in its place
+        raise KeyboardInterrupt  # postponed by a timer, which would end the new program
     choose_log_folder()
     signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
     os.execv(path, [path, *words, *remapped])
 
 
 def parameter_arguments(files: Iterable[Path]) -> list[str]:
-    """Return the arguments with which a node takes its parameters from ``files``, later ones over earlier ones."""
+    """Return the command-line arguments by which a node loads ``files``; later files override earlier ones."""
     return [word for path in files for word in ("--params-file", str(path))]
 
 
@@ -117,10 +118,10 @@ class Launcher:
         """Prepare to start processes.
 
         Args:
-            nodes: Nodes to start, the one that ends the run last.
-            arguments: Command line of each.
-            on_step: Called with the steps that are reported.
-            on_line: Called with the name of a node and every other line that it writes, or that is to be said of it.
+            nodes: Nodes to start; the run ends with the last one.
+            arguments: ROS arguments of every node.
+            on_step: Called with the number of every step that the plant reports.
+            on_line: Called with the name of a node and every other line of its output, or a warning about the node.
             wait_timeout: Time (s) for which a process may be idle if no other node would end the run.
             namespace: Namespace of all nodes.
         """
@@ -155,12 +156,12 @@ class Launcher:
     def wait(self) -> int:
         """Wait for the last node to finish and return its exit code: 0, or that of a flight that diverged.
 
-        A process that hangs is reported, and also when it continues. In flight the plant itself detects a peer that
+        A process that hangs is reported, and again if it continues. In flight the plant itself detects a node that
         does not answer, and ends.
 
         Raises:
-            RunError: It failed, or another ended before it (a plant that has landed may). Or it hung, or another
-                before the flight had begun. Losing a viewer does not end the flight.
+            RunError: The last node failed or hung, another node ended earlier, or it hung before the flight began. The
+                plant may end earlier after its flight, and losing the live view only gives a warning.
         """
         *others, last = self._processes
         while True:
@@ -195,7 +196,10 @@ class Launcher:
             time.sleep(_LOOK)
 
     def stop(self) -> None:
-        """End all processes with SIGTERM, then SIGKILL; the plant first, so that the recorder receives everything."""
+        """End all processes with SIGINT, then SIGTERM, then SIGKILL.
+
+        The plant is signalled first, so that the recorder receives everything.
+        """
         for number, grace in ((signal.SIGINT, GRACE), (signal.SIGTERM, GRACE / 5), (signal.SIGKILL, GRACE)):
             running = [p for p in reversed(self._processes) if p.popen.poll() is None]
             for process in running:
@@ -226,7 +230,7 @@ class Launcher:
             errors="replace",
             # Ctrl-C in the terminal goes to this process alone, which ends the nodes in order.
             start_new_session=True,
-            # Where the launcher itself is killed, the nodes must not fly on without it.
+            # If the launcher itself is killed, the nodes must end, too.
             preexec_fn=partial(end_with_parent, os.getpid()),
         )
         process = _Process(description, popen)
@@ -242,7 +246,7 @@ class Launcher:
             if process.description in _FLYING and text.startswith("step "):
                 self._on_step(int(text.split()[1]))
             elif text:
-                # A crashed interpreter lists its extension modules: kilobytes that tell nothing.
+                # A crashed interpreter lists its extension modules, which explain nothing.
                 if not text.startswith("Extension modules:"):
                     process.words.append(text)
                 self._on_line(process.description.label, text)
@@ -254,8 +258,8 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
     The nodes of two runs would receive each other's messages, and both runs would fail.
 
     Raises:
-        RunError: Another run has them, or a node that publishes a topic of one of ``nodes``.
-        ParameterError: The environment names no domain, or one in which nodes cannot find each other.
+        RunError: Another run has claimed both, or a node already publishes a topic of one of ``nodes``.
+        ParameterError: ROS_DOMAIN_ID is invalid, or nodes cannot find each other, see :func:`ros_domain`.
     """
     domain = ros_domain()
     where = f"ROS_DOMAIN_ID={domain}{f' and namespace {namespace}' if namespace != ROOT else ''}"
@@ -271,7 +275,7 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
 
 
 def _ending(process: _Process, code: int) -> str:
-    """Return how a process ended, with the error that ended it, or else the last that it has printed."""
+    """Return how a process ended as text, with its last fatal log line or else its last line that is not ``[INFO]``."""
     if process.reader:
         process.reader.join(1.0)
     if code < 0:

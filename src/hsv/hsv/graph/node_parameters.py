@@ -1,4 +1,4 @@
-"""Every parameter of every node: those of its block and of its part in the graph, and those that change in flight."""
+"""The parameters of every node: those of its component and of its infrastructure, and which may change in flight."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _designed(own: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
 
 
 def own_parameters(controller: str) -> tuple[Parameter, ...]:
-    """Return the parameters of the node that flies a controller, whose class is loaded."""
+    """Return the parameters of the node that steps a controller; the controller's class is loaded."""
     return _designed(tuple(controller_class(controller).PARAMETERS))
 
 
@@ -65,7 +65,7 @@ _TRUTH = {"true": True, "false": False}
 
 
 def find(name: str) -> tuple[NodeDescription, Parameter]:
-    """Return the node and the parameter that a full name, or the last word of one, means."""
+    """Return a parameter that may change in flight, by its full name or the last part of it, with its node."""
     found = [entry for full, entry in SETTABLE.items() if name in (full, full.rpartition(".")[2])]
     if len(found) != 1:
         names = ", ".join(SETTABLE) + did_you_mean(name, SETTABLE)
@@ -74,7 +74,7 @@ def find(name: str) -> tuple[NodeDescription, Parameter]:
 
 
 def parse(text: str, parameter: Parameter) -> bool | float | list[float]:
-    """Return the value in ``text``: numbers with their units between commas, in brackets or not; true or false."""
+    """Return the value in ``text``, SI: true or false, or comma-separated numbers with units; brackets are optional."""
     if parameter.kind == "bool":
         return bool(parameter.check(_TRUTH.get(text.strip().lower(), text)))
     words = text.strip().removeprefix("[").removesuffix("]").split(",")

@@ -34,7 +34,7 @@ from hsv.graph.launcher import executable
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """A checked scenario with its parameter files (design first, scenario over it) and the bag to record to."""
+    """A checked scenario, ready to fly: nodes, bag to record to, and parameter files, the later over the earlier."""
 
     scenario: Scenario
     bag: Path
@@ -43,9 +43,9 @@ class PreparedRun:
     steps: int
     """Number of the last step if the flight does not diverge."""
     step_timeout: float
-    """Wall time (s) to wait for a node that does nothing."""
+    """Wall time (s) after which a silent node ends the run."""
     folder: tempfile.TemporaryDirectory[str] | None
-    """Temporary folder of the parameter files, removed with this object; ``None``: a folder of the caller."""
+    """Temporary folder of the parameter files, removed with this object; ``None`` if the caller gave a folder."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class RunOptions:
     """Options of the execution of a run, which do not change the numbers of the flight."""
 
     real_time_factor: float | None = None
-    """Simulated over wall time; 0: as fast as possible; None: 0, with a live view 1."""
+    """Ratio of simulated to wall time; 0: as fast as possible; None: 1 with a live view, otherwise 0."""
     step_timeout: float = STEP_TIMEOUT
     """Wall time (s) after which a silent node ends the run."""
     composed: bool = False
@@ -61,12 +61,12 @@ class RunOptions:
     external: bool = False
     """Whether a controller that is started by hand replaces that of the scenario."""
     live_port: int | None = None
-    """Port of the live view, whose page has the next one; 0: any two; None: no live view."""
+    """Port of the live view's Foxglove server; its page has the next port. 0: any free ports; None: no live view."""
     paused: bool = False
     """Whether the flight starts paused."""
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Raise a QuantityError if a number is out of range."""
         if self.real_time_factor is not None and not 0.0 <= self.real_time_factor <= 1000.0:
             raise QuantityError(f"real-time-factor = {self.real_time_factor}: expected 0 (as fast as possible) to 1000")
         if not 0.1 <= self.step_timeout <= 1e6:
@@ -84,15 +84,15 @@ def prepare(
 ) -> PreparedRun:
     """Check scenario and design, make the bag's directory, and write the parameter files of a run.
 
-    Whatever can be refused is refused here, before a process starts or anything is written.
+    Whatever can be refused is refused here, before a process starts.
 
     Args:
         scenario_name: Name or path of the scenario.
-        options: How it is flown.
-        text: The scenario, as :func:`hsv.flight.scenario.scenario_text` returns it; empty: that of this name.
+        options: Options of the execution.
+        text: The scenario, as :func:`hsv.flight.scenario.scenario_text` returns it; empty: read by its name.
         bags: Folder of the bag if ``bag`` is not given; it is named by scenario and time.
         bag: Bag to record to, a new directory.
-        folder: Directory for the parameter files; if not given, a temporary one that goes with the result.
+        folder: Directory for the parameter files; if not given, a temporary one that is removed with the result.
 
     Raises:
         ParameterError: ``live_port`` or the port after it is in use.
@@ -106,7 +106,7 @@ def prepare(
     text = text or scenario_text(scenario_name)
     name = Path(scenario_name).stem
     if options.external:
-        # The bag keeps this scenario, which is not the published one.
+        # The bag gets the changed scenario, which is not the published one.
         text = with_controller(text, NODE, name)
     scenario = parse_scenario(text, name)
     with blamed_on(scenario):
@@ -158,7 +158,7 @@ def prepare(
 
 
 def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:
-    """Return the nodes to start for a flight with ``controller``; the last one ends the run."""
+    """Return the nodes to start for a flight with ``controller``, in start order; the run ends with the last one."""
     node = controller_node(controller)
     if node.executable and node.foreign:
         try:
@@ -170,7 +170,7 @@ def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:
 
 
 def provenance(controller: str, name: str, design_hash: str, seed: int) -> dict[str, str]:
-    """Return the origin of a flight for its bag: controller, design with its ``name``, seed, and time."""
+    """Return the origin of a flight as custom data of its bag: commit, controller, design with ``name``, seed, time."""
     library = library_digest(controller)
     return {
         "commit": commit(),
@@ -201,7 +201,7 @@ def recorded_files(values: Mapping[str, Mapping[str, Any]], designed: Mapping[st
 def _new_directory(candidates: Sequence[Path]) -> Path:
     """Make and return the first of ``candidates`` that does not exist.
 
-    The recorder would do so too late: the second of two runs with one name is refused before it starts anything.
+    The recorder would make it too late: of two runs with the same bag, the second must be refused before it starts.
     """
     for path in candidates:
         try:

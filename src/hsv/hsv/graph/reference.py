@@ -47,7 +47,7 @@ Their channels and parameters, as in `fault.parameters`. Every type also has the
 
 
 def reference() -> str:
-    """Return the page: the loop, its signals, one table per node, and the types of faults."""
+    """Return the parameter reference in Markdown: the loop, its signals, one table per node, and the fault types."""
     parts = [_HEADER, _LOOP + _loop() + _SIGNALS + _signals(), "## Every node\n" + _parameters(LOCKSTEP_PARAMETERS)]
     parts += [f"## {node}\n" + _parameters(table) for node, table in NODE_PARAMETERS.items()]
     return "\n".join([*parts, _FAULTS + _faults()])

@@ -19,11 +19,11 @@ from hsv.graph.launcher import Launcher, parameter_arguments
 def replay_all(
     bag: Bag, names: Sequence[str], controller: str, values: ParameterSections, progress: Progress
 ) -> Iterator[ProcessComparison]:
-    """Run each of the nodes ``names`` alone, fed from ``bag`` by a peer emulator, and compare its answers.
+    """Run each of the nodes ``names`` alone, fed from ``bag`` by a peer emulator; yield a comparison of its outputs.
 
     Raises:
         RecordingError: A topic that is needed is missing; no process has been started.
-        RunError: A process failed; its last words are in the message.
+        RunError: A process failed; its last error line is in the message.
     """
     under_test = [processes_of(controller, estimated(values))[name] for name in names]
     for process in under_test:
@@ -47,7 +47,7 @@ def replay_all(
 
 
 def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progress) -> Iterator[ProcessComparison]:
-    """Repeat the run of the whole graph and compare every step topic."""
+    """Repeat the run of the whole graph; yield for each node a comparison of its step topics with those in ``bag``."""
     require(bag, step_topics(controller))
     with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
         repeated = Path(folder, "rerun")
@@ -67,7 +67,7 @@ def _run(
     steps: int,
     progress: Progress,
 ) -> None:
-    """Run ``nodes`` until the last of them has ended: the emulator or, where there is none, the plant."""
+    """Run ``nodes`` until the last of them has ended: the peer emulator or, without one, the plant."""
     file = folder / "parameters.yaml"
     file.write_text(values.to_yaml(), encoding="utf-8")
 

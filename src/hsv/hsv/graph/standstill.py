@@ -1,7 +1,7 @@
 """Detection of hung processes, as opposed to slow ones.
 
-On a busy machine everything may take any time. Nothing in the graph is therefore given up for being late, but only for
-standing still: no step, no message, no processor time used.
+On a busy machine, everything may take any time. A process is therefore not given up because it is late, but only if it
+makes no progress: no step, no message, no processor time used.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import ctypes
 import time
 
 HUNG_AFTER = 5.0
-"""Seconds without any progress after which a process is called hung."""
+"""Time (s) without any progress after which a process counts as hung."""
 
 _LONGEST_GAP = 1.0
-"""Largest time in seconds that counts between two looks: after a longer gap this process itself was kept waiting."""
+"""Maximum time (s) that counts between two looks; after a longer gap, this process itself had to wait."""
 
 
 class Standstill:
-    """Time for which something has not changed."""
+    """Measurement of the time for which a value has not changed."""
 
     def __init__(self) -> None:
         self._looked = time.monotonic()
@@ -25,7 +25,7 @@ class Standstill:
         self._seconds = 0.0
 
     def look(self, value: object) -> float:
-        """Return for how long (s) the looks have found this same ``value``; look a few times a second."""
+        """Return the time (s) since ``value`` changed, as seen by the calls; call this a few times a second."""
         now = time.monotonic()
         self._seconds += min(now - self._looked, _LONGEST_GAP)
         self._looked = now
@@ -35,9 +35,9 @@ class Standstill:
 
 
 def processor_time(pid: int) -> float | None:
-    """Return the processor time (s) that process ``pid`` has used in all threads; ``None``: not to be found out.
+    """Return the processor time (s) that process ``pid`` has used in all threads; None if it cannot be determined.
 
-    To the nanosecond: a node that only waits uses some ten microseconds whenever it looks around, a stopped one none.
+    The resolution is 1 ns: a node that only waits uses about 10 µs each time that it wakes up, a stopped node none.
     """
     clock = ctypes.c_int()
     if ctypes.CDLL(None).clock_getcpuclockid(pid, ctypes.byref(clock)):

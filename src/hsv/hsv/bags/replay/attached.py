@@ -54,7 +54,7 @@ from hsv.model.faults.injector import FaultInjector
 from hsv.model.vehicle import vehicle_label
 
 DESIGN, SCENARIO = "design.yaml", "scenario.yaml"
-"""Attachments: the parameters of the design and, over them, those of the scenario."""
+"""Attachments with the parameters of the design, and with those of the scenario, which override them."""
 
 _OF_THE_RUN = {
     p.name for p in (*PACE_PARAMETERS, *RECORDER_PARAMETERS, *CERTIFICATE_PARAMETERS, *LOCKSTEP_PARAMETERS)
@@ -62,18 +62,18 @@ _OF_THE_RUN = {
 """Parameters of the execution, such as pace and files, which do not change the flight."""
 
 LEAST_ACTIVE_TIME = 10.0
-"""Simulated time (s) in which the controller must have acted."""
+"""Minimum simulated time (s) for which the controller must have been active, so that a replay proves something."""
 
 ACTIVE_INPUT = 1e-6
 """Smallest deviation (1, rad) of a command from the reference input that counts as an action of the controller."""
 
 
 def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
-    """Give a bag attachments that it does not have, or replace its own, as if it had been flown with them.
+    """Add or replace the attachments of an opened bag as if it had been flown with them; its files do not change.
 
     Args:
         bag: Any bag of a flight.
-        design: Parameter file of the design; where none is given, that of ``scenario``.
+        design: Parameter file of the design; default: the design of ``scenario``.
         scenario: Name of a shipped scenario, or path of a TOML file.
     """
     files = {}
@@ -92,9 +92,9 @@ def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
 
 
 def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
-    """Return the parameters of the nodes in a recorded run, with what was changed in flight: faults, tau, commands.
+    """Return the parameters of the nodes in a recorded run, with the changes in flight of faults, tau and commands.
 
-    A ``design`` takes the place of the attached one. A RecordingError says that the parameters are missing or wrong.
+    A ``design`` file replaces the attached design. A RecordingError says that parameters are missing or wrong.
     """
     for name in (DESIGN, SCENARIO):
         if name not in bag.attachments:
@@ -106,7 +106,7 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
     values = designed.overlaid(scenario)
     with expecting_fields(bag.path):
         try:
-            # Of these nodes alone: others may have another design, which is not certified for the same factors.
+            # For these nodes only: another node may have another design, which is not certified for the same factors.
             changed = {
                 FAULT_INJECTOR.name: _faults_as_flown(bag, values.of(FAULT_INJECTOR.name)),
                 TUBE_MPC.name: _tau_as_flown(bag, values),
@@ -139,9 +139,9 @@ def estimated(values: ParameterSections) -> bool:
 
 
 def complete_steps(bag: Bag, topics: Iterable[str] = ()) -> int:
-    """Return the number of steps, up to the first that is missing, of which the bag has every one of ``topics``.
+    """Return the number of steps before the first step that is missing on one of ``topics``.
 
-    Without ``topics``: of all step topics that it has.
+    Default of ``topics``: all step topics in the bag.
     """
     stamps = [bag.times(topic) for topic in topics or [topic for topic in TOPICS if topic in bag.roles]]
     expected = expected_stamps(bag)
@@ -171,7 +171,7 @@ def refuse_vacuous(bag: Bag) -> None:
 
 
 def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
-    """Return the fault parameters for the recorded active faults: the attached schedule with changes in flight."""
+    """Return the fault parameters that give the recorded active faults; empty if the attached ``values`` do so."""
     injector = FaultInjector.from_parameters(values)
     command = np.zeros(2)
     changed = False
@@ -192,7 +192,7 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _commands_as_flown(bag: Bag) -> dict[str, Any]:
-    """Return the parameters of the reference in flight; empty without commands in flight."""
+    """Return the parameters of the last reference commanded in flight; empty without commands in flight."""
     published = bag.decode(REFERENCE) if REFERENCE in bag.roles else ()
     flown = [message for _, message in published if message.status == bag.constant(REFERENCE, "FLOWN")]
     if not flown or flown[-1].step == 0:
@@ -201,7 +201,7 @@ def _commands_as_flown(bag: Bag) -> dict[str, Any]:
 
 
 def _tau_as_flown(bag: Bag, sections: ParameterSections) -> dict[str, Any]:
-    """Return the parameters of tau for the recorded factors; empty if the attached parameters give them."""
+    """Return the parameters that give the recorded tube factors tau; empty if the attached ``sections`` do so."""
     if controller_of(sections) != TUBE_MPC.name:
         return {}
     recorded_status = [status for _, status in bag.decode(TUBE_STATUS)]

@@ -1,4 +1,4 @@
-"""Feed processes with recorded messages in lockstep and compare their answers with the recorded ones."""
+"""Replay in this process: step the components of nodes with recorded messages and compare their outputs."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _TOLERANCES = {
 
 @dataclass(frozen=True)
 class Process:
-    """A process under test: its node, and the tolerance, absolute and relative, within which numbers count as equal."""
+    """A process under test: its node, and the absolute and relative tolerance of the comparison with its reason."""
 
     node: NodeDescription
     tolerance: float
@@ -57,7 +57,7 @@ class Process:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Topics that a step subscribes to."""
+        """Topics whose messages a step uses."""
         return (*self.node.subscribes, STATE) if self.restarts else self.node.subscribes
 
     @property
@@ -96,7 +96,7 @@ class ProcessComparison:
 
 
 class _Replica:
-    """A process under test in this program: its component, and its messages as bytes."""
+    """The component of a process under test, stepped in this program, with its inputs and outputs as bytes."""
 
     def __init__(self, process: Process, values: ParameterSections, types: Typestore) -> None:
         assert process.node.block is not None
@@ -110,7 +110,7 @@ class _Replica:
         """Whether the plant has reported the end of the flight."""
 
     def step(self, inputs: Mapping[str, bytes]) -> dict[str, bytes]:
-        """Step the component with its inputs by topic, none for the first state; return and keep the outputs."""
+        """Step the component with ``inputs`` by topic (none for the plant at step 0); return and keep its outputs."""
         signals = Signals()
         for topic, message in inputs.items():
             self._inputs[topic].unpack(message, signals)
@@ -160,7 +160,7 @@ def fly(
     recorded: Mapping[str, Track] = NOTHING,
     limit: int | None = None,
 ) -> dict[str, Track]:
-    """Fly the loop in this process and return every step topic; see :func:`rerun`.
+    """Fly the loop in this process and return the messages of every step topic; see :func:`rerun`.
 
     Args:
         types: Definitions of the messages.
@@ -210,7 +210,7 @@ def require(bag: Bag, topics: Iterable[str]) -> None:
 
 
 def compare_process(bag: Bag, process: Process, tracks: Mapping[str, Track]) -> ProcessComparison:
-    """Compare the outputs of ``process`` with those in ``bag``; of a run that was broken off, its complete steps."""
+    """Compare the outputs of ``process`` with those in ``bag``; if the run was broken off, only its complete steps."""
     limit = complete_steps(bag) if broken_off(bag) else None
     compared = []
     for topic in process.node.publishes:
