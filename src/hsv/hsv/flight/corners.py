@@ -1,4 +1,4 @@
-"""The region that a design declares: its flight, and the corners of the uncertain parameters' bounds."""
+"""The region that a design declares: one flight, and the corners of the bounds on the uncertain parameters."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from hsv.model.actuators import ACTUATOR_SETS
 from hsv.model.vehicle import Vehicle
 
 Corner = Mapping[str, float]
-"""Relative changes of a vehicle by name of the parameter."""
+"""Relative changes of a vehicle's parameters, by name."""
 
 _FRACTIONED = 10
-"""Uncertain parameters from which on a quarter of the corners is enough to measure disturbances."""
+"""Number of uncertain parameters from which :func:`fraction` returns only a quarter of the corners."""
 
 _NO_STOP = 1e3
-"""Stop of an actuator beyond those of the vehicle, which hold as well."""
+"""Position limit of an actuator that is never reached, because the vehicle's own input limits are smaller."""
 
 
 def corners(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, float]]:
-    """Return the nominal vehicle (no change) and all corners of ``share`` of the relative bounds, in a fixed order."""
+    """Return the nominal vehicle (no changes), then all corners of ``share`` times the bounds, in a fixed order."""
     signs = itertools.product((-1.0, 1.0), repeat=len(bounds))
     return [
         {},
@@ -32,10 +32,10 @@ def corners(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, f
 
 
 def fraction(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, float]]:
-    """Return the nominal vehicle and a quarter of the corners, in a fixed order; of fewer than ten parameters all.
+    """Return the nominal vehicle, then a quarter of the corners, or all of fewer than ten parameters; fixed order.
 
-    A regular fraction of resolution VI: two of ten signs are products of five others, so that every three parameters
-    still meet in all their combinations.
+    The quarter is a regular fraction of resolution VI: two of ten signs are products of five others. Any three
+    parameters therefore still occur in all combinations of their signs.
     """
     names = list(bounds)
     nominal, *rows = corners(bounds, share)
@@ -47,9 +47,10 @@ def fraction(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, 
 
 
 def screening_corners(bounds: Mapping[str, float], share: float = 1.0) -> list[Corner]:
-    """Return the nominal vehicle and 32 corners of ``share`` of the bounds of at most 15 parameters, in a fixed order.
+    """Return the nominal vehicle, then 32 corners of ``share`` times the at most 15 bounds, in a fixed order.
 
-    A Hadamard matrix of 16 runs and its mirror image: any three parameters meet in all their combinations.
+    The corners are the 16 runs of a Hadamard matrix and their mirror images. Any three parameters occur in all
+    combinations of their signs.
     """
     runs = hadamard(16)[:, 1 : 1 + len(bounds)]
     rows = share * np.vstack((runs, -runs)) * np.array(list(bounds.values()))
@@ -57,9 +58,9 @@ def screening_corners(bounds: Mapping[str, float], share: float = 1.0) -> list[C
 
 
 def region_parameters(inputs: Mapping[str, Any], vehicle: Vehicle, share: float = 1.0) -> dict[str, Any]:
-    """Return the flat flight parameters of the region that the ``inputs`` (SI) of a design declare, without its own.
+    """Return the flat parameters of the flight that the ``inputs`` (SI) of a design declare, without the design's.
 
-    ``share`` is that of the lost elevator effectiveness (paper eq. 47).
+    The lost elevator effectiveness is ``share`` (0 to 1) times the declared loss (paper eq. 47).
     """
     declared, ramp = inputs["disturbance"], inputs["disturbance"].get("ramp")
     start, target = inputs["nominal"]["start"], inputs["nominal"]["target"]

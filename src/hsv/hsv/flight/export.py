@@ -19,7 +19,7 @@ NUMBERS = "scenario.h"
 
 
 def exported_vehicle(scenario: Scenario) -> ExportedBlock:
-    """Return the vehicle of ``scenario``, for an FMU."""
+    """Return the vehicle of ``scenario`` as a block in C, from which an FMU is made."""
     components = assemble_flight(scenario)
     plant = components.plant
     source = files("hsv.flight").joinpath("export.c").read_text(encoding="utf-8")

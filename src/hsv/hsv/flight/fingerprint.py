@@ -1,10 +1,10 @@
-"""The fingerprint of a flight: a digest of every bit that its loop computed, the same on every machine.
+"""The fingerprint of a flight: a digest of all bits of its states, inputs and commands, the same on every machine.
 
-Other digests identify stored results: they are of everything on which the outcome of a flight depends.
+Other digests identify stored results. They cover everything on which the outcome of a flight depends.
 
-A table of published fingerprints is part of the library: whoever flies a shipped scenario with a shipped design can
-tell whether it is the same flight. It holds no scenario whose nominal law calls a solver in flight: what a solver
-returns depends on the machine, within a tolerance.
+A table of published fingerprints is part of the library. It shows whether a flight of a shipped scenario with its
+shipped design is the published one. The table has no scenario whose nominal law calls a solver in flight, because the
+result of a solver depends on the machine, within a tolerance.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ _FLOWN = ("base", "core", "model", "control", "flight")
 """Packages with the code and the vehicle tables that a flight uses."""
 
 DIGITS = 12
-"""Digits of a digest in the name of a folder, enough to avoid collisions."""
+"""Number of digits of a digest in the name of a file or folder, enough to avoid collisions."""
 
 
 def fingerprint(flown: np.ndarray) -> str:
-    """Return ``v1:`` and the SHA-256 of the rows ``flown`` (n + 1, 25).
+    """Return ``v1:`` and the hexadecimal SHA-256 of the rows ``flown`` (n + 1, 25).
 
-    Rows k = 0 ... n of x (9), q_f, x_n (9), u_n, command, actuator (2 each). The digest is of little-endian float64
-    numbers, row after row, every NaN as the same one.
+    Row k has x (9), q_f, x_n (9), u_n (2), command u (2) and actuator input (2) of step k. The numbers are digested row
+    after row as little-endian float64, with all NaNs replaced by the same NaN.
     """
     digest = hashlib.sha256()
-    # As many at a time as the processor's cache holds.
+    # As many rows at a time as the processor's cache holds.
     for start in range(0, len(flown), _ROWS):
         rows = np.ascontiguousarray(flown[start : start + _ROWS], "<f8")
         if (unknown := np.isnan(rows)).any():
@@ -53,9 +53,10 @@ def fingerprint(flown: np.ndarray) -> str:
 
 
 def as_published(found: str | None, scenario: Scenario | None, design_hash: str) -> bool | None:
-    """Return whether a flight has a published fingerprint, of whatever scenario.
+    """Return whether the fingerprint ``found`` of a flight is published, for any scenario.
 
-    ``None``: there is none, or an unpublished one and no shipped scenario with its shipped design (by its digest).
+    False: ``scenario`` and the design, with the digest ``design_hash``, are shipped and have another fingerprint. None:
+    neither is the case, or there is no fingerprint.
     """
     if any(found == entry["fingerprint"] for entry in _table().values()):
         return True
@@ -87,7 +88,7 @@ def code_digest() -> str:
 
 
 def drop_older(path: Path) -> None:
-    """Remove outdated files, which have the name of ``path`` with another digest."""
+    """Remove outdated files and folders, whose names differ from that of ``path`` in the digest alone."""
     name, _, rest = path.name.rpartition("_")
     for other in path.parent.glob(f"{name}_{'[0-9a-f]' * DIGITS}{rest[DIGITS:]}"):
         if other != path:
@@ -95,7 +96,7 @@ def drop_older(path: Path) -> None:
 
 
 def digest_of(parts: Iterable[bytes]) -> str:
-    """Return one digest (SHA-256) for several contents."""
+    """Return the hexadecimal SHA-256 of the SHA-256 digests of all ``parts``."""
     total = hashlib.sha256()
     for part in parts:
         total.update(hashlib.sha256(part).digest())

@@ -44,7 +44,7 @@ class LoadedLibrary:
 
     @contextmanager
     def sharing(self, numbers: int) -> Iterator[np.ndarray]:
-        """Yield the shared memory as an array (numbers)."""
+        """Yield the shared memory as an array of ``numbers`` values."""
         yield self._memory.numbers(numbers)
 
     def request(self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, **_: Any) -> Any:
@@ -52,7 +52,7 @@ class LoadedLibrary:
         return getattr(self, name)(*arguments, **(kept or {}))
 
     def describe(self, symbol: str) -> CBlock:
-        """Load the library on first use and return its block ``symbol``, which is empty for an FMU."""
+        """Load the library on first use and return its block ``symbol``; for an FMU the symbol is empty."""
         if not symbol:
             self._fmu = self._fmu or LoadedFmu(self._path)
             return self._fmu.block
@@ -85,7 +85,7 @@ class LoadedLibrary:
             raise
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Return the result of a function that uses the library."""
+        """Return the result of a ``function`` that uses the library in this process."""
         return function(*arguments)
 
 

@@ -12,16 +12,16 @@ from hsv.flight.scenario import Scenario
 
 @dataclass(frozen=True)
 class Verdict:
-    """A limit (SI) and the metric it is for; ``value`` is None where the flight does not define the metric."""
+    """A ``limit`` (SI) of a metric and the metric's ``value``, None if the flight does not define the metric."""
 
     limit: float
     value: float | None
     ended: bool = True
-    """Whether the flight came to its end; one that did not may exceed a limit, but kept none."""
+    """Whether the flight reached its end; a flight that did not may exceed a limit but never keeps one"""
 
     @property
     def within(self) -> bool:
-        """Whether the flight came to its end and the magnitude of the metric stayed within the limit."""
+        """Whether the flight reached its end and the magnitude of the metric stayed within the limit."""
         return self.words == "within"
 
     @property
@@ -35,25 +35,25 @@ class Verdict:
 
 
 def verdicts(scenario: Scenario, metrics: Mapping[str, float], *, ended: bool) -> dict[str, Verdict]:
-    """Return the verdict for each metric that ``scenario`` limits, on a flight that came to its end or did not."""
+    """Return the verdict for each metric that ``scenario`` limits, by name; ``ended``: the flight reached its end."""
     return {name: Verdict(limit, metrics.get(name), ended) for name, limit in scenario.limits.items()}
 
 
 def in_units(name: str, value: float, system: UnitSystem) -> str:
-    """Return the value (SI) of a metric with its unit in ``system``, three digits."""
+    """Return the ``value`` (SI) of the metric ``name`` as text in ``system``: three significant digits and the unit."""
     metric = METRICS[name]
     number, unit = in_system(value, metric.unit, system, share=metric.share)
     return significant(number) + ("" if unit == "1" else f" {unit}")
 
 
 def not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, float]) -> list[str]:
-    """Return the names of the metrics of a flight that have no limit, those that the paper judges by first."""
+    """Return the names of the metrics of a flight that have no limit, beginning with the criteria of the paper."""
     free = [name for name in metrics if name not in judged]
     return sorted(free, key=lambda name: name not in CRITERIA)
 
 
 def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float], system: UnitSystem) -> str:
-    """Return in one line whether a flight kept the limits of its scenario, which it broke, and what is not judged."""
+    """Return one line: whether a flight kept its limits, which it did not keep, and the metrics without a limit."""
     text = limits_kept(judged, system)
     words = criteria_not_judged(judged, metrics, system)
     if others := len(not_judged(judged, metrics)) - len(words):
@@ -63,7 +63,7 @@ def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float]
 
 
 def criteria_not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, float], system: UnitSystem) -> list[str]:
-    """Return in words, with their values, the metrics that the paper judges a flight by and its scenario does not."""
+    """Return the paper's criteria that the scenario does not limit, each as text with its value."""
     named = [name for name in not_judged(judged, metrics) if name in CRITERIA]
     return [f"{in_words(name)} ({in_units(name, metrics[name], system)})" for name in named]
 

@@ -1,8 +1,9 @@
-"""Random sequences of vertices and disturbances against an ellipsoid: evidence that needs no faith in the inequality.
+"""Random sequences of vertices and disturbances that may drive the error e out of an ellipsoid.
 
-Sequences start at e = 0, where flights start, or on the boundary of the set. Kinds: *iid* draws vertex and signs of
-all disturbances anew at every step; *held* keeps them; *switching* keeps them for random times; *adversarial* keeps
-vertices for random times and picks the signs that push outwards most, every twenty-fifth of them the vertex too.
+They test the invariance of the ellipsoid without the matrix inequality that certifies it. They start at e = 0, where
+flights start, or on the boundary. Kinds: *iid* draws the vertex and the signs of all disturbances anew at every step;
+*held* keeps them; *switching* keeps them for random times; *adversarial* keeps vertices for random times and picks the
+signs that push outwards most. Every twenty-fifth adversarial sequence picks the vertex in this way, too.
 """
 
 from __future__ import annotations
@@ -15,31 +16,35 @@ from hsv.base.processes import over_threads
 from hsv.core import doubles, lib
 
 KINDS = ("iid", "held", "switching", "adversarial")
-"""Sequence j is of kind j mod 4."""
+"""Kinds of sequences; sequence j is of the kind with index j mod 4."""
 
 _BATCH = 2500
 
 _WIDEST = 32
-"""Numbers in a state, as in ``core/sequences.h``."""
+"""Largest number of states of the error, as in ``core/sequences.h``."""
 
 
 def random_sequences(
     A: np.ndarray, columns: np.ndarray, centre: np.ndarray, Q: np.ndarray, sequences: int, steps: int, seed: int
 ) -> dict[str, Any]:
-    """Return the worst level reached, by kind and start; the same ``seed`` gives the same bits on any thread count.
+    """Return the largest levels that random sequences reach, in total and by start and kind; 1 is the boundary.
+
+    The same ``seed`` gives the same bits on any number of threads.
 
     Args:
-        A: (r, n, n) closed loops, between which the sequences switch.
-        columns: (r, n, d) effect of disturbances of at most 1 on the error less ``centre``.
+        A: (r, n, n) closed loops at the vertices, between which the sequences switch.
+        columns: (r, n, d) effects of d disturbances, each of magnitude 1 at most, on the error less ``centre``.
         centre: (n) centre of the ellipsoid.
-        Q: (n, n) its matrix.
-        sequences, steps, seed: Their number, the steps of each, and the seed.
+        Q: (n, n) its matrix; the level of an error e is (e - centre)' Q^-1 (e - centre).
+        sequences: Number of sequences.
+        steps: Number of steps of each sequence.
+        seed: Seed of the random numbers.
     """
     factor = np.linalg.cholesky(Q)
     A, G = np.linalg.solve(factor, A @ factor), np.linalg.solve(factor, columns)
     start = np.linalg.solve(factor, -centre)
     n = len(factor)
-    # Padded with zeros: the inner loops then run over whole vectors.
+    # Padded with zeros, so that the inner loops run over full vector registers.
     width = -(-n // 4) * 4
     both = np.zeros((len(A), n + G.shape[2], width))
     both[:, :n, :n], both[:, n:, :n] = np.swapaxes(A, 1, 2), np.swapaxes(G, 1, 2)

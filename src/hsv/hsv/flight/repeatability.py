@@ -26,15 +26,15 @@ from hsv.flight.scenario import Scenario, load_scenario, scenario_names
 from hsv.model.signals import PITCH_RATE
 
 FLOWN_BY_DEFAULT = "case1"
-"""Default scenario for a controller."""
+"""Scenario that is flown if only a controller is given."""
 
 _FLIGHTS = 2
-"""Flights at a time in each process under load."""
+"""Simultaneous flights in each process of the check under load."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One way of repeating a flight, how many flights it took, and where bytes differ first; empty: nowhere."""
+    """The result of a check: its name, its number of flights, and in words where bytes first differ, or empty."""
 
     check: str
     flights: int
@@ -42,7 +42,7 @@ class Finding:
 
 
 def scenario_of(name: str) -> Scenario:
-    """Return the scenario with this name or path, or the default one with the controller of this name."""
+    """Return the scenario ``name`` (or path), or the default scenario with the controller ``name``."""
     if name in scenario_names() or name.endswith(".toml"):
         return load_scenario(name)
     return load_scenario(FLOWN_BY_DEFAULT, {"controller": name})
@@ -63,7 +63,10 @@ def findings(scenario: Scenario) -> Iterator[Finding]:
 
 
 def from_copied_state(parts: Components, flight: Flight) -> str:
-    """Step the controller along a flight, then in turn with a copy; return where an answer differs first, or ''."""
+    """Step the controller along a ``flight`` again, and a copy of it from the middle of the flight on.
+
+    Return in words where an unsaturated input first differs from that of the flight, or empty text.
+    """
     h, steps = flight.history, len(flight.time)
     steppers = {"the controller": parts.controller}
     try:
@@ -73,13 +76,13 @@ def from_copied_state(parts: Components, flight: Flight) -> str:
             if k == steps // 2:
                 try:
                     steppers["its copy"] = parts.controller.copied()
-                # Foreign objects may refuse in any way.
+                # Copying an object of foreign code may raise any exception.
                 except Exception as error:
                     return f"the controller cannot be copied: {type(error).__name__}: {' '.join(str(error).split())}"
             filtered = parts.notch_filter.step(h.estimate[k, PITCH_RATE])
             for name, stepper in steppers.items():
                 rows = h.estimate, flight.reference, flight.reference_input, h.deviation, h.nominal_input
-                # Copies: a controller may keep or change what it was given.
+                # Copied, because a controller may keep or change its inputs.
                 x, x_r, u_r, x_n, u_n = (row[k].copy() for row in rows)
                 states = filtered.filter_state.copy()
                 inputs = ControllerInput(k, x, filtered.filtered_pitch_rate, x_r, u_r, x_n, u_n, states)
@@ -92,7 +95,7 @@ def from_copied_state(parts: Components, flight: Flight) -> str:
 
 
 def under_load(scenario: Scenario, first: Flight) -> Finding:
-    """Fly ``scenario`` in more processes than there are processors, several flights at a time in each."""
+    """Fly ``scenario`` in up to five processes, several flights at a time in each, and return the finding."""
     processes = min(os.cpu_count() or 1, 4) + 1
     name, histories = f"under load, {processes} processes", list[History]()
     try:
@@ -118,10 +121,10 @@ def _flown_alike(first: Flight, parts: Components) -> str:
 
 
 def _difference(first: History, other: History) -> str:
-    """Return where the bytes of another flight differ first from those of the ``first``; empty: nowhere."""
+    """Return in words where the bytes of the ``other`` history first differ from ``first``, or empty text."""
     rows = min(len(first.state), len(other.state))
     found = []
-    # In the order of the loop: of what differs in a step, the first is the cause.
+    # In the order of the loop, because the first signal that differs within a step is the cause.
     for order, name in enumerate(SIGNALS):
         columns = (getattr(history, name)[:rows] for history in (first, other))
         expected, flown = (np.ascontiguousarray(column).reshape(rows, -1) for column in columns)

@@ -1,4 +1,4 @@
-"""Flights that differ little, several at a time in the lanes of a register: each with the bits that it has alone."""
+"""Similar flights, simulated several at a time in the lanes of vector registers, each with the bits it has alone."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _MOST_HISTORY = 64 * 2**20
 
 
 class FlightGroup:
-    """Up to :func:`hsv.core.lanes` simultaneous flights, and the memory for them."""
+    """A simulator of up to :func:`hsv.core.lanes` flights at a time, which keeps the memory for them."""
 
     def __init__(self) -> None:
         self.lanes = lanes()
@@ -35,8 +35,8 @@ class FlightGroup:
     def takes(components: Sequence[Components], rows: int | None = None) -> bool:
         """Return whether flights can be flown side by side.
 
-        All blocks must be the core's own; only vehicle, seed, beginning, faults, reference, gains, and the numbers of
-        sensors, links and air may differ; the histories, of ``rows`` steps each, must not be too large.
+        Nominal law and controller must be the core's own. Only vehicle, seed, initial state, faults, reference, gains,
+        and the numbers of sensors, links and air may differ. Histories of ``rows`` steps each must not be too large.
         """
         of_the_core = all(each.controller.in_core and each.nominal_trajectory.law.in_core for each in components)
         if not 1 < len(components) <= lanes() or not of_the_core:
@@ -47,9 +47,9 @@ class FlightGroup:
         return all(_same(first, other) for other in others)
 
     def fly(self, components: Sequence[Components], tube_set: Struct | None = None) -> list[tuple[Flight, float]]:
-        """Return the flights of ``components``, valid until the next call, and their largest levels in ``tube_set``.
+        """Return the flights of ``components``, each with its largest level in ``tube_set``, -inf without a set.
 
-        Spare lanes repeat the last flight. Without a set the levels are -inf.
+        The flights are valid until the next call. Spare lanes repeat the last flight.
         """
         rows, estimated = components[0].plant.steps + 1, not is_ideal(components[0])
         if self._numbers.shape[1] != rows * History.numbers():
@@ -63,19 +63,19 @@ class FlightGroup:
 
 
 class TubeLevels:
-    """Levels in the invariant set of one design, for flights with its notch filter and a tube law."""
+    """Computes levels in a design's invariant set, for flights with a tube law and the notch filter of the design."""
 
     def __init__(self, parts: Components) -> None:
-        """Read the set from the tube law among the components of the flights, if it is one."""
+        """Take the set from the controller in ``parts``, the components of the flights, if it is a tube law."""
         law, notch = parts.controller, parts.notch_filter
         tube = law.design.tube if isinstance(law, TubeLaw) and notch.sections == law.design.notch else None
         self.set: Struct | None = None
-        """The set as the core takes it; None if no set holds for the flights"""
+        """The core's struct of the set; None if no set applies to the flights"""
         if tube:
             self.set = Struct("hsv_tube_set", notch=notch.data, shape=tube.shape, centre=tube.centre)
 
     def worst(self, flight: FlightData) -> float | None:
-        """Return the largest level (e - c)' P (e - c) of the flight, None if no set holds for it."""
+        """Return the largest level (e - c)' P (e - c) of the flight, None if no set applies to it."""
         if not self.set:
             return None
         given = [doubles(vector(each)) for each in (flight.history.state, flight.history.deviation, flight.reference)]
@@ -88,10 +88,10 @@ def fly_perturbed(
     job: Callable[[Mapping[str, float], Flight], Result],
     progress: Callable[[int], None] = lambda done: None,
 ) -> list[Result]:
-    """Return ``job`` of every flight in order; the flights are simulated in one thread per processor.
+    """Fly every perturbation of a vehicle and return the results of ``job(perturbation, flight)``, in order.
 
-    ``components`` are those of the nominal vehicle, ``perturbations`` relative changes of its parameters. ``progress``
-    is called with the number of flights done.
+    The flights are simulated in one thread per processor. ``components`` are those of the nominal vehicle,
+    ``perturbations`` relative changes of its parameters. ``progress`` receives the number of finished flights.
     """
     width = lanes()
 
@@ -107,7 +107,7 @@ def fly_perturbed(
 
 
 def _shared(components: Components) -> tuple[Any, ...]:
-    """Return all that flights side by side have in common."""
+    """Return the data that must be equal in all flights that are simulated side by side."""
     plant, notch, tube = components.plant, components.notch_filter, components.controller.kernel
     data, nominal = plant.data, components.nominal_trajectory.data
     engine = any(row.fault.kind.side == ENGINE_SIDE for row in components.fault_injector.known)
