@@ -2,8 +2,8 @@
  * scenario in scenario.h.
  *
  * It is everything between the command and the measurement: the link and the faults of the command, actuators, vehicle,
- * air, engine, sensors and the link of the measurement, and the reference of the scenario with its defect. Step k holds
- * the command over the period from k - 1 to k and gives the signals at k; step 0 gives those of the start. */
+ * air, engine, sensors and the link of the measurement. It also has the reference of the scenario with its defect. Step
+ * k applies the command over the period from k - 1 to k and outputs the signals at k; step 0 outputs those at 0. */
 #define BASE
 #include "scenario.h"
 #include "hsv_block.h"
@@ -11,7 +11,7 @@
 
 #define SIZE(array) (sizeof(array) / sizeof((array)[0]))
 
-/* All that is kept from step to step, without pointers. */
+/* The state that is kept from step to step; it contains no pointers. */
 typedef struct {
     double x[STATES], actuator[INPUTS], actuators[2 * INPUTS], command[INPUTS], effector[INPUTS];
     double conditions[CONDITIONS], atmosphere[SIZE(memory_data_atmosphere)], link[SIZE(memory_data_link)];

@@ -1,7 +1,7 @@
-"""Flights and random sequences of a design repeated: the second half of :mod:`hsv.control.verification`.
+"""Verification of a design by flights and random sequences; :mod:`hsv.control.verification` has the other checks.
 
-Nothing here comes from the code that computes designs. Flights are simulated by the real loop, and the disturbances
-that acted in them are what the polytopic model does not explain, eq. 13 to 19.
+Nothing here uses the code that computes designs. The core simulates the flights. The disturbances of a flight are the
+part of its motion that the polytopic model does not explain, eq. 13 to 19.
 """
 
 from __future__ import annotations
@@ -50,15 +50,17 @@ _FLIGHTS, _SEED = 48, 7
 
 
 def region(subject: Subject, design: ControlDesign, share: float) -> Components:
-    """Return the loop that flies the step of the design, without uncertainty, with ``share`` of the fault (eq. 47)."""
+    """Return the loop of the design's declared flight: nominal vehicle, and ``share`` of the fault (eq. 47)."""
     declared = region_parameters(subject.certificate["inputs"], subject.vehicle, share)
     return assemble({**design.to_parameters(), **declared})
 
 
 class Disturbances(NamedTuple):
-    """A flight in the coordinates of the tube, a row a step: ``channels`` (n, 7) of W, ``error`` e (n + 1, states).
+    """Disturbances and error of a flight, one row per step.
 
-    ``lag`` (n + 1, 2): feedback to the lag of the plan behind actuators.
+    ``channels`` (n, 7): disturbances in the order of :data:`~hsv.control.verification.CHANNELS`. ``error``
+    (n + 1, states): tube error e, without its response to the lag of actuators behind the plan. ``lag`` (n + 1, 2):
+    response of the feedback to this lag.
     """
 
     channels: np.ndarray
@@ -69,9 +71,10 @@ class Disturbances(NamedTuple):
 def disturbances(subject: Subject, flight: Flight) -> Disturbances:
     """Return the disturbances in a flight (eq. 13 to 18), and its error in the tube (eq. 22).
 
-    The disturbance is Delta(k) = x(k+1) - [x_r(k+1) + d_r(k)] - A(p) (x - x_r) - B(p) (u - u_r). Its part B_e(p) times
-    the lost elevator deflection is due to the fault. The rest is represented by three held accelerations and the
-    residuals of altitude and pitch angle. With actuators, u and the lost deflection are mean positions over a period.
+    The disturbance is Delta(k) = x(k+1) - [x_r(k+1) + d_r(k)] - A(p) (x - x_r) - B(p) (u - u_r), where p is the
+    altitude and velocity of step k. Its part B_e(p) times the lost elevator deflection is due to the fault; B_e is the
+    elevator's column of B. The rest is represented by three accelerations, constant over a period, and the residuals of
+    altitude and pitch angle. With actuators, u and the lost deflection are mean positions over a period.
     """
     design, vehicle, h = subject.design, subject.vehicle, flight.history
     notch, plan = discretise(design.notch, design.period), flight.plan
@@ -109,10 +112,11 @@ def disturbances(subject: Subject, flight: Flight) -> Disturbances:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Evidence of a flight: largest ``level`` in the set, largest ``ratio`` of a disturbance to its bound, and where.
+    """Extremes of a flight: largest ``level`` in the tube, and largest ``ratio`` of a disturbance to its bound.
 
-    ``lowest``, ``highest`` (3): of u_n + u_r and of the nominal pitch acceleration; ``lag`` (2, 2): least and largest
-    feedback to the lag; ``channels`` (2, 7): least and largest disturbances.
+    The largest ratio occurs in ``channel`` at ``step``. ``lowest`` and ``highest`` (3) are the extremes of u_r + u_n
+    (2) and of the nominal pitch acceleration (rad/s^2). The rows of ``lag`` (2, 2) and ``channels`` (2, 7) are minimum
+    and maximum of the feedback to the lag and of the disturbances.
     """
 
     level: float
@@ -126,10 +130,10 @@ class Evidence:
 
 
 def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
-    """Return the evidence of ``flight`` for the ``tube``.
+    """Return the extremes of ``flight`` that are compared with the ``tube``.
 
     Raises:
-        DesignError: The flight diverged, or its input was limited.
+        DesignError: The flight diverged, or an input was limited.
     """
     h = flight.history
     if flight.status is not FlightStatus.FINISHED or np.any(h.command != h.u_unsaturated):
@@ -154,16 +158,17 @@ def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
 
 
 def share_of(inputs: Mapping[str, Any]) -> float:
-    """Return the share of fault and parameter bounds that W' covers (eq. 47): the largest factor, or 1 without one."""
+    """Return the share of fault and parameter bounds that W' covers (eq. 47): the largest tau, or 1 if tau is fixed."""
     return float(max(inputs["adjustable"]["tau"])) if inputs.get("adjustable") else 1.0
 
 
 def flight_checks(subject: Subject) -> Checks:
-    """Repeat the flights at the corners that determine a bound of W (eq. 19), and at a sample of all corners.
+    """Yield the checks of flights at the corners that determine a bound of W (eq. 19), and at a sample of all corners.
 
-    Errors stay in the set (eq. 26), plans in the stated range, itself within eq. 30; pitch acceleration is our own.
+    Errors must stay in the set (eq. 26), and plans in the stated range, which is within the bounds of eq. 30. The check
+    of the pitch acceleration is our own.
     """
-    certified = replace(subject.design, tau=subject.design.tau_minimum)  # in flight the factor may be another one
+    certified = replace(subject.design, tau=subject.design.tau_minimum)  # a flight may use another tau
     subject = replace(subject, design=certified)
     tube, share, bounds = Tube(subject, certified, "tube"), share_of(subject.certificate["inputs"]), subject.vehicle
     parts, seen = region(subject, certified, share), fraction(bounds.uncertainty, share)
@@ -193,7 +198,7 @@ def flight_checks(subject: Subject) -> Checks:
     )
     yield _lag_check("feedback to the lag of the plan", subject, flown)
     if "adjustable" in subject.certificate:
-        # Our own: the whole fault (W) stays in the set of W' (eq. 47) in these flights; eq. 26 does not guarantee it.
+        # Our own check: with the whole fault (W), too, these flights stay in the set for W' (eq. 47), beyond eq. 26.
         whole, everyone = region(subject, certified, 1.0), corners(bounds.uncertainty, 1.0)
         field = "adjustable.complete_fault"
         yield recomputed(subject, f"{field}.flights", len(everyone), "copied")
@@ -201,7 +206,7 @@ def flight_checks(subject: Subject) -> Checks:
 
 
 def _worst(subject: Subject, field: str, flown: Sequence[Evidence]) -> Checks:
-    """Check that the flown corners do not exceed the extremes stated for all corners."""
+    """Yield the checks that the flown corners do not exceed the extremes that ``field`` states for all corners."""
     stated, allowance = subject.stated(field), 1.0 + TOLERANCES["flights"].relative
     yield at_most(f"{field}: level", max(f.level for f in flown), min(1.0, stated["worst_level"] * allowance))
     ratio = stated["disturbance_membership"]["worst_ratio"] * allowance
@@ -209,14 +214,14 @@ def _worst(subject: Subject, field: str, flown: Sequence[Evidence]) -> Checks:
 
 
 def _lag_check(name: str, subject: Subject, flown: Sequence[Evidence]) -> Check:
-    """Check the feedback to the plan's lag; our own, since the actuators of the paper have no dynamics."""
+    """Return the check of the feedback to the plan's lag. It is our own; actuators of the paper have no dynamics."""
     lower, upper = lag_feedback(subject)
     room = min(float(min((f.lag[0] - lower).min(), (upper - f.lag[1]).min())) for f in flown)
     return above(f"{name}, room to its bounds", room, -ROUNDING)
 
 
 def sequence_checks(subject: Subject) -> Checks:
-    """Repeat the random disturbance sequences, whose errors stay in the invariant set (eq. 26)."""
+    """Yield the checks of repeated random disturbance sequences, whose errors must stay in the tube's set (eq. 26)."""
     tube, field = Tube(subject, subject.design, "tube"), "tube.invariant_set.sampling"
     numbers = subject.count(f"{field}.sequences", 1_000_000), subject.count(f"{field}.steps", 10_000)
     drawn = random_sequences(tube.A, tube.columns, tube.c, tube.Q, *numbers, subject.stated(f"{field}.seed"))
@@ -229,7 +234,7 @@ def sequence_checks(subject: Subject) -> Checks:
 
 
 def bounding_corners(subject: Subject) -> list[Corner]:
-    """Return the nominal vehicle and the corners of the parameters that set a bound of the disturbances."""
+    """Return the nominal vehicle and those corners of the parameters at which a disturbance bound was measured."""
     measured = subject.stated("tube.disturbance.measured")
     seen = fraction(subject.vehicle.uncertainty, share_of(subject.certificate["inputs"]))
     return [seen[i] for i in sorted({0, *measured["lower_flight"], *measured["upper_flight"]})]
@@ -238,10 +243,10 @@ def bounding_corners(subject: Subject) -> list[Corner]:
 def scenario_checks(
     subject: Subject, scenario: Scenario, over: Sequence[Corner] = ({},), progress: Progress = lambda *_: None
 ) -> Checks:
-    """Fly ``scenario``, also with the changes ``over``; check level (eq. 26), disturbances (eq. 19), plan (eq. 30).
+    """Fly ``scenario`` with each vehicle in ``over`` and check level (eq. 26), disturbances (eq. 19), plan (eq. 30).
 
     Raises:
-        DesignError: The scenario is not flown by the tube law.
+        DesignError: The controller of the scenario is not the tube law.
     """
     name = scenario.name
     if scenario.controller != "tube_mpc":
@@ -263,11 +268,11 @@ def scenario_checks(
 
 
 FLOWN: dict[str, Part] = {"flights": flight_checks, "random sequences": sequence_checks}
-"""Checks by part that take longer."""
+"""The checks that take longer, by part of the verification."""
 
 
 def verify(subject: Subject, quick: bool = False, progress: Progress = lambda *_: None) -> dict[str, list[Check]]:
-    """Return every check recomputed, by part; with ``quick`` only those that need no flights or random sequences."""
+    """Return all checks by part; with ``quick``, only those without flights and random sequences."""
     checks: dict[str, list[Check]] = {}
     for name, part in (QUICK | RECOMPUTED | ({} if quick else FLOWN)).items():
         progress(name, 0, 1)
