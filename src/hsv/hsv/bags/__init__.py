@@ -1,1 +1,1 @@
-"""Topics, and bags: writing, reading, repair, comparison and replay in one process."""
+"""The topics and messages of the graph; bags: writing, reading, repair, comparison, and replay in one process."""

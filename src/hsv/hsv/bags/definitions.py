@@ -149,7 +149,7 @@ def installed_types(message_type: str) -> Typestore:
 
 
 def deserialized(types: Typestore, message: bytes, message_type: str) -> Any:
-    """Return ``message`` (CDR) deserialized, without surplus bytes; raise a SerdeError if it does not fit the type."""
+    """Return ``message`` (CDR) deserialized, without surplus bytes at its end; a SerdeError says that it is invalid."""
     try:
         return types.deserialize_cdr(message, message_type)
     except SerdeError:
@@ -182,7 +182,7 @@ def _check(store: Typestore, name: str, within: tuple[str, ...], where: str) -> 
 
 
 def definition(message_type: str) -> str:
-    """Return the definition of a type with its dependencies, in the ``ros2msg`` format of MCAP.
+    """Return the installed definition of a message type with its dependencies, in the ``ros2msg`` format of MCAP.
 
     Args:
         message_type: ``package/msg/Type``; looked up as ``share/package/msg/Type.msg`` below each prefix of
@@ -209,7 +209,7 @@ def definition(message_type: str) -> str:
 
 
 def type_hash(message_type: str) -> str:
-    """Return the hash of a type (``RIHS01_`` and 64 digits) from its installed description."""
+    """Return the hash of a message type (``RIHS01_`` and 64 digits) from its installed description."""
     description = json.loads(_share_file(message_type, ".json").read_text(encoding="utf-8"))
     return next(str(row["hash_string"]) for row in description["type_hashes"] if row["type_name"] == message_type)
 

@@ -45,7 +45,7 @@ SIMULATION_CONTROL = {
     "StepSimulation": "hsv/step_simulation",
     "ResetSimulation": "hsv/reset_simulation",
 }
-"""Services of the plant by their types in the ROS 2 standard ``simulation_interfaces``."""
+"""Services of the plant by their service types in the ROS 2 package ``simulation_interfaces``."""
 
 TOPICS = {
     CLOCK: "rosgraph_msgs/msg/Clock",
@@ -58,8 +58,8 @@ TOPICS = {
     TUBE_STATUS: "hsv_msgs/msg/TubeStatus",
     ACTUATOR: "hsv_msgs/msg/Actuator",
 }
-"""Types of the step topics, which have exactly one message per step, in order of recording. Not every controller
-publishes the tube status, see :func:`step_topics`."""
+"""Message types of the step topics, by role, in order of recording. A step topic has exactly one message per step. Not
+every controller publishes the tube status, see :func:`step_topics`."""
 
 CARRIED: dict[str, dict[SignalType, str]] = {
     MEASUREMENT: {signals.MEASUREMENT: "state", signals.STATUS: "status"},
@@ -235,7 +235,7 @@ def controller_node(controller: str) -> NodeDescription:
 
 
 def flown_role(role: NodeDescription, estimator: bool) -> NodeDescription:
-    """Return the description of ``role`` in a graph with or without an ``estimator``."""
+    """Return ``role``, or :data:`ESTIMATOR` if it is the notch filter and the graph has an ``estimator``."""
     return ESTIMATOR if estimator and role.name == ESTIMATOR.name else role
 
 
@@ -260,7 +260,7 @@ def peers(me: NodeDescription, controller: str, recorded: bool, estimator: bool 
 def links(
     me: NodeDescription, controller: str, recorded: bool, estimator: bool = False
 ) -> list[tuple[str, NodeDescription]]:
-    """Return the pairs (topic, other node) between which DDS must connect ``me``; with the recorder if ``recorded``."""
+    """Return the connections of ``me`` in the graph as pairs (topic, other node); with the recorder if ``recorded``."""
     return [
         (topic, other)
         for topic in TOPICS

@@ -114,7 +114,7 @@ def _file_stem(topic: str) -> str:
 
 
 def _columns(bag: Bag, topic: str) -> tuple[dict[str, NDArray[Any]], dict[str, Units]]:
-    """Return the fields of a topic and their units; the simulated time (s) is the first."""
+    """Return the fields of a topic, and their units, both by name; the first is the simulated ``time`` (s)."""
     return {"time": bag.times(topic) * 1e-9} | bag.columns(topic), {"time": Units(("s",))} | bag.units(topic)
 
 

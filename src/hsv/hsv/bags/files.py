@@ -15,14 +15,14 @@ from hsv.base.errors import DocumentError, RecordingError
 from hsv.base.files import read_bytes
 
 COMPRESSIONS = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
-"""Compressions by the first bytes of compressed data; MCAP files and messages in CDR begin differently."""
+"""Names of compressions by the first bytes of compressed data; MCAP files and messages in CDR begin differently."""
 _MAGIC = 4
 _NAME = re.compile(r".+\.mcap(?:\.zstd|\.zst|\.lz4)?")
 _NUMBER = re.compile(r"_(\d+)\.mcap")
 _MAX_FILES = 100_000
 """A number of this size or more in a file name is a date or the like, not the counter of a split bag."""
 _PART = 1024
-"""Compressed bytes that are unpacked at a time, to at most 32 MiB; so all data before a damage are kept."""
+"""Number of compressed bytes (at most 32 MiB unpacked) to unpack at a time, so that data before a damage are kept."""
 
 MAX_UNPACKED, MAX_RATIO = 2**27, 32
 """Limits on the size of an unpacked file: bytes, or a multiple of the packed size if that is more. A flight is

@@ -51,7 +51,7 @@ def input_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarra
 
 
 def flight_data(bag: Bag) -> FlightData:
-    """Return the flight in ``bag`` at the steps contained in every topic; raise a RecordingError if there are none."""
+    """Return the flight in ``bag`` at the steps that all its topics have; raise a RecordingError if there are none."""
     rows = joined(bag, (STATE, NOMINAL, COMMAND))
     state, nominal, command = rows[STATE], rows[NOMINAL], rows[COMMAND]
     status = bag.columns(ACTUATOR)
@@ -105,7 +105,7 @@ def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def held(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return, by link, the mask (n) of the steps at which it repeated its last payload; other links are left out."""
+    """Return, for each link (measurement, command) that held an old payload, the mask (n) of the steps of this."""
     ends = {}
     if MEASUREMENT in topics:
         ends["measurement"] = state_columns(topics[STATE]), state_columns(topics[MEASUREMENT], "state.")
@@ -121,9 +121,9 @@ def _repeats(rows: np.ndarray) -> np.ndarray:
 
 
 def effectors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the positions (n), SI, of effectors that deviate from their command, during the period after each step.
+    """Return, by name, the positions (n), SI, of effectors that deviate from their command, in the period of each step.
 
-    The last position is NaN, because the period after the last step is not flown.
+    The period of a step begins with it. The last position is NaN, because the period of the last step is not flown.
     """
     if ACTUATOR not in topics:
         return {}
@@ -133,13 +133,13 @@ def effectors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def moving_air(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the fields (n) of :data:`CALM_AIR` that differ from calm air, during the period after each step."""
+    """Return the fields (n) of :data:`CALM_AIR` that differ from calm air, in the period that begins with each step."""
     air = {name: _over_the_period(topics, name) for name in CALM_AIR}
     return {name: y for name, y in air.items() if (np.isfinite(y) & (y != CALM_AIR[name])).any()}
 
 
 def _over_the_period(topics: Mapping[str, Columns], field: str) -> np.ndarray:
-    """Return a field (n) of the forces during the period after each step; NaN if lost, empty if not recorded at all."""
+    """Return a field (n) of the forces in the period that begins with each step; NaN if lost, empty if not in the bag."""
     if FORCES not in topics or field not in topics[FORCES]:
         return np.empty(0)
     forces = topics[FORCES]

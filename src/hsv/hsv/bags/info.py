@@ -158,7 +158,7 @@ def parameters_in_words(fault: dict[str, Any], written: Callable[[float, str], s
 
 
 def _equipment(bag: Bag) -> dict[str, Any] | None:
-    """Return the deviations from the ideal: measurement errors, held payloads, effector errors and moving air, SI."""
+    """Return deviations from the ideal, SI: measurement errors, held payloads, effector errors, moving air; or None."""
     try:
         topics = joined(bag, equipment_topics(bag))
     except RecordingError:
@@ -174,7 +174,7 @@ def _equipment(bag: Bag) -> dict[str, Any] | None:
 
 
 def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | None:
-    """Return a text for each property of the flight that its certificate does not cover; None without attachments."""
+    """Return a text on each property of the flight outside its certificate; None if the attachments are unreadable."""
     try:
         sections = [ParameterSections.parse(bag.text(name), name) for name in ("design.yaml", "scenario.yaml")]
         values = sections[0].overlaid(sections[1]).of(TUBE_MPC.name)
@@ -229,7 +229,7 @@ def _tube(bag: Bag) -> dict[str, Any]:
 def intervals(stamps: NDArray[np.int64], holds: NDArray[np.bool_]) -> list[dict[str, Any]]:
     """Return the intervals (s) in which a condition ``holds`` (n), given the ``stamps`` (n, ns) of the steps.
 
-    ``start_s`` is the first step of an interval and ``end_s`` the first step after it, None at the end of the bag.
+    ``start_s`` is the time of the first step in an interval, ``end_s`` that of the first step after it, or None.
     """
     edges = np.diff(np.concatenate(([False], holds, [False])).astype(np.int8))
     return [

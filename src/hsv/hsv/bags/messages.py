@@ -37,7 +37,7 @@ FRAME = LEVEL
 """``frame_id`` of every message of a step: the vehicle-carried frame of the state."""
 
 ENCAPSULATION = 4
-"""Length of the header of a message in CDR, bytes; the alignment is relative to its end."""
+"""Length of the header of a message in CDR, bytes; fields are aligned relative to the end of the header."""
 
 _LITTLE_ENDIAN = b"\x00\x01"
 
@@ -48,7 +48,7 @@ def stamp_of(step: int, period: float) -> tuple[int, int]:
 
 
 def stamp_in(message: bytes) -> int:
-    """Return the simulated time (ns) at the beginning of a message of a step."""
+    """Return the simulated time (ns) at the beginning of a message (CDR) of a step topic."""
     seconds = int.from_bytes(message[4:8], "little", signed=True)
     return seconds * 1_000_000_000 + int.from_bytes(message[8:12], "little")
 
@@ -65,7 +65,7 @@ class Structure:
             ``header.stamp.sec`` or ``state.altitude``. A text includes its closing zero.
         lengths: Offset and value of the length of every text and sequence, by path.
         size: Size of :attr:`dtype`, bytes.
-        complete: Whether the type covers the whole message; it ends before a list of messages or texts.
+        complete: Whether the type covers the whole message; if not, it ends before a list of messages or texts.
     """
 
     def __init__(self, store: Typesdict, message_type: str, message: bytes) -> None:
@@ -179,7 +179,7 @@ _VALUES: dict[SignalType, Callable[[Signals], Any]] = {
     types.ESTIMATE: lambda signals: () if signals.estimate is signals.measurement else signals.estimate,
     types.GAIN: lambda signals: signals.gain.ravel(),
 }
-"""Functions that return the numbers to send for a signal, for signals that are not sent as they are."""
+"""Functions that return the numbers to send for a signal, if these differ from the value of the signal."""
 
 _TUBE = {
     "level": 1,
@@ -302,7 +302,7 @@ def _size(signal: SignalType) -> int:
 
 
 def fault_in(message: Any) -> Fault:
-    """Return the fault in a message Fault; a ParameterError names an unknown or invalid channel, type or parameter."""
+    """Return the fault in a ``Fault`` message; a ParameterError names an invalid channel, type or parameter."""
     from hsv.model.faults.table import Fault  # imported here because most nodes need no faults
 
     names, values = message.parameter_names, message.parameter_values
@@ -312,7 +312,7 @@ def fault_in(message: Any) -> Fault:
 
 
 def active_faults(message: Any) -> tuple[ActiveFault, ...]:
-    """Return the active faults in a message Actuator with their first steps; a SignalError names an invalid one."""
+    """Return the active faults in an ``Actuator`` message, with first steps; a SignalError names an invalid fault."""
     from hsv.model.faults.schedule import ActiveFault
 
     active, since = message.active, message.since

@@ -15,7 +15,7 @@ _ALL = "/**"
 
 @dataclass(frozen=True)
 class ParameterSections:
-    """Flat parameters by node."""
+    """Parameters of the nodes of a graph by their full, dotted names: shared ones, and those of single nodes."""
 
     shared: dict[str, Any]
     """Values for every node that has the parameter."""
@@ -24,7 +24,7 @@ class ParameterSections:
 
     @classmethod
     def gathered(cls, values: Mapping[str, Mapping[str, Any]]) -> Self:
-        """Return the parameters in ``values`` (by node, then name); a value that no node has differently is shared."""
+        """Return the parameters in ``values`` (by node, then name); those without :func:`differences` become shared."""
         differing = differences(values)
         shared = {name: value for flat in values.values() for name, value in flat.items() if name not in differing}
         own = {node: {name: flat[name] for name in differing if name in flat} for node, flat in values.items()}
@@ -38,7 +38,7 @@ class ParameterSections:
         return cls(shared, {name.removeprefix("/"): flat for name, flat in sections.items()})
 
     def of(self, node: str) -> dict[str, Any]:
-        """Return the flat parameters of a node, including shared ones that only other nodes have."""
+        """Return the parameters of a node by name, including shared ones that only other nodes have."""
         return self.shared | self.own.get(node, {})
 
     def only(self, names: Iterable[str]) -> Self:
@@ -73,7 +73,7 @@ class ParameterSections:
 
 
 def differences(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return the parameters with different values in different nodes: their values by node."""
+    """Return the values by node of each parameter that differs between nodes, given ``values`` by node, then name."""
     by_name: dict[str, dict[str, Any]] = {}
     for node, flat in values.items():
         for name, value in flat.items():

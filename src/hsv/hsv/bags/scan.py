@@ -41,7 +41,7 @@ class Scan:
         self._data = memoryview(file.data)
 
     def records(self) -> Iterator[kinds.McapRecord]:
-        """Yield every intact record, those of chunks in place of the chunks; damaged data are skipped and listed.
+        """Yield every intact record, and for a chunk the records inside; list damaged data in ``damages`` and go on.
 
         A record cut off at the end, as left by a killed writer, is skipped and not listed.
         """

@@ -49,7 +49,7 @@ class BagWriter:
     Args:
         directory: The bag directory, ``<name>/`` with ``<name>_0.mcap``; new or empty.
         topics: The topics known at the start.
-        custom_data: Data of the run known at the start (run id, seed, commit, design hash).
+        custom_data: Data of the run known at the start, such as seed, commit and design hash.
         distro: ROS 2 distribution of the recorder.
 
     Raises:

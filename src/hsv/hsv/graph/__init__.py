@@ -1,1 +1,1 @@
-"""The graph of nodes, described once as data, and the launcher of its processes."""
+"""Runs of the node graph: preparation, launching of the processes, node parameters, and replay over DDS."""

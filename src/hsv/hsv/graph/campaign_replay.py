@@ -90,10 +90,10 @@ def replay_over_dds(
 
 
 def require_design(results: Results) -> None:
-    """Refuse results where the file of their design no longer holds the design that the campaign flew.
+    """Refuse results if the file of their design no longer holds the design that the campaign flew.
 
     Raises:
-        CampaignError, DesignError: It holds another design, or is missing.
+        CampaignError, DesignError: The file holds another design, or is missing.
         ParameterError: The results name a design in another folder, but are not trusted.
     """
     name = results.campaign.scenario.design

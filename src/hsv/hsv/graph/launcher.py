@@ -40,7 +40,7 @@ WARNING = "[WARN] "
 """Prefix of warnings of ROS nodes and of the launcher."""
 
 _LOOK = 0.02
-"""Seconds between two looks at the processes."""
+"""Time (s) between two checks of the processes."""
 
 _FLYING = (PLANT, COMPOSED)
 """Processes that report the steps of the flight."""
@@ -160,8 +160,8 @@ class Launcher:
         does not answer, and ends.
 
         Raises:
-            RunError: The last node failed or hung, another node ended earlier, or it hung before the flight began. The
-                plant may end earlier after its flight, and losing the live view only gives a warning.
+            RunError: The last node failed or hung, or another node ended too early or hung before the flight began. A
+                plant may end first after its flight, and losing the live view only gives a warning.
         """
         *others, last = self._processes
         while True:

@@ -34,7 +34,7 @@ from hsv.graph.launcher import executable
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """A checked scenario, ready to fly: nodes, bag to record to, and parameter files, the later over the earlier."""
+    """A checked scenario, ready to fly, with nodes, bag and parameter files; later files override earlier ones."""
 
     scenario: Scenario
     bag: Path

@@ -25,7 +25,7 @@ class Standstill:
         self._seconds = 0.0
 
     def look(self, value: object) -> float:
-        """Return the time (s) since ``value`` changed, as seen by the calls; call this a few times a second."""
+        """Return the time (s) for which ``value`` was the same in successive calls; call this a few times a second."""
         now = time.monotonic()
         self._seconds += min(now - self._looked, _LONGEST_GAP)
         self._looked = now

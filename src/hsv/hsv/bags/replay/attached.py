@@ -69,7 +69,7 @@ ACTIVE_INPUT = 1e-6
 
 
 def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
-    """Add or replace the attachments of an opened bag as if it had been flown with them; its files do not change.
+    """Attach a design and a scenario to an opened bag, as if it had been flown with them; its files do not change.
 
     Args:
         bag: Any bag of a flight.
@@ -156,7 +156,7 @@ def broken_off(bag: Bag) -> bool:
 
 
 def refuse_vacuous(bag: Bag) -> None:
-    """Refuse a bag whose replay would be meaningless, since its controller was active for less than ten seconds."""
+    """Raise a RecordingError if the controller was active for less than ten seconds: a replay would prove nothing."""
     command, nominal = joined(bag, (COMMAND, NOMINAL)).values()
     deviation = input_columns(command) - input_columns(nominal, "reference_input.")
     active = np.abs(deviation).max(axis=1, initial=0.0) > ACTIVE_INPUT

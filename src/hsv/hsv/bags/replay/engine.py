@@ -91,7 +91,7 @@ class ProcessComparison:
 
     @property
     def identical(self) -> bool:
-        """Whether every output is equal in every byte."""
+        """Whether every output is equal in every byte except padding."""
         return all(topic.identical for topic in self.topics)
 
 
