@@ -54,7 +54,24 @@ def test_bad_settings_end_with_one_line_and_leave_nothing(campaign, tmp_path, wo
     ran = campaign(*words)
     assert ran.code == 2
     assert expected in ran.error
-    assert not list(tmp_path.rglob("*.parquet*"))
+    assert [path.name for path in tmp_path.iterdir()] == ["short.toml"]
+
+
+@pytest.mark.parametrize(
+    ("interrupted", "words"),
+    [
+        ("executors.make_executor", None),
+        ("store.ResultStore.finish", "finished results are in a.parquet.parts, the same command continues from there"),
+        ("summary.shares", "all flights are finished, their results are in a.parquet; the same command shows them"),
+    ],
+)
+def test_an_interrupted_campaign_says_where_its_results_are(campaign, monkeypatch, interrupted, words):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(f"hsv.flight.campaign.{interrupted}", interrupt)
+    ran = campaign("--out", "a.parquet", "--no-page")
+    assert (ran.code, ran.out, ran.error) == (130, "", f"interrupted; {words}" if words else "interrupted")
 
 
 DRAWN = """

@@ -394,20 +394,22 @@ def fly(
     count = _SAMPLES if samples is None else samples
     campaign = plan(scenario, method=method, samples=count, seed=seed, scale=scale, commit=commit(), factors=factors)
     if out is None:
-        Path("campaigns").mkdir(exist_ok=True)
         counted = "" if corners else f"_{campaign.samples}_seed{seed}"
         out = Path("campaigns", f"{campaign.scenario_name}_{method}{counted}.parquet")
-    check_target(out, "out", ".parquet")
+        check_folder(out.parent, "out")  # made with the first file
+    else:
+        check_target(out, "out", ".parquet")
     store = ResultStore(out, campaign)
-    with (
-        output.resumable(store.folder),
-        make_executor(workers, scheduler, output.errors.print) as flying,
-        output.flights(campaign.scenario_name, campaign.samples) as progress,
-    ):
-        flown = run_campaign(campaign, store, flying, restart=restart, progress=progress)
-    # The results are trusted: their code is that of the user's own scenario.
-    results = Results(out, trust=True)
-    show_campaign(results, units, json, page, flown.flights)
+    with output.resumable(store.folder) as complete:
+        with (
+            make_executor(workers, scheduler, output.errors.print) as flying,
+            output.flights(campaign.scenario_name, campaign.samples) as progress,
+        ):
+            flown = run_campaign(campaign, store, flying, restart=restart, progress=progress)
+            complete(out)
+        # The results are trusted: their code is that of the user's own scenario.
+        results = Results(out, trust=True)
+        show_campaign(results, units, json, page, flown.flights)
     if flown.flights and not json:
         output.say(f"flown in {significant(flown.wall_time)} s")
     if results.crashed.all():
@@ -555,15 +557,16 @@ def resilience(
     campaign = plan(scenarios or CONTROLLERS, tuple(dict.fromkeys(chain.from_iterable(tried))) or tuple(TRIED))
     check_folder(out, "out")
     store = CaseStore(out, campaign)
-    with (
-        output.resumable(store.folder),
-        make_executor(workers, scheduler, output.errors.print) as flying,
-        output.flights("resilience", sum(case.flights for case in campaign.batches)) as progress,
-    ):
-        flown = run_campaign(campaign, store, flying, progress=progress)
-    results = ResilienceResults.read(campaign, store)
-    options = [word for pair in (("--controllers", controllers), ("--faults", faults)) if pair[1] for word in pair]
-    written = write_results(results, out, shlex.join(["hsv", "resilience", *options]))
+    with output.resumable(store.folder) as complete:
+        with (
+            make_executor(workers, scheduler, output.errors.print) as flying,
+            output.flights("resilience", sum(case.flights for case in campaign.batches)) as progress,
+        ):
+            flown = run_campaign(campaign, store, flying, progress=progress)
+            complete(store.folder)
+        results = ResilienceResults.read(campaign, store)
+        options = [word for pair in (("--controllers", controllers), ("--faults", faults)) if pair[1] for word in pair]
+        written = write_results(results, out, shlex.join(["hsv", "resilience", *options]))
     if json:
         values = {"cases_flown_now": flown.batches, "flown_in_s": flown.wall_time}
         output.print_json({"written": list(map(str, written)), **values, "cells": _cells(results)})

@@ -58,14 +58,22 @@ class Interrupted(Exception):  # noqa: N818 - an interruption by the user is no 
 
 
 @contextmanager
-def resumable(folder: Path) -> Iterator[None]:
-    """Report after Ctrl-C, in one line, that finished results are stored in ``folder``."""
+def resumable(folder: Path) -> Iterator[Callable[[Path], None]]:
+    """Report after Ctrl-C, in one line, where the results are: finished ones in ``folder``, if it exists.
+
+    Yields a function to be called with the path of the results once all flights are finished.
+    """
+    complete: list[Path] = []
     try:
-        yield
+        yield complete.append
     except KeyboardInterrupt:
-        raise Interrupted(
-            f"interrupted; finished results are in {folder}, the same command continues from there"
-        ) from None
+        if complete:
+            words = f"all flights are finished, their results are in {complete[0]}; the same command shows them"
+        elif folder.exists():
+            words = f"finished results are in {folder}, the same command continues from there"
+        else:
+            raise
+        raise Interrupted(f"interrupted; {words}") from None
 
 
 def unit_key(unit: str) -> str:
