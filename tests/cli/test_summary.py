@@ -49,8 +49,9 @@ def test_what_is_printed_fits_80_columns_in_whole_words(hsv, monkeypatch, words,
     assert [word for word in broken if not any(map(str.isdigit, word))] == []
 
 
-def test_groups_come_in_the_order_of_reading_with_degrees_and_percent(hsv):
-    lines = [line.strip() for line in hsv("simulate", "case1_no_notch").out.splitlines()]
+@pytest.mark.parametrize("units", ["metric", "paper"])
+def test_groups_come_in_the_order_of_reading_with_degrees_and_percent(hsv, units):
+    lines = [line.strip() for line in hsv("simulate", "case1_no_notch", "--units", units).out.splitlines()]
     places = [lines.index(group) for group in (*Group, "run")]
     assert places == sorted(places)
     rows = {name: cells for name, *cells in (re.split(r"\s{2,}", line) for line in lines)}

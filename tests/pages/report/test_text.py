@@ -12,4 +12,4 @@ def test_degrees_are_for_people_and_radians_strict():
 
 def test_shares_are_in_percent_for_people():
     shown = quantity(0.0345, "1", 3, signed=True, share=True)
-    assert shown == '<span class="metric">+3.45&nbsp;%</span><span class="si paper">+0.0345</span>'
+    assert shown == '<span class="metric paper">+3.45&nbsp;%</span><span class="si">+0.0345</span>'

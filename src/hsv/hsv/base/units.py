@@ -49,7 +49,7 @@ class UnitSystem(StrEnum):
     """SI, but angles in degrees and shares in percent"""
     si = "si"
     paper = "paper"
-    """Feet, pounds, slugs and degrees"""
+    """Feet, pounds, slugs, degrees and percent"""
 
 
 _EXAMPLES = {"m": "85500 ft", "m/s": "7900 ft/s", "rad": "0.3 deg", "s": "200 s", "1": "+10 %", "rad/s": "15 rad/s"}
@@ -117,9 +117,9 @@ def in_system(value: float, unit: str, system: UnitSystem, *, share: bool = Fals
         value: The number.
         unit: Its SI unit.
         system: Unit system of the result.
-        share: Whether the value is a share (0 to 1), which the metric system shows in percent.
+        share: Whether the value is a share (0 to 1), shown in percent except in strict SI.
     """
-    if share and system is UnitSystem.metric:
+    if share and system is not UnitSystem.si:
         return 100.0 * value, "%"
     other = unit_in(system, unit)
     return (value * factor(unit, other) if other != unit else value), other

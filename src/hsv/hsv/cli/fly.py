@@ -451,6 +451,7 @@ def replay(
     from hsv.cli.summary import sample_words
     from hsv.flight.campaign.sample_runner import OUTCOMES
     from hsv.flight.campaign.summary import Results
+    from hsv.flight.metrics import is_share
     from hsv.graph.campaign_replay import replay_in_process, replay_over_dds
 
     if bag and not over_dds:
@@ -479,7 +480,8 @@ def replay(
             }
         )
     else:
-        output.print_table(f"flight {flight} of {result.name}", quantities, units)
+        shares = [*filter(is_share, quantities)]
+        output.print_table(f"flight {flight} of {result.name}", quantities, units, shares=shares)
         crashed = outcome["crashed"]
         output.say(
             f"sample  {sample_words(sample, units)}",

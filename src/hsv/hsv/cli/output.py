@@ -240,11 +240,13 @@ def quantity_table(
     return table
 
 
-def print_table(title: str, quantities: Mapping[str, Quantity], units: UnitSystem, digits: int = 3) -> None:
-    """Print name, value and unit of every quantity."""
+def print_table(
+    title: str, quantities: Mapping[str, Quantity], units: UnitSystem, digits: int = 3, shares: Collection[str] = ()
+) -> None:
+    """Print name, value and unit of every quantity; those named in ``shares`` are in percent except in strict SI."""
     table = new_table("quantity", "value", "unit", title=title, right=["value"])
     for name, quantity in quantities.items():
-        value, unit = in_system(*quantity, units)
+        value, unit = in_system(*quantity, units, share=name in shares)
         table.add_row(name.replace("_", " "), significant(value, digits), "" if unit == "1" else unit)
     console.print(table)
 

@@ -214,7 +214,7 @@ def sample_words(sample: Mapping[str, float], units: UnitSystem) -> str:
     """Return a sample (SI; uncertain parameters are relative changes) on one line."""
     from hsv.model.dynamics import COEFFICIENT_UNITS
 
-    percent = COEFFICIENT_UNITS if units is UnitSystem.metric else ()
+    percent = () if units is UnitSystem.si else COEFFICIENT_UNITS
     words = (f"{100.0 * value:+.3g} %" if name in percent else f"{value:+.3g}" for name, value in sample.items())
     return ", ".join(map(" ".join, zip(sample, words, strict=True)))
 

@@ -42,7 +42,7 @@ class Plot:
     group: str
     curves: list[dict[str, Any]]
     share: bool = False
-    """Whether y is a share, which the metric system gives in percent."""
+    """Whether y is a share, which is given in percent except in strict SI."""
     limits: Sequence[float] = ()
     """Limits, drawn as lines, in SI."""
     shades: Sequence[dict[str, Any]] = ()

@@ -15,7 +15,7 @@ SYSTEMS = {UnitSystem.metric: "SI, degrees", UnitSystem.si: "strict SI", UnitSys
 def quantity(value: float | None, unit: str, digits: int = 5, *, signed: bool = False, share: bool = False) -> Markup:
     """Return a value (in its SI ``unit``) with its unit in all systems of units; a dash for None.
 
-    A ``signed`` value has its sign if it is positive, too; the metric system gives a ``share`` in percent.
+    A ``signed`` value has its sign if it is positive, too; a ``share`` is in percent except in strict SI.
     """
     if value is None:
         return Markup("–")
