@@ -19,7 +19,7 @@ from typer.completion import completion_init
 from typer.core import TyperCommand
 
 import hsv
-from hsv.base.errors import HsvError, QuantityError, RunError, did_you_mean, reason
+from hsv.base.errors import HsvError, QuantityError, RunError, did_you_mean, one_of, reason
 from hsv.cli.output import Interrupted, console, report_error
 
 if TYPE_CHECKING:
@@ -192,10 +192,19 @@ def run(prog: str, commands: Mapping[str, Command], description: str, moved: Map
 
 
 def _usage(error: Any, prog: str) -> str:
-    # For a choice, typer also prints the type of its own exception; choices that are missing it lists a line each.
-    message = " ".join(error.format_message().replace(": Value error, ", ": ").split())
-    if choice := re.search(r"'([^']*)' is not one of (.*)\.$", message):
-        message += did_you_mean(choice[1], re.findall(r"'([^']*)'", choice[2]))
+    """Return typer's error on one line; a wrong value and a missing choice are reported in the form of all errors."""
+    message = " ".join(error.format_message().split())
+    if parameter := getattr(error, "param", None):
+        name = max(parameter.opts, key=len).lstrip("-")
+        if hasattr(error.__cause__, "errors"):  # from pydantic, which converts the words
+            wrong = error.__cause__.errors()[0]
+            expected = re.sub("^Input should be (?=greater|less)", "a number ", wrong["msg"])
+            expected = expected.removeprefix("Input should be ").partition(", unable")[0]
+            if choices := re.search(r" is not one of (.*)\.$", expected):
+                expected = one_of(re.findall(r"'([^']*)'", choices[1]), wrong["input"])
+            return f"{name} = {wrong['input']!r}: expected {expected}"
+        if choices := re.search("Choose from: (.*)", message):
+            return f"{name}: missing, expected one of {choices[1]}"
     return f"{message} (see {error.ctx.command_path if error.ctx else prog} --help)"
 
 
