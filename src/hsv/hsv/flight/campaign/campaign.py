@@ -30,13 +30,13 @@ METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
 MAX_SAMPLES = 10**7
 
 _MAX_HYPERCUBE = 10**6
-"""Largest number of samples of a Latin hypercube, which every worker draws and keeps completely"""
+"""Maximum number of samples of a Latin hypercube; every worker process draws all of them and keeps them in memory"""
 
 _BATCHES = 256
-"""Number of batches to aim at"""
+"""Number of batches into which a campaign is divided, as far as :data:`_BATCH_LIMITS` permit"""
 
 _BATCH_LIMITS = (32, 256)
-"""Smallest and largest batch: multiples of the lanes of every processor, as are all sizes in between"""
+"""Minimum and maximum number of flights in a batch; all sizes used are multiples of the minimum, to fill all lanes"""
 
 _SEEDS = int(SEED_PARAMETER.maximum) + 1
 
@@ -45,10 +45,13 @@ _PERTURBATION = "vehicle.perturbation."
 
 @dataclass(frozen=True, kw_only=True)
 class Factor(Distribution):
-    """Range or distribution of one field of the scenario; uncertain parameters are relative changes."""
+    """A scenario field that differs from flight to flight, with its range or distribution.
+
+    For an uncertain parameter of the vehicle, the values are relative changes.
+    """
 
     name: str
-    """Name of an uncertain parameter, or the field"""
+    """Name of an uncertain parameter, such as ``mass``, or of any other field, such as ``fault[0].start``"""
 
     @property
     def is_perturbation(self) -> bool:
@@ -57,18 +60,18 @@ class Factor(Distribution):
 
     @property
     def field(self) -> str:
-        """The field of the scenario."""
+        """Full name of the field in a scenario file, such as ``vehicle.perturbation.mass``."""
         return _PERTURBATION + self.name if self.is_perturbation else self.name
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """Everything that its flights depend on; equal campaigns give equal results, byte for byte."""
+    """A campaign: everything that its flights depend on. Equal campaigns give equal results, byte for byte."""
 
     scenario_name: str
     scenario_text: str
     design: Mapping[str, Any]
-    """Flat parameters of the controller's design, kept whole: its file may change later."""
+    """All parameters of the controller's design by name, stored because the design file may change later."""
     method: str
     """Sampling method, one of :data:`METHODS`."""
     samples: int
@@ -76,36 +79,36 @@ class Campaign:
     seed: int
     factors: tuple[Factor, ...]
     commit: str
-    """Version of the program, so that no result mixes two."""
+    """Git commit of the program; results of different commits are not mixed."""
     library: str = ""
-    """SHA-256 of the controller's library, for the same reason; empty where it is in none."""
+    """SHA-256 of the controller's shared library, empty without one; results of different builds are not mixed."""
 
     @cached_property
     def table(self) -> dict[str, Any]:
-        """The scenario as written."""
+        """The scenario file as a nested table."""
         return scenario_table(self.scenario_text, self.scenario_name)
 
     @cached_property
     def scenario(self) -> Scenario:
-        """The scenario without any change, distributions at their means."""
+        """The scenario with every distribution at its mean and without variation by factors."""
         return scenario_at_means(self.table, self.scenario_name)[0]
 
     @cached_property
     def perturbed(self) -> tuple[str, ...]:
-        """The uncertain parameters of the vehicle that vary, one a factor; empty where anything else varies, too."""
+        """Names of the factors if all of them are uncertain parameters of the vehicle, otherwise empty."""
         names = tuple(factor.name for factor in self.factors)
         return names if all(factor.is_perturbation for factor in self.factors) else ()
 
     def flown(self, flight: int, sample: Sequence[float]) -> Scenario:
-        """Return the scenario of a flight with its sample (one value a factor)."""
+        """Return the scenario of a flight; ``sample`` has one value per factor, in the factor's unit."""
         return scenario_at_means(self._flown_table(flight, sample), self.scenario_name)[0]
 
     def file(self, flight: int, sample: Sequence[float], **replaced: str) -> str:
-        """Return the scenario of a flight with its sample as a file; ``replaced``: other values, by key."""
+        """Return the text of the scenario file of a flight with its sample; ``replaced`` overrides top-level keys."""
         return tomli_w.dumps(self._flown_table(flight, sample) | replaced)
 
     def flight_seed(self, flight: int) -> int:
-        """Return the seed of the random numbers within a flight; flights of other campaigns have others."""
+        """Return the seed for the random numbers within a flight, from the campaign's seed and the flight number."""
         return (self.seed * MAX_SAMPLES + int(flight)) % _SEEDS
 
     def _flown_table(self, flight: int, sample: Sequence[float]) -> dict[str, Any]:
@@ -122,9 +125,10 @@ class Campaign:
         return flown
 
     def draw(self, flights: range) -> tuple[np.ndarray, np.ndarray]:
-        """Return the samples (flights, factors), in the factors' units, and the seed (flights) that each is drawn from.
+        """Return the samples (flights, factors) of the given flights, in the factors' units, and their seeds (flights).
 
-        Uniform samples have a seed each, so that any can be drawn alone; the other methods draw from the campaign's.
+        Every uniform sample has its own seed, so that it can be drawn alone. With the other methods, all samples are
+        drawn from the campaign's seed.
         """
         d, seeds = len(self.factors), np.full(len(flights), self.seed, np.uint64)
         if self.method == "uniform":
@@ -141,45 +145,45 @@ class Campaign:
                 engine.fast_forward(flights.start)
             shares = np.asarray(engine.random(len(flights)))
         else:
-            # Corners: the binary digits of the flight's number, the first factor's first.
+            # Corners: bit by bit of the flight number, 0 for the least value; the first factor has the highest bit.
             shares = (np.array(flights)[:, None] >> np.arange(d)[::-1] & 1).astype(float)
-        # Each column has the shares of a factor's distribution below the samples, 0 to 1.
+        # Each column of shares has the cumulative probabilities (0 to 1) of one factor's samples.
         return np.column_stack([f.quantiles(column) for f, column in zip(self.factors, shares.T, strict=True)]), seeds
 
     @cached_property
     def _hypercube(self) -> np.ndarray:
-        """All samples (samples, factors): the strata of each factor are shuffled over all flights."""
+        """The Latin hypercube (flights, factors), 0 to 1; the strata of each factor are shuffled over all flights."""
         from scipy.stats import qmc
 
         return np.asarray(qmc.LatinHypercube(len(self.factors), seed=self.seed).random(self.samples))
 
     @property
     def batch(self) -> int:
-        """Number of flights of a batch, the unit that is flown and stored at once."""
+        """Number of flights in each batch but the last; a batch is flown and stored at once."""
         low, high = _BATCH_LIMITS
         return max(low, min(high, self.samples // _BATCHES // low * low))
 
     @cached_property
     def batches(self) -> list[Batch]:
-        """All batches."""
+        """All batches, in the order of their flights."""
         flights = map(self.flights, range(-(-self.samples // self.batch)))
         return [Batch(f"flights {some.start} to {some.stop - 1}", len(some)) for some in flights]
 
     def flights(self, batch: int) -> range:
-        """Return the numbers of the flights of a batch."""
+        """Return the flight numbers of a batch, which is given by its number."""
         return range(batch * self.batch, min((batch + 1) * self.batch, self.samples))
 
     @cached_property
     def text(self) -> str:
-        """The campaign as JSON, the same text for the same campaign."""
+        """The campaign as JSON; equal campaigns have equal texts."""
         return json.dumps(asdict(self), sort_keys=True)
 
     @classmethod
     def from_text(cls, text: str) -> Self:
-        """Return the campaign written by :attr:`text`.
+        """Return the campaign from its JSON ``text``, the inverse of :attr:`text`.
 
         Raises:
-            CampaignError: Another version wrote it, or it is damaged.
+            CampaignError: The text was written by an incompatible version, or is damaged.
         """
         commit = "unknown"
         try:
@@ -202,7 +206,7 @@ class Campaign:
         return found
 
     def difference(self, other: Campaign) -> str:
-        """Return the first setting in which ``other`` differs, in words; empty if in none."""
+        """Return a text on the first setting in which ``other`` differs from this campaign; empty if they are equal."""
         for field in fields(self):
             mine, theirs = getattr(self, field.name), getattr(other, field.name)
             if mine != theirs:
@@ -221,19 +225,21 @@ def plan(
     commit: str = "unknown",
     factors: Mapping[str, tuple[object, object]] | None = None,
 ) -> Campaign:
-    """Return the campaign over the uncertain parameters of the paper's section 5.1, and over further ``factors``.
+    """Return the campaign that varies a vehicle's uncertain parameters, a scenario's distributions and ``factors``.
+
+    The bounds of the paper's vehicle are those of section 5.1.
 
     Args:
-        scenario_name: Shipped scenario or path of a TOML file.
-        method: One of :data:`METHODS`; ``"corners"`` flies all combinations of least and largest value.
-        samples: Number of flights; not used for corners.
-        seed: Determines all samples.
-        scale: Factor on the bounds of the uncertain parameters; 0 leaves them alone.
-        commit: Version of the program.
-        factors: Least and largest value, as a file has them, by field of the scenario.
+        scenario_name: Name of a shipped scenario, or path of a TOML file.
+        method: One of :data:`METHODS`; ``"corners"`` flies all combinations of the factors' least and largest values.
+        samples: Number of flights; ignored for corners.
+        seed: Seed from which all samples are drawn.
+        scale: Factor on the bounds of the uncertain parameters; with 0 they do not vary.
+        commit: Git commit of the program.
+        factors: Least and largest value of further fields, by field, written as in a scenario file.
 
     Raises:
-        CampaignError, ScenarioError, DesignError: Names the setting that is wrong.
+        CampaignError, ScenarioError, DesignError: A setting is wrong; the message names it.
     """
     text = scenario_text(scenario_name)
     name = Path(scenario_name).stem
@@ -264,7 +270,11 @@ def plan(
 
 
 def _factors(scenario: Scenario, drawn: Mapping[str, Distribution], scale: float) -> tuple[Factor, ...]:
-    """Return the vehicle's uncertain parameters and the ``drawn`` distributions, which replace a parameter's bounds."""
+    """Return a factor for each uncertain parameter of the vehicle and for each distribution of the scenario.
+
+    ``drawn`` has the scenario's distributions by field. The distribution of an uncertain parameter replaces its bounds;
+    the other parameters have the vehicle's bounds times ``scale``.
+    """
     if not 0.0 <= scale <= 10.0:
         raise CampaignError(f"scale = {scale}: expected 0 to 10")
     uncertainty = scenario.vehicle.described.uncertainty
@@ -279,7 +289,10 @@ def _factors(scenario: Scenario, drawn: Mapping[str, Distribution], scale: float
 
 
 def _check_ends(campaign: Campaign) -> None:
-    """Refuse factors that the scenario does not admit at their ends, all at once or one by one, the others half-way."""
+    """Raise an error if the scenario does not admit the least or largest values of the factors.
+
+    They are tried all at once, and one by one with the other factors at their middle values.
+    """
     low, high, mean = ([getattr(f, end) for f in campaign.factors] for end in ("low", "high", "middle"))
     for ends in (low, high):
         assemble_flight(campaign.flown(0, ends), design_of(campaign.design))
@@ -288,7 +301,10 @@ def _check_ends(campaign: Campaign) -> None:
 
 
 def _commands_to_same_goals(table: dict[str, Any], name: str, starts: Mapping[str, float]) -> list[dict[str, Any]]:
-    """Return the commands from other ``starts`` (SI, by axis) to the same targets: the step at t = 0 changes."""
+    """Return the scenario's commands, with the step at t = 0 changed so that the targets are reached from ``starts``.
+
+    ``starts`` has the initial altitude (m) or velocity (m/s) by axis, where it differs from the scenario's.
+    """
     scenario, _ = scenario_at_means(table, name)
     steps = [command for command in scenario.command if command.end == 0.0]
     goals = {"altitude": scenario.commands.altitudes[0], "velocity": scenario.commands.velocities[0]}

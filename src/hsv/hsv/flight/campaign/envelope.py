@@ -1,4 +1,4 @@
-"""Envelopes of the curves of all flights, updated during a campaign; the curves themselves are not stored."""
+"""Envelopes of the signals of all flights, updated during a campaign; the time histories themselves are not stored."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WINDOWS = 400
 
 
 class Signal(NamedTuple):
-    """A curve of the campaign page: name and unit."""
+    """A signal that is drawn on the campaign page: its name and SI unit."""
 
     name: str
     unit: str
@@ -35,16 +35,16 @@ SIGNALS = (
 
 
 def signals(flight: FlightData) -> np.ndarray:
-    """Return the curves of a flight (signals, steps)."""
+    """Return the time histories (signals, steps) of :data:`SIGNALS` in a flight."""
     return flight.curves[: len(SIGNALS)]
 
 
 @dataclass
 class Envelope:
-    """Envelope of the curves of several flights by window.
+    """Minimum, maximum and mean of every signal over several flights, in each time window.
 
-    ``low`` and ``high`` (windows, signals) are minimum and maximum, ``total`` (windows, signals) is the sum of the
-    flights' means; ``count`` (windows) is the number of flights.
+    ``low`` and ``high`` (windows, signals) are minimum and maximum. ``total`` (windows, signals) is the sum over the
+    flights of their mean in the window, and ``count`` (windows) the number of flights in this sum.
     """
 
     low: np.ndarray
@@ -54,7 +54,7 @@ class Envelope:
 
     @classmethod
     def empty(cls, windows: int = WINDOWS) -> Self:
-        """Return the envelope of no flight."""
+        """Return an empty envelope, to which flights are added."""
         shape = windows, len(SIGNALS)
         return cls(np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape), np.zeros(windows))
 
@@ -92,7 +92,7 @@ class Envelope:
 
     @classmethod
     def decode(cls, text: str) -> Self:
-        """Return the envelope from the text of :meth:`encode`; a ``ValueError`` if its size is another one."""
+        """Return the envelope from the text that :meth:`encode` returned; a ``ValueError`` if its size is wrong."""
         s = len(SIGNALS)
         table = np.frombuffer(base64.b64decode(text)).reshape(WINDOWS, 3 * s + 1).copy()
         return cls(table[:, :s], table[:, s : 2 * s], table[:, 2 * s : -1], table[:, -1])

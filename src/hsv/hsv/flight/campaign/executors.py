@@ -34,22 +34,22 @@ from hsv.base.processes import ctrl_c_held_back, end_with_parent
 from hsv.flight.fingerprint import DIGITS, code_digest
 
 Job = Callable[[str, int], bytes]
-"""A function that flies a batch, by its number, of the campaign written in a text, and returns the result."""
+"""A function (text of a campaign, batch number) that flies the batch and returns its result."""
 
 Notice = Callable[[str], None]
-"""A function that shows the user what the campaign waits for."""
+"""A function that shows the user a message about what the campaign waits for."""
 
 NOTICE = 10.0
-"""Seconds without a result after which the campaign says what it waits for."""
+"""Seconds without a result after which the user is told what the campaign waits for."""
 
 ANSWER, WORKERS = 60.0, 300.0
 """Seconds to wait for a Dask scheduler, and for the first of its workers: a cluster may have to start machines."""
 
 _AHEAD = 2
-"""Batches per core that are submitted at a time: one is flown, one waits."""
+"""Number of submitted batches per core: one is being flown, and one waits."""
 
 _LOOK = 0.5
-"""Seconds between two looks at the scheduler and the clock."""
+"""Seconds between two checks of the clock and of the state of the workers."""
 
 _KEPT = "what is finished is kept"
 
@@ -66,17 +66,19 @@ class Executor:
     def fly(
         self, job: Job, text: str, batches: Iterable[int], label: Callable[[int], str] = "batch {}".format
     ) -> Iterator[tuple[int, bytes]]:
-        """Yield the number and the result of each batch, in any order; ``label`` names a batch in messages.
+        """Fly batches of the campaign ``text``; yield the number and the result of each, in any order.
+
+        ``label`` returns the name of a batch for messages.
 
         Raises:
-            RunError: A batch ends the process that flies it, or the scheduler is lost.
+            RunError: A batch crashes the process that flies it, or the connection to the scheduler is lost.
         """
         for batch in batches:
             yield batch, job(text, batch)
 
 
 class _PoolExecutor(Executor, ABC):
-    """Flies the batches in a pool of workers, and reports when no result comes."""
+    """Flies the batches in a pool of workers, and calls ``notice`` if no result comes for :data:`NOTICE` seconds."""
 
     def __init__(self, notice: Notice) -> None:
         self._notice = notice
@@ -108,8 +110,8 @@ class _PoolExecutor(Executor, ABC):
                 future.cancel()
 
     def _alone(self, job: Job, text: str, batch: int, label: Callable[[int], str]) -> bytes:
-        """Return the result of a batch that is flown with no other batch in flight."""
-        for _ in range(2):  # the first time, it may have been a process that had nothing to do
+        """Fly a batch with no other batch in flight, to learn whether it crashes its worker; return its result."""
+        for _ in range(2):  # the first failure may be that of an idle worker process
             future = self._submit(job, text, batch)
             try:
                 self._first({future: batch}, label)
@@ -119,7 +121,7 @@ class _PoolExecutor(Executor, ABC):
         raise RunError(f"campaign: {label(batch)}: the worker process ended; {_KEPT}")
 
     def _first(self, flying: dict[Future[bytes], int], label: Callable[[int], str]) -> Collection[Future[bytes]]:
-        """Wait for the first results, and return their futures."""
+        """Wait until at least one batch is finished, and return the futures of the finished batches."""
         due = time.monotonic() + NOTICE
         while not (done := wait(flying, _LOOK, FIRST_COMPLETED).done):
             obstacle = self._obstacle()
@@ -131,29 +133,29 @@ class _PoolExecutor(Executor, ABC):
 
     @abstractmethod
     def _submit(self, job: Job, text: str, batch: int) -> Future[bytes]:
-        """Start the flight of a batch."""
+        """Submit a batch to the pool, and return its future."""
 
     @abstractmethod
     def _result(self, future: Future[bytes]) -> bytes:
-        """Return the result of a flown batch."""
+        """Return the result of a finished batch."""
 
     def _renew(self) -> None:
         """Replace a pool that is broken."""
 
     @abstractmethod
     def _obstacle(self) -> str:
-        """Return why no result can come, as the end of a message; empty if the batches just take long."""
+        """Return why no result can come, as the end of a message; empty if the batches may just take long."""
 
 
 class ProcessExecutor(_PoolExecutor):
-    """Flies the batches in processes of this machine, which are replaced when one of them dies.
+    """Flies the batches in processes of this machine; when one of them dies, all are replaced.
 
-    Campaigns and results travel in files: if a process were killed while a long one is on its way through a pipe, the
-    pool would wait for ever, for the rest of it or to get rid of it.
+    Campaigns and results are passed in files, not through the pool's pipes: if a process were killed while a long text
+    is in a pipe, the pool would wait for ever to read or write the rest.
     """
 
     def __init__(self, workers: int, notice: Notice = lambda words: None) -> None:
-        """Start the processes."""
+        """Start ``workers`` processes."""
         super().__init__(notice)
         self.cores = workers
         self._start()
@@ -163,7 +165,7 @@ class ProcessExecutor(_PoolExecutor):
         return [process.pid for process in self._processes()]
 
     def close(self, *, kill: bool = False) -> None:
-        """End the processes: at once, or when they have flown the batches that they have begun."""
+        """End the processes: at once with ``kill``, otherwise after the batches that they are flying."""
         if kill:
             for process in self._processes():
                 process.kill()
@@ -175,14 +177,14 @@ class ProcessExecutor(_PoolExecutor):
         self._others = set(multiprocessing.active_children())
         context = multiprocessing.get_context("spawn")
         self._pool = ProcessPoolExecutor(self.cores, context, end_with_parent, (os.getpid(),))
-        for _ in range(self.cores):  # a task for each, so that all start
+        for _ in range(self.cores):  # one task per process, so that all processes start now
             self._call(int)
 
     def _processes(self) -> list[BaseProcess]:
         return [child for child in multiprocessing.active_children() if child not in self._others]
 
     def _call(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        # The processes, which start here, never receive Ctrl-C: this process ends them.
+        # A worker process that starts here must never receive Ctrl-C, because this process ends it.
         with ctrl_c_held_back():
             try:
                 return self._pool.submit(function, *arguments)
@@ -196,12 +198,12 @@ class ProcessExecutor(_PoolExecutor):
     def _submit(self, job: Job, text: str, batch: int) -> Future[bytes]:
         try:
             return self._call(_to_file, job, self._written(text), batch)
-        except BrokenProcessPool:  # a process died while it had nothing to do
+        except BrokenProcessPool:  # an idle process died
             self._renew()
             return self._call(_to_file, job, self._written(text), batch)
 
     def _written(self, text: str) -> Path:
-        """Return the file with the text of a campaign."""
+        """Write the text of a campaign to a file, unless this was done before, and return the path of the file."""
         path = Path(self._folder.name, sha256(text.encode()).hexdigest())
         if not path.exists():
             path.write_text(text, encoding="utf-8")
@@ -223,14 +225,14 @@ class ProcessExecutor(_PoolExecutor):
 
 
 def _to_file(job: Job, campaign: Path, batch: int) -> bytes:
-    """Fly a batch of the campaign in a file, and return the path of the file with its result."""
+    """Fly a batch of the campaign whose text is in a file; return the path, as bytes, of a file with the result."""
     path = campaign.with_name(f"{batch}")
     path.write_bytes(job(campaign.read_text(encoding="utf-8"), batch))
     return bytes(path)
 
 
 class DaskExecutor(_PoolExecutor):
-    """Flies the batches on the workers of a Dask scheduler, which flies those of a lost worker on another one."""
+    """Flies the batches on the workers of a Dask scheduler, which repeats those of a lost worker on another worker."""
 
     def __init__(self, client: Any, notice: Notice = lambda words: None) -> None:
         super().__init__(notice)
@@ -271,14 +273,16 @@ class DaskExecutor(_PoolExecutor):
 
 @contextmanager
 def make_executor(workers: int, scheduler: str = "", notice: Notice = lambda words: None) -> Iterator[Executor]:
-    """Yield the executor for the Dask ``scheduler`` at an address, or for a number of processes of this machine.
+    """Yield an executor for the workers of a Dask scheduler, or for worker processes on this machine.
 
-    Of the workers, 0 means one per processor, and 1 flies in this process. ``notice`` is called with the reason when
-    the campaign has to wait.
+    Args:
+        workers: Number of processes: 0 for one per processor, 1 to fly in this process. Must be 0 with a scheduler.
+        scheduler: Address of a Dask scheduler; empty: fly on this machine.
+        notice: Called with a message when the campaign has to wait.
 
     Raises:
-        CampaignError: The number or the address is not admissible, no scheduler answers there, it has no workers, or
-            one of them has another program.
+        CampaignError: The number or the address is not admissible, no scheduler answers at the address, it has no
+            workers, or one of them has another version of the library.
     """
     if not 0 <= workers <= 4096:
         raise CampaignError(f"workers = {workers}: expected 0 to 4096")
@@ -304,7 +308,11 @@ def make_executor(workers: int, scheduler: str = "", notice: Notice = lambda wor
 
 @contextmanager
 def _connected(address: str, notice: Notice) -> Iterator[Any]:
-    """Yield the client of the scheduler at ``address``, which has at least one worker."""
+    """Yield a client of the scheduler at ``address`` as soon as the scheduler has at least one worker.
+
+    Raises:
+        CampaignError: The address is malformed, no Dask scheduler answers, or no worker comes in time.
+    """
     from distributed import Client
     from distributed.comm import get_address_host_port
 
@@ -338,7 +346,10 @@ def _connected(address: str, notice: Notice) -> Iterator[Any]:
 
 
 async def _answers(address: str, waiting: Callable[[], None]) -> bool:
-    """Return whether a scheduler answers within :data:`ANSWER`; Dask's own client cannot be interrupted meanwhile."""
+    """Return whether a Dask scheduler answers within :data:`ANSWER` seconds; after :data:`NOTICE`, call ``waiting``.
+
+    Dask's own client is not used here, because Ctrl-C does not interrupt it while it waits.
+    """
     from distributed.core import rpc
     from distributed.security import Security
 
@@ -355,20 +366,20 @@ async def _answers(address: str, waiting: Callable[[], None]) -> bool:
 
 
 def program() -> str:
-    """Return the version of the library, and the first digits of the digest of the code that flies."""
+    """Return the version of the library, and the first digits of the digest of the code that a flight uses."""
     return f"hsv {version('hsv')}, sources {code_digest()[:DIGITS]}"
 
 
 def _check_workers(client: Any, address: str, notice: Notice) -> None:
-    """Refuse the scheduler at ``address`` if one of its workers has another program, or none, or does not answer."""
+    """Raise a ``CampaignError`` if any worker lacks the library, has another version of it, or does not answer."""
 
     def worker_program() -> str:
-        # A local function travels by value: the worker may not have the library.
+        # A local function is sent by value, and so it can be called on a worker without the library.
         from hsv.flight.campaign.executors import program
 
         return program()
 
-    # In a thread, which ends with the client: an interruption need not wait for a worker that is stopped.
+    # Use a thread, so that Ctrl-C need not wait for a worker that is stopped. The thread ends with the client.
     pool = ThreadPoolExecutor(1)
     answers = pool.submit(client.run, worker_program, on_error="return")
     pool.shutdown(wait=False)

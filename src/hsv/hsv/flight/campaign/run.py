@@ -16,39 +16,40 @@ from hsv.flight.campaign.executors import Executor, Job
 
 
 class Batch(NamedTuple):
-    """A number of flights that are flown and stored together; its number is its place in the campaign."""
+    """A group of flights that are flown and stored together; its number is its index in :attr:`Plan.batches`."""
 
     label: str
-    """Name in messages"""
+    """Name of the batch in messages"""
     flights: int
+    """Number of flights"""
 
 
 class Plan(Protocol):
-    """The definition of a campaign."""
+    """The definition of a campaign, as far as :func:`run_campaign` uses it."""
 
     @property
     def text(self) -> str:
-        """The campaign as a text, from which workers read it."""
+        """The campaign as a text, from which worker processes construct it."""
 
     @property
     def batches(self) -> Sequence[Batch]:
-        """All batches."""
+        """All batches, in the order of their numbers."""
 
 
 class Store(ABC):
-    """The place where the results of a campaign are kept, and the job that makes them."""
+    """Storage for the results of a campaign, with the job that computes them."""
 
     def __init__(self, place: Path, lock: Path, fly: Job) -> None:
-        """Keep the results of the job ``fly`` in a file or folder ``place``, with the file ``lock`` next to it."""
+        """Store the results of the job ``fly`` in a file or folder ``place``; ``lock`` is the path of the lock file."""
         self._place, self._lock = place, lock
         self.fly = fly
 
     @contextmanager
     def opened(self, *, restart: bool = False) -> Iterator[set[int]]:
-        """Yield the numbers of the finished batches; with ``restart``, existing results are discarded before.
+        """Lock the store and yield the numbers of the finished batches; ``restart`` first discards existing results.
 
         Raises:
-            CampaignError: The place belongs to another campaign, cannot be made, or is in use.
+            CampaignError: The store belongs to another campaign, cannot be created, or is in use.
         """
         with writing(self._place):
             self._lock.parent.mkdir(parents=True, exist_ok=True)
@@ -57,22 +58,22 @@ class Store(ABC):
 
     @abstractmethod
     def finished(self, restart: bool) -> set[int]:
-        """Return the numbers of the finished batches; errors as for :meth:`opened`."""
+        """Return the numbers of the finished batches, none with ``restart``; errors as for :meth:`opened`."""
 
     @abstractmethod
     def path(self, batch: int) -> Path:
-        """Return the file of a batch."""
+        """Return the path of the result file of a batch."""
 
     def keep(self, batch: int, content: bytes) -> None:
         """Store the result of a batch atomically."""
         write_whole(self.path(batch), content)
 
     def finish(self) -> None:  # noqa: B027
-        """Complete the results once all batches are there."""
+        """Complete the results after the last batch; by default, there is nothing to do."""
 
 
 class Flown(NamedTuple):
-    """The flights and batches that a run has flown, and the time (s) that it took."""
+    """The numbers of flights and batches flown by one call of :func:`run_campaign`, and its wall time (s)."""
 
     flights: int
     batches: int
@@ -89,11 +90,11 @@ def run_campaign(
 ) -> Flown:
     """Fly those batches of a campaign whose results are not in the store, or with ``restart`` all of them.
 
-    ``progress`` is called with the number of finished flights, those found at the start included.
+    ``progress`` is called with the number of finished flights, including those that were in the store before.
 
     Raises:
         CampaignError: The store holds another campaign, is in use, or cannot be written.
-        RunError: A batch ends its worker process, or the scheduler is lost.
+        RunError: A batch crashes its worker process, or the connection to the scheduler is lost.
     """
     with store.opened(restart=restart) as finished:
         batches = plan.batches
@@ -111,9 +112,12 @@ def run_campaign(
 
 @contextmanager
 def locked(path: Path, complaint: str) -> Iterator[None]:
-    """Hold the lock file ``path``, which exists only while it is held, or if its holder was killed.
+    """Hold an exclusive lock on the file ``path``, which is created for this purpose and removed afterwards.
 
-    If another process holds it, the ``CampaignError`` is the ``complaint``.
+    A file left by a process that was killed is not locked.
+
+    Raises:
+        CampaignError: Another process holds the lock, with the message ``complaint``, or the file cannot be created.
     """
     while True:
         try:
@@ -124,7 +128,7 @@ def locked(path: Path, complaint: str) -> Iterator[None]:
         except OSError as error:
             raise CampaignError(f"{path}: cannot be locked ({reason(error)})") from error
         with stream:
-            # The last holder may have removed the file in the meantime, and a third process made another one.
+            # The previous holder may have removed the file after it was opened here, and then the lock is void.
             if not path.exists() or not os.path.samestat(path.stat(), os.fstat(stream.fileno())):
                 continue
             try:
@@ -135,7 +139,7 @@ def locked(path: Path, complaint: str) -> Iterator[None]:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file atomically."""
+    """Write a file atomically; a ``CampaignError`` if this fails."""
     temporary = path.with_name(path.name + ".unfinished")
     with writing(path, temporary):
         temporary.write_bytes(content)
@@ -144,7 +148,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 @contextmanager
 def writing(path: Path, temporary: Path | None = None) -> Iterator[None]:
-    """Convert system errors to an error that names ``path``, and remove an incomplete ``temporary`` file."""
+    """Convert system errors to a ``CampaignError`` that names ``path``, and remove an incomplete ``temporary`` file."""
     try:
         yield
     except OSError as error:
@@ -155,7 +159,7 @@ def writing(path: Path, temporary: Path | None = None) -> Iterator[None]:
 
 
 def replace_file(temporary: Path, path: Path) -> None:
-    """Move a finished file into place, on the disk before it has its name."""
+    """Rename a finished file ``temporary`` to ``path`` after its content has reached the disk."""
     with temporary.open("rb") as stream:
         os.fsync(stream.fileno())
     temporary.replace(path)

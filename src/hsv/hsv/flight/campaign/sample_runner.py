@@ -26,13 +26,13 @@ from hsv.flight.side_by_side import FlightGroup, TubeLevels
 from hsv.model.dynamics import in_model_range
 
 CAMPAIGN, ENVELOPE, DIGEST = b"hsv.campaign", b"hsv.envelope", b"hsv.digest"
-"""Keys of the file's metadata."""
+"""Keys in the metadata of a result file: the campaign, the envelope, and the digest of both."""
 
 OUTCOMES = {"end_time": "s", "tube_level": "1", **{name: metric.unit for name, metric in METRICS.items()}}
-"""The recorded numbers of a flight, with their SI units; null if a flight does not define one."""
+"""Names of the numbers that are recorded of every flight, with their SI units; a number may be undefined (null)."""
 
 WRITTEN: dict[str, Any] = {"compression": "zstd", "write_page_checksum": True}
-"""Options of the result file; the checksums detect damage that decompresses without an error."""
+"""Parquet options of the result file; its checksums detect damage that does not stop the decompression."""
 
 _BATCH_WRITTEN: dict[str, Any] = {
     "compression": "none",
@@ -40,20 +40,18 @@ _BATCH_WRITTEN: dict[str, Any] = {
     "write_statistics": False,
     "write_page_checksum": True,
 }
-"""Options of a batch, which is read once and removed: compressing it takes longer than writing it."""
+"""Parquet options of the file of a batch, which is read only once: compressing it takes longer than writing it."""
 
 
 Outcome = dict[str, float | bool | str | None]
 
 
 FlownSample = tuple[Flight, float | None] | ControllerError
-"""A flight and its largest level in the tube's invariant set (None if no set holds for it), or the controller's error.
-
-A campaign does not keep the flight itself."""
+"""A flight and its largest tube level (None if no invariant set applies to it), or the error of the controller."""
 
 
 class SampleRunner:
-    """Flies any flight of one campaign, alone or in any order, always with the same bits."""
+    """Flies any flights of one campaign, in any order; a flight always has the same bits."""
 
     def __init__(self, campaign: Campaign) -> None:
         self.campaign = campaign
@@ -65,7 +63,7 @@ class SampleRunner:
         self.period = parts.plant.period
         """Control period, s"""
         self.steps = parts.plant.steps
-        """Control periods of a flight that does not end early"""
+        """Number of control periods of a flight that does not end early"""
 
     @property
     def controller(self) -> Controller:
@@ -73,18 +71,19 @@ class SampleRunner:
         return self._variants.unchanged.controller
 
     def sample(self, flight: int) -> list[float]:
-        """Return the sample of a flight (one value a factor)."""
+        """Return the sample of a flight: one value per factor, in the factor's unit."""
         [sample], _ = self.campaign.draw(range(flight, flight + 1))
         return list(sample.tolist())
 
     def fly(self, flight: int, sample: Sequence[float]) -> Flight:
-        """Fly a flight with its sample (one value a factor)."""
+        """Fly a flight with its sample, one value per factor."""
         return fly(self._components(flight, sample))
 
     def fly_all(self, flights: Sequence[int], samples: np.ndarray) -> Iterator[FlownSample]:
-        """Fly ``flights`` with their ``samples`` (flights, factors), side by side if possible.
+        """Fly ``flights`` with their ``samples`` (flights, factors) and yield the results, in the same order.
 
-        Each flight is valid until the next one.
+        The flights are simulated side by side if possible. A result must be used before the next one is requested,
+        because flights share memory.
         """
         width = lanes()
         for start in range(0, len(flights), width):
@@ -97,22 +96,22 @@ class SampleRunner:
                 yield from map(self._fly_alone, components)
 
     def fly_unchanged(self) -> Flight:
-        """Fly the scenario itself."""
+        """Fly the scenario without variation by the factors."""
         return fly(self._variants.unchanged)
 
     def level(self, flight: FlightData) -> float | None:
-        """Return the largest level of a flight in the tube, None if no set holds for it."""
+        """Return the largest tube level of a flight, None if no invariant set applies to it."""
         return self._levels.worst(flight)
 
     def outcome(self, flown: FlownSample) -> Outcome:
-        """Return the row of a flight: its end, tube level, metrics (SI) and fingerprint, or the controller's error."""
+        """Return the outcome of a flight: end, tube level, metrics (SI) and fingerprint, or the controller's error."""
         if isinstance(flown, ControllerError):
             return {"diverged": False, "crashed": str(flown)}
         flight, level = flown
         return self.measured(flight, level, flight.fingerprint)
 
     def measured(self, flight: FlightData, level: float | None, fingerprint: str | None) -> Outcome:
-        """Return the row of a flight with its largest level in the tube and its fingerprint."""
+        """Return the outcome of a flight with its largest tube level and its fingerprint."""
         vehicle = self._variants.unchanged.plant.vehicle
         return {
             "diverged": not in_model_range(flight.history.state[-1], vehicle.angle_limit),
@@ -124,7 +123,7 @@ class SampleRunner:
         }
 
     def fly_batch(self, batch: int) -> bytes:
-        """Fly a batch; return its rows and envelope as a Parquet file."""
+        """Fly a batch, given by its number; return its table of results and its envelope as a Parquet file."""
         flights, envelope, rows = self.campaign.flights(batch), Envelope.empty(), []
         samples, seeds = self.campaign.draw(flights)
         for flight, sample, seed, flown in zip(flights, samples, seeds, self.fly_all(flights, samples), strict=True):
@@ -154,7 +153,7 @@ class SampleRunner:
 
 
 def schema(campaign: Campaign) -> pa.Schema:
-    """Return the columns: flight, seed, sample, end, metrics, fingerprint."""
+    """Return the columns of the table of results: flight, seed, sample, end, metrics (SI), fingerprint."""
     samples = [_number(f"sample_{factor.name}", factor.unit) for factor in campaign.factors]
     outcomes = [_number(name, unit) for name, unit in OUTCOMES.items()]
     fixed = [pa.field("flight", pa.int64(), False), pa.field("seed", pa.uint64(), False)]
@@ -167,7 +166,7 @@ def _number(name: str, unit: str) -> pa.Field:
 
 
 def encode(campaign: Campaign, rows: list[dict[str, Any]], envelope: Envelope) -> bytes:
-    """Return rows and envelope of a batch as a Parquet file."""
+    """Return the rows (one per flight) and the envelope of a batch as the content of a Parquet file."""
     table = pa.Table.from_pylist(rows, schema=schema(campaign).with_metadata({ENVELOPE: envelope.encode()}))
     stream = BytesIO()
     pq.write_table(table, stream, **_BATCH_WRITTEN)
@@ -176,15 +175,15 @@ def encode(campaign: Campaign, rows: list[dict[str, Any]], envelope: Envelope) -
 
 @lru_cache(maxsize=1)
 def sample_runner(text: str) -> SampleRunner:
-    """Return the sample runner of the campaign written in ``text``; a worker process keeps the last one."""
+    """Return the sample runner of the campaign with this ``text``; the runner of the latest text is cached."""
     return SampleRunner(Campaign.from_text(text))
 
 
 def fly_batch(text: str, batch: int) -> bytes:
-    """Fly a batch of the campaign written in ``text``, see :meth:`SampleRunner.fly_batch`.
+    """Fly a batch of the campaign with this ``text``; return the same as :meth:`SampleRunner.fly_batch`.
 
-    The flights run in the child process of the controller's library if there is one. If the library crashes, they are
-    flown again, each with a child process of its own.
+    If the controller is in a shared library, the flights run in the child process that loads it. If the library
+    crashes, all flights of the batch are flown again, each with a new child process.
     """
     runner = sample_runner(text)
     if isinstance(runner.controller, LibraryController):

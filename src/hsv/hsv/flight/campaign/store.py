@@ -21,7 +21,7 @@ _CAMPAIGN_FILE = "campaign.json"
 
 
 class ResultStore(Store):
-    """The store of the batches of one campaign; a stored batch is complete even if the process is killed."""
+    """Stores the batches of one campaign, then its result file; a stored batch is complete even after a crash."""
 
     def __init__(self, out: Path, campaign: Campaign) -> None:
         super().__init__(out, out.with_name(out.name + ".lock"), fly_batch)
@@ -30,7 +30,7 @@ class ResultStore(Store):
         self._campaign = campaign
 
     def finished(self, restart: bool) -> set[int]:
-        """Return the numbers of the finished batches."""
+        """Return the numbers of the finished batches, none with ``restart``, which deletes existing results."""
         if restart:
             shutil.rmtree(self.folder, ignore_errors=True)
             self.out.unlink(missing_ok=True)
@@ -53,7 +53,7 @@ class ResultStore(Store):
         return {batch for batch in batches if self._is_whole(batch)}
 
     def finish(self) -> None:
-        """Make the result file of all batches, if it is not there, and remove the batches."""
+        """Join the files of all batches to the result file and delete them, unless the result file exists."""
         if self.out.exists():
             return
         temporary = self.out.with_name(self.out.name + ".unfinished")
@@ -90,7 +90,7 @@ class ResultStore(Store):
             raise CampaignError(f"{path}: damaged, removed; the same command flies these flights again") from error
 
     def path(self, batch: int) -> Path:
-        """Return the file of a batch."""
+        """Return the path of the result file of a batch."""
         return self.folder / f"{batch:08}.parquet"
 
     def _check(self, found: Campaign, where: Path) -> None:
@@ -104,7 +104,7 @@ def read_result(path: Path) -> tuple[Campaign, Envelope]:
     """Return the campaign whose results are in a Parquet file, and the envelope of its flights.
 
     Raises:
-        CampaignError: The file is missing, damaged, not the result of a campaign, or that of another version.
+        CampaignError: The file is missing, damaged, not the result of a campaign, or written by another version.
     """
     try:
         with open_regular(path):
@@ -134,6 +134,6 @@ def read_result(path: Path) -> tuple[Campaign, Envelope]:
 
 
 def result_digest(kept: Mapping[bytes, bytes]) -> bytes:
-    """Return the hexadecimal SHA-256 of the metadata."""
+    """Return the hexadecimal SHA-256 of the campaign and the envelope in the metadata of a result file."""
     texts = [kept.get(key, b"") for key in (CAMPAIGN, ENVELOPE)]
     return hashlib.sha256(b"".join(b"%d:%s" % (len(text), text) for text in texts)).hexdigest().encode()

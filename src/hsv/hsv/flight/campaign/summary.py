@@ -26,22 +26,25 @@ if TYPE_CHECKING:
 CONFIDENCE = 0.95
 
 CRASHED, DIVERGED = ENDED = ("crashed", "diverged")
-"""Names that replace the limit of a flight that did not reach its end."""
+"""Reasons why a flight did not reach its end; :attr:`WorstFlight.limit` has them in place of a limit."""
 
 TUBE_LIMIT = 1.0
-"""Largest level of e - c inside the invariant set."""
+"""Tube level on the boundary of the invariant set."""
 
 
 @dataclass(frozen=True)
 class Share:
-    """Number of flights within a limit (SI; ``None`` for a yes-or-no statement), with the 95 % confidence interval."""
+    """Number of flights within a limit, with the 95 % confidence interval of their share.
+
+    The limit is in SI units. It is None for the statement that a flight reaches its end.
+    """
 
     name: str
     limit: float | None
     within: int
     flights: int
     interval: tuple[float, float] | None
-    """Clopper-Pearson interval; ``None`` for corners, which are not a random sample."""
+    """Clopper-Pearson interval, from 0 to 1; None for corners, which are not a random sample."""
 
     @property
     def fraction(self) -> float:
@@ -51,7 +54,10 @@ class Share:
 
 @dataclass(frozen=True)
 class WorstFlight:
-    """A flight, the limit with its largest ratio of value to limit, and that ratio; infinite if it did not finish."""
+    """One of the worst flights, with the name of the limit for which the ratio of value to limit is largest.
+
+    ``ratio`` is this ratio, infinite for a flight that did not reach its end. ``sample`` is in SI units, by factor.
+    """
 
     flight: int
     limit: str
@@ -60,10 +66,10 @@ class WorstFlight:
 
 
 class Results:
-    """The results of a campaign from its file; only :attr:`sample_runner` loads a controller."""
+    """The results of a campaign, read from its file; only :attr:`sample_runner` loads a controller."""
 
     def __init__(self, path: Path, *, trust: bool = False) -> None:
-        """Read the result file ``path``; ``trust``: whether code named in it may run. Errors as :func:`read_result`."""
+        """Read the result file ``path``; ``trust`` permits code that it names to run. Errors as :func:`read_result`."""
         self.path = path
         self.trust = trust
         self.campaign: Campaign
@@ -73,21 +79,25 @@ class Results:
 
     @property
     def flyable(self) -> bool:
-        """Whether flights can be repeated: the controller is registered here, or the file is trusted."""
+        """Whether flights can be repeated: the controller is a registered one or a node, or the file is trusted."""
         return self.trust or not names_code(self.campaign.scenario.controller)
 
     @cached_property
     def sample_runner(self) -> SampleRunner:
-        """The sample runner that repeats flights; its first use loads the controller, if the file may name it."""
+        """The sample runner that repeats flights.
+
+        Raises:
+            ParameterError: The controller is code that the file names, and the file is not trusted.
+        """
         require_trust(self.campaign.scenario.controller, self.path, self.trust)
         return SampleRunner(self.campaign)
 
     def column(self, name: str) -> np.ndarray:
-        """Return a column (flights); values that a flight does not define are NaN."""
+        """Return a column of the results (flights), in SI units; undefined numbers are NaN."""
         return np.asarray(self._column(name).to_numpy())
 
     def frame(self) -> DataFrame:
-        """Return the file as a table with one row per flight; ``attrs["units"]`` has the units (SI) of the columns."""
+        """Return the results as a table with one row per flight; ``attrs["units"]`` has the SI units by column."""
         table = self._read()
         frame = table.to_pandas()
         frame.attrs["units"] = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
@@ -95,16 +105,16 @@ class Results:
 
     @property
     def crashed(self) -> np.ndarray:
-        """Mask (flights) of the flights ended by a failure of the controller."""
+        """Mask (flights) of the flights that ended because the controller failed."""
         return np.asarray(self._column("crashed").is_valid())
 
     @property
     def samples(self) -> np.ndarray:
-        """Samples of the factors (flights, factors), SI."""
+        """Samples (flights, factors), in SI units."""
         return np.column_stack([self.column(f"sample_{factor.name}") for factor in self.campaign.factors])
 
     def row(self, flight: int) -> dict[str, Any]:
-        """Return the row of a flight by column.
+        """Return the results of one flight by column.
 
         Raises:
             CampaignError: The campaign has no such flight.
@@ -117,12 +127,12 @@ class Results:
         return dict(rows[0])
 
     def sample(self, flight: int) -> dict[str, float]:
-        """Return the recorded sample of a flight by factor; errors as for :meth:`row`."""
+        """Return the recorded sample of a flight (SI) by factor; errors as for :meth:`row`."""
         row = self.row(flight)
         return {factor.name: row[f"sample_{factor.name}"] for factor in self.campaign.factors}
 
     def file(self, flight: int, **replaced: str) -> str:
-        """Return the text of a flight's scenario file, with values ``replaced`` by key; errors as for :meth:`row`."""
+        """Return the scenario file of a flight; ``replaced`` overrides top-level keys. Errors as for :meth:`row`."""
         return self.campaign.file(flight, list(self.sample(flight).values()), **replaced)
 
     def _column(self, name: str) -> pa.ChunkedArray:
@@ -142,7 +152,7 @@ class Results:
 
 
 def limits(results: Results) -> dict[str, float]:
-    """Return the limits (SI) of the campaign by metric: those of the scenario, and the tube if there is a set."""
+    """Return the limits (SI) by metric: those of the scenario, and that of the tube level if it is recorded."""
     stated = dict(results.campaign.scenario.limits)
     if np.any(np.isfinite(results.column("tube_level"))):
         stated["tube_level"] = TUBE_LIMIT
@@ -150,7 +160,10 @@ def limits(results: Results) -> dict[str, float]:
 
 
 def _within(results: Results) -> dict[str, tuple[float | None, np.ndarray]]:
-    """Return the mask (flights) of the flights that finish, and of those within each limit, with the limit."""
+    """Return by metric the limit (SI) and the mask (flights) of the flights that finish within this limit.
+
+    The first entry, ``flown_to_the_end``, has no limit (None), and the mask of all flights that finish.
+    """
     finished = ~(results.column("diverged") | results.crashed)
     # A comparison with NaN is false: an undefined metric is not within its limit.
     return {"flown_to_the_end": (None, finished)} | {
@@ -164,7 +177,7 @@ def within_all(results: Results) -> int:
 
 
 def shares(results: Results) -> list[Share]:
-    """Return the share of flights that finish, and that finish within each limit."""
+    """Return the share of the flights that finish, then for each limit the share of those that finish within it."""
     every = results.campaign.method == "corners"
     found = []
     for name, (limit, mask) in _within(results).items():
@@ -182,7 +195,7 @@ def clopper_pearson(count: int, n: int, confidence: float = CONFIDENCE) -> tuple
 
 
 def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
-    """Return the worst flights: crashed ones, then diverged ones by time, then by the ratio of value to limit."""
+    """Return the ``number`` worst flights: crashed ones, diverged ones by time, others by ratio of value to limit."""
     stated = {name: limit for name, limit in limits(results).items() if limit > 0.0}
     diverged, crashed, end = results.column("diverged"), results.crashed, results.column("end_time")
     ratios = np.zeros((len(diverged), len(stated) or 1))
@@ -204,7 +217,7 @@ def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
 
 @dataclass(frozen=True)
 class Distribution:
-    """Statistics of a metric over the number of ``flights`` that define it, in its ``unit`` (SI)."""
+    """Statistics of one of :data:`OUTCOMES` in its SI ``unit``, over the number of ``flights`` that define it."""
 
     name: str
     unit: str
@@ -217,7 +230,7 @@ class Distribution:
 
 
 def distributions(results: Results) -> list[Distribution]:
-    """Return the distribution of every outcome that at least one flight defines."""
+    """Return the statistics of every outcome that is defined in at least one flight."""
     found = []
     for name, unit in OUTCOMES.items():
         values = results.column(name)

@@ -1,4 +1,4 @@
-"""Components of flights that differ little from one flight; unchanged components are built once and shared."""
+"""Components of flights that are variants of one flight; components that do not differ are built once and shared."""
 
 from __future__ import annotations
 
@@ -19,21 +19,22 @@ from hsv.model.plant import PLANT_PARAMETERS, Plant
 from hsv.model.trim import initial_trim
 
 _NOT_OF_SHIPPED = (*HIDDEN_PARAMETERS, "initial.", "reference.")
-"""Beginnings of parameters on which the bench's own controllers do not depend."""
+"""Prefixes of the parameters on which the shipped controllers do not depend."""
 
 _PERTURBATION = "vehicle.perturbation."
 
 _CHANGES = {p.name.removeprefix(_PERTURBATION): p for p in PLANT_PARAMETERS if p.name.startswith(_PERTURBATION)}
-"""Relative changes of the vehicle's parameters, by theirs."""
+"""Declarations of the relative changes ``vehicle.perturbation.*``, by the name of the vehicle's parameter."""
 
 
 class FlightVariants:
-    """A scenario's flight, and variants of it."""
+    """Builds the components of variants of one flight, all with the same design."""
 
     def __init__(self, scenario: Scenario, design: Mapping[str, Any], library: str | None = None) -> None:
-        """Assemble the flight of a scenario with the flat parameters of a design.
+        """Assemble the flight of a scenario with the parameters of a design, by name.
 
-        ``library`` is the SHA-256 of the controller's library, empty if it is in none; None: not checked.
+        ``library`` is the expected SHA-256 of the controller's shared library, empty for a controller without library.
+        None skips this check.
         """
         if library is not None and library_digest(scenario.controller) != library:
             raise CampaignError(
@@ -45,11 +46,11 @@ class FlightVariants:
         self._nominal = {**design, **scenario_parameters(scenario)}
         self._kept_for = _NOT_OF_SHIPPED if scenario.controller in SHIPPED_CONTROLLERS else HIDDEN_PARAMETERS
         self.unchanged: Components = assemble_flight(scenario, self._design)
-        """Components of the flight itself"""
+        """Components of the flight of the scenario itself"""
         self._vehicle, _ = initial_trim(self._nominal)
 
     def components(self, scenario: Scenario) -> Components:
-        """Return the components of the flight of another ``scenario`` with the same design."""
+        """Return the components of a variant, given by its ``scenario``."""
         values = {**self._parameters, **scenario_parameters(scenario)}
         names = values.keys() | self._nominal.keys()
         changed = [name for name in names if values.get(name) != self._nominal.get(name)]
@@ -66,9 +67,10 @@ class FlightVariants:
         )
 
     def perturbed(self, perturbation: Mapping[str, float], seed: int) -> Components | None:
-        """Return the components of a flight that differs only in perturbation (relative, by parameter) and seed.
+        """Return the components of a variant that differs in the vehicle's parameters and the seed only.
 
-        ``None`` if a change is not admissible; reading the scenario or building the plant then gives the error.
+        ``perturbation`` has the relative changes by parameter. Return None if one of them is not admissible; to build
+        the variant from its scenario then raises an error with the reason.
         """
         if not all(_CHANGES[name].admits(change) for name, change in perturbation.items()):
             return None
