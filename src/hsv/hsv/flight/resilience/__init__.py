@@ -1,1 +1,1 @@
-"""Resilience of controllers: faults of increasing severity, at two times, on the nominal vehicle and at corners."""
+"""Resilience of controllers: flights with faults of increasing severity, at two times, on several vehicles."""

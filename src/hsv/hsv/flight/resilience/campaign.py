@@ -1,4 +1,4 @@
-"""Definition of a resilience campaign: controllers, each in its own scenario, by faults and times of occurrence."""
+"""Definition of a resilience campaign: every controller, in its own scenario, meets every fault at every time."""
 
 from __future__ import annotations
 
@@ -22,47 +22,52 @@ from hsv.flight.resilience.faults import OBSERVED, TRIED, Moment, TriedFault
 from hsv.flight.scenario import PERIOD, Scenario, load_scenario, parse_scenario, scenario_table, scenario_text
 
 CONTROLLERS = ("case1", "case2", "case1_qp", "case1_integral_heavy", "case1_rmpc")
-"""Scenarios flown by default: nested gains, adjustable factor, quadratic programme, integral action, robust MPC."""
+"""Scenarios by default: nested gains, adjustable tube factor, quadratic programme, integral action, robust MPC."""
 
 _EVERY = 8
-"""Stride in the list of screening corners; it selects two corners and their mirror images."""
+"""Stride in the list of screening corners; it selects the nominal vehicle, two corners and their mirror images."""
 
 
 @dataclass(frozen=True)
 class Subject:
-    """A controller in its scenario, with everything that its flights depend on, and its vehicles."""
+    """A controller under test: its scenario, the vehicles it flies, and all else that its flights depend on."""
 
     name: str
     text: str
-    """The scenario, with everything that it extends"""
+    """Text of the scenario file, including what it inherits by ``extends``"""
     design: Mapping[str, Any]
-    """Flat parameters of the controller's design"""
+    """Parameters of the controller's design by name"""
     library: str
     """SHA-256 of the controller's shared library; empty if it has none"""
     vehicles: tuple[Mapping[str, float], ...]
-    """Relative changes of the vehicle's parameters, the nominal vehicle first"""
+    """Relative changes of the uncertain parameters of each vehicle; the first vehicle is the nominal one"""
 
     @cached_property
     def scenario(self) -> Scenario:
-        """The scenario without a fault of the campaign."""
+        """The scenario itself, without faults of the campaign."""
         return parse_scenario(self.text, self.name)
 
     def start(self, moment: Moment) -> float:
-        """Return the start (s) of a fault."""
+        """Return the time (s) at which a fault starts."""
         return rounded(moment.share * self.scenario.duration)
 
     def file(self, moment: Moment, vehicle: int, fault: TriedFault | None = None, value: float = 0.0) -> str:
-        """Return the scenario of a flight as a file: it ends :data:`OBSERVED` after the start of its only fault.
+        """Return the text of the scenario file of a flight with one fault.
 
-        The changes of the numbered ``vehicle`` replace those of the scenario. Without a fault, it is the flight with
-        which the others are compared.
+        The flight ends at the share :data:`OBSERVED` of the scenario's duration after the start of the fault.
+
+        Args:
+            moment: Time of occurrence of the fault.
+            vehicle: Index in :attr:`vehicles`.
+            fault: The fault; None for the flight with which the others are compared.
+            value: Value of the parameter that is the severity of the fault.
         """
         table = scenario_table(self.text, self.name)
         start = self.start(moment)
         period = self.design.get("period", PERIOD)
         steps = round((start + OBSERVED * self.scenario.duration) / period)
         table["duration"] = written(rounded(steps * period), "s")
-        table.pop("limits", None)  # they hold for the flight without these faults
+        table.pop("limits", None)  # they apply to the scenario's own flight
         changes = {name: f"{100.0 * change!r} %" for name, change in self.vehicles[vehicle].items()}
         table["vehicle"] = {**table.get("vehicle", {}), "perturbation": changes}
         table["fault"] = [fault.row(value, start)] if fault else []
@@ -71,34 +76,34 @@ class Subject:
 
 @dataclass(frozen=True)
 class Case:
-    """A fault of one controller at one time: a batch with all severities and vehicles, and the bisection."""
+    """One controller with one fault at one time. Its batch has all severities on all vehicles, and the bisection."""
 
     subject: Subject
     fault: str
     moment: Moment
     kind: int = 0
-    """Number of the subject in the campaign"""
+    """Index of the subject in the campaign"""
 
     @property
     def flights(self) -> int:
-        """Number of flights, without those of the bisection."""
+        """Number of flights, not counting those of the bisection."""
         return len(TRIED[self.fault].values) * len(self.subject.vehicles)
 
     @property
     def label(self) -> str:
-        """Name of the case in its campaign."""
+        """Name of the case, unique in its campaign."""
         return f"{self.subject.name}_{self.fault}_{self.moment.name}"
 
     @property
     def text(self) -> str:
-        """Everything that the flights depend on except the code, as JSON."""
+        """JSON with everything, except the code, that the flights depend on."""
         values = {"subject": asdict(self.subject), "fault": asdict(TRIED[self.fault]), "moment": self.moment.name}
         return json.dumps(values, sort_keys=True)
 
 
 @dataclass(frozen=True)
 class ResilienceCampaign:
-    """Controllers by faults, each at every time of occurrence."""
+    """A resilience campaign: every controller meets every fault at every time of occurrence."""
 
     subjects: tuple[Subject, ...]
     faults: tuple[str, ...]
@@ -106,12 +111,12 @@ class ResilienceCampaign:
 
     @property
     def batches(self) -> list[Batch]:
-        """A batch for each case."""
+        """One batch per case, in the order of :attr:`cases`."""
         return [Batch(case.label, case.flights) for case in self.cases]
 
     @cached_property
     def cases(self) -> list[Case]:
-        """All cases, in a fixed order."""
+        """All cases: for each controller, each fault at each time."""
         return [
             Case(subject, fault, moment, kind)
             for kind, subject in enumerate(self.subjects)
@@ -121,12 +126,12 @@ class ResilienceCampaign:
 
     @property
     def text(self) -> str:
-        """The campaign as JSON, the same text for the same campaign."""
+        """The campaign as JSON; equal campaigns have equal texts."""
         return json.dumps(asdict(self), sort_keys=True)
 
     @classmethod
     def from_text(cls, text: str) -> Self:
-        """Return the campaign written by :attr:`text`."""
+        """Return the campaign from its JSON ``text``, the inverse of :attr:`text`."""
         values = json.loads(text)
         subjects = tuple(
             Subject(**subject | {"vehicles": tuple(subject["vehicles"])}) for subject in values["subjects"]
@@ -138,7 +143,7 @@ def plan(controllers: Sequence[str], faults: Sequence[str]) -> ResilienceCampaig
     """Return the campaign of controllers (scenarios, by name or path) and faults (names in :data:`TRIED`).
 
     Raises:
-        CampaignError, ScenarioError: Names what is wrong.
+        CampaignError, ScenarioError: An argument is wrong; the message names it.
     """
     for field, names in (("controllers", controllers), ("faults", faults)):
         if not names:
@@ -161,7 +166,7 @@ def _subject(name: str) -> Subject:
         design, library = design_parameters(scenario), library_digest(scenario.controller)
     law = FlightVariants(scenario, design).unchanged.nominal_trajectory.law
     corners = screening_corners(scenario.vehicle.described.uncertainty)[::_EVERY]
-    # A problem that is solved in flight takes about a hundred times as long.
+    # A law that solves a problem in flight flies the nominal vehicle only: its flights take about 100 times as long.
     vehicles = corners if law.in_core else corners[:1]
     subject = Subject(Path(name).stem, scenario_text(name), design, library, tuple(vehicles))
     for moment in Moment:

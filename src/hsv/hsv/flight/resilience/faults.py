@@ -1,4 +1,4 @@
-"""The faults that are tried: what fails, how severely, and which parameter is the severity."""
+"""The faults of resilience campaigns: what fails, how severely, and which parameter measures the severity."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from hsv.base.units import rounded, written
 from hsv.model.faults.table import FAULT_KINDS
 
 RESOLUTION = 0.02
-"""Share of the range of severities to which the largest one that is survived is found."""
+"""Accuracy, as a share of the range of severities, with which the largest survived severity is found."""
 
 SEVERITIES = ("mild", "medium", "severe")
 
 
 class Moment(StrEnum):
-    """When the fault occurs."""
+    """Time of occurrence of a fault."""
 
     during = "during the manoeuvre"
     after = "after the manoeuvre"
@@ -30,33 +30,33 @@ class Moment(StrEnum):
 
 
 OBSERVED = 0.5
-"""Length of a flight after the start of the fault, as a share of the scenario's duration."""
+"""Duration of a flight after the start of the fault, as a share of the scenario's duration."""
 
 
 DURATION = "duration"
-"""Name of the severity of a temporary fault: its duration, instead of a parameter of its kind."""
+"""Value of :attr:`TriedFault.parameter` for a temporary fault whose severity is its duration."""
 
 
 @dataclass(frozen=True)
 class TriedFault:
-    """A fault and the one parameter that is its severity; the others are fixed."""
+    """A fault, one parameter of which is its severity; the other parameters are fixed."""
 
     channel: str
     kind: str
     parameter: str
-    """Parameter of the fault that is varied: one of its kind or occurrence, or :data:`DURATION`"""
+    """The parameter that is the severity: one of the fault's kind or of its occurrence, or :data:`DURATION`"""
     unit: str
     """Unit in which the parameter is written."""
     harmless: float
-    """Value at severity 0, in this unit"""
+    """Value of the parameter at severity 0"""
     worst: float
-    """Value at severity 1"""
+    """Value of the parameter at severity 1"""
     values: tuple[float, float, float]
-    """Mild, medium, severe"""
+    """Values of the parameter for a mild, a medium and a severe fault"""
     fixed: Mapping[str, Any] = field(default_factory=dict)
-    """Further parameters as in a scenario"""
+    """The other parameters by name, as written in a scenario file"""
     geometric: bool = False
-    """Whether equal steps of severity are equal ratios of values, for ranges over decades."""
+    """Whether equal steps of severity are equal ratios of values; used for ranges over decades."""
 
     @property
     def whole(self) -> bool:
@@ -65,12 +65,12 @@ class TriedFault:
 
     @property
     def resolution(self) -> float:
-        """Resolution of the boundary in severity: the common one, or one step of an integer parameter."""
+        """Resolution of the bisection in severity: :data:`RESOLUTION`, or one step of an integer if that is larger."""
         return max(RESOLUTION, 1.0 / abs(self.worst - self.harmless) if self.whole else 0.0)
 
     def value(self, severity: float) -> float:
-        """Return the parameter's value at a ``severity``, 0 to 1."""
-        # Either is exact at both ends.
+        """Return the parameter's value at a ``severity`` from 0 to 1."""
+        # Both formulas are exact at severities 0 and 1.
         if self.geometric:
             value = self.harmless ** (1.0 - severity) * self.worst**severity
         else:
@@ -78,20 +78,20 @@ class TriedFault:
         return float(round(value)) if self.whole else rounded(value)
 
     def severity(self, value: float) -> float:
-        """Return the severity of a ``value`` of the parameter."""
+        """Return the severity, from 0 to 1, of a ``value`` of the parameter."""
         if self.geometric:
             return math.log(value / self.harmless) / math.log(self.worst / self.harmless)
         return (value - self.harmless) / (self.worst - self.harmless)
 
     def row(self, value: float, start: float) -> dict[str, Any]:
-        """Return the fault as in a scenario, with its ``start`` (s)."""
+        """Return the fault as a table of a scenario file, with the ``value`` of the parameter and the ``start`` (s)."""
         own = {"channel": self.channel, "type": self.kind, **self.fixed, "start": written(start, "s")}
         if self.parameter == DURATION:
             return {**own, "stop": written(rounded(start + value), self.unit)}
         return {**own, self.parameter: written(value, self.unit)}
 
     def in_words(self, *values: float) -> str:
-        """Return ``values`` of the parameter in words."""
+        """Return ``values`` of the parameter as a text with their unit."""
         return f"{', '.join(f'{value:.3g}' for value in values)}{'' if self.unit == '1' else ' ' + self.unit}"
 
 
@@ -142,10 +142,12 @@ TRIED = {
     "pitch_rate_scale": TriedFault(_RATE, "sensor_scale", "factor", "1", 1.0, 0.0, (0.9, 0.7, 0.5)),
     "pitch_rate_drop_out": TriedFault(_RATE, "sensor_drop_out", "probability", "1", 0.0, 1.0, (0.1, 0.5, 0.8)),
 }
-"""Faults by name. The mild values are realistic: the paper's 0.9 as loss of effectiveness, published bandwidths, one
-degree of elevator as the moment of an unstart (0.0225), low noise; the severe ones are where controllers begin to
-differ. Ranges extend to the loss of the baseline, or to the physical limit: no elevator, no fuel, no thrust. The
-elevator is trimmed at 12 deg and limited to 30 deg, so that the sign that uses up its positive travel is the worse one
-for a bias, a drift and a moment. Lock and float are intermittent, and the severity is the fraction of time for which
-they act; a hard-over, at the 100 deg/s of usual actuators, ends when a monitor has passivated it, and the severity is
-the time until then."""
+"""Faults by name.
+
+Mild values are realistic: the effectiveness of 0.9 in the paper, published bandwidths, low noise, and for an unstart
+the moment of one degree of elevator (0.0225). At the severe values, controllers begin to differ. The ranges extend to
+the loss of the baseline design, or to the physical limit: no elevator, no fuel, no thrust. The elevator is trimmed at
+12 deg and limited to 30 deg. Therefore a bias, a drift or a moment is worse in the direction that must be countered by
+a larger positive deflection. Lock and float are intermittent; their severity is the fraction of the time in which they
+act. A hard-over runs at 100 deg/s, as usual actuators do, and ends when a monitor switches the actuator off; its
+severity is the time until then."""

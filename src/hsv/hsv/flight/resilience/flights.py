@@ -1,4 +1,4 @@
-"""Flights of a resilience campaign: all severities of a case on all vehicles, and a bisection on the nominal one."""
+"""Flights of a resilience campaign: a case flies all severities on all vehicles, and a bisection on the nominal one."""
 
 from __future__ import annotations
 
@@ -21,45 +21,45 @@ from hsv.flight.scenario import parse_scenario
 from hsv.model.plant import FlightStatus
 
 ATTITUDE_BAND, ALTITUDE_BAND = np.deg2rad(0.5), 30.0 * 0.3048
-"""Distances (rad, m) from the flight without the fault within which a flight counts as recovered."""
+"""Maximum deviations (rad, m) from the flight without the fault at which a flight counts as recovered."""
 
 _RUNNERS = 16
-"""Number of runners that a worker keeps: two times of eight controllers"""
+"""Number of runners that a worker process keeps: those of eight controllers, with two times of occurrence each"""
 
 _ALTITUDE, _ATTITUDE = 0, slice(2, 4)
-"""Columns of the state: altitude; angle of attack and pitch angle."""
+"""Indices in the state vector: altitude; angle of attack and pitch angle."""
 
 
 @dataclass(frozen=True)
 class FlownFault:
-    """Result of a flight; deviations are measured from the same vehicle's flight without the fault."""
+    """The result of a flight with a fault; deviations are from the flight of the same vehicle without the fault."""
 
     severity: str
     """One of :data:`SEVERITIES`"""
     value: float
-    """Value of the fault's parameter, in its unit."""
+    """Value of the parameter that is the severity, in :attr:`TriedFault.unit`"""
     vehicle: int
-    """0: the nominal one"""
+    """Index of the vehicle; 0 is the nominal one"""
     survived: bool
-    """Whether the flight came to its end within the range of the model"""
+    """Whether the flight reached its end within the range of the model"""
     attitude: float | None
-    """Largest deviation of angle of attack or pitch angle after the fault, rad; None if the controller failed"""
+    """Largest deviation of angle of attack or pitch angle after the start of the fault, rad; None after a crash"""
     altitude: float | None
-    """Largest deviation of altitude after the fault, m; None if the controller failed"""
+    """Largest deviation of altitude after the start of the fault, m; None after a crash"""
     recovery_time: float | None
-    """Time after the fault from which on the flight stays within the band, s; None if it ends outside"""
+    """Time from the start of the fault until the deviations stay within the bands, s; None if they do not"""
     time_to_loss: float | None
-    """Time after the fault at which the flight was lost, s; None if it was not, or the controller failed"""
+    """Time from the start of the fault to the loss of the flight, s; None if it was not lost, or after a crash"""
     crashed: str | None
-    """Error of the controller, if it failed"""
+    """Error of the controller if it crashed, otherwise None"""
 
 
 @dataclass(frozen=True)
 class Boundary:
-    """The severities (0 to 1) on the nominal vehicle between which a controller is lost.
+    """The largest survived and the smallest lost severity (0 to 1) of a fault on the nominal vehicle.
 
-    ``survived`` is None if the harmless end is lost, ``lost`` is None if the worst end is survived. If a milder fault
-    is lost and a more severe one survived, the mildest loss counts.
+    ``survived`` is None if even severity 0 is lost, and ``lost`` is None if severity 1 is survived. If a fault is lost
+    that is milder than a survived one, the mildest lost severity counts, and the survived one is below it.
     """
 
     survived: float | None
@@ -67,7 +67,7 @@ class Boundary:
 
 
 class SubjectRunner:
-    """Flies one controller with faults at one time; components that the flights share are built once."""
+    """Flies one controller with faults at one time of occurrence; shared components are built once."""
 
     def __init__(self, subject: Subject, moment: Moment) -> None:
         self._subject, self._moment = subject, moment
@@ -76,18 +76,18 @@ class SubjectRunner:
         self._without: dict[int, Flight] = {}
 
     def fly(self, vehicle: int, fault: TriedFault | None = None, value: float = 0.0) -> Flight:
-        """Fly with a fault, or without."""
+        """Fly the vehicle with this index, with a fault whose severity parameter has a ``value``, or without fault."""
         text = self._subject.file(self._moment, vehicle, fault, value)
         return fly(self._variants.components(parse_scenario(text, self._subject.name)))
 
     def without(self, vehicle: int) -> Flight:
-        """Return the flight without a fault for comparison."""
+        """Return the flight of a vehicle without a fault, simulated at the first call."""
         if vehicle not in self._without:
             self._without[vehicle] = self.fly(vehicle)
         return self._without[vehicle]
 
     def outcome(self, severity: str, vehicle: int, fault: TriedFault, value: float) -> FlownFault:
-        """Fly with a fault and return the result."""
+        """Fly a vehicle with a fault and return the result; ``severity`` is one of :data:`SEVERITIES`."""
         try:
             flight, without = self.fly(vehicle, fault, value), self.without(vehicle)
         except ControllerError as error:
@@ -99,7 +99,7 @@ class SubjectRunner:
         return FlownFault(severity, value, vehicle, survived, attitude, altitude, recovery, loss, None)
 
     def survives(self, fault: TriedFault, severity: float) -> bool:
-        """Return whether the nominal vehicle finishes its flight."""
+        """Return whether the nominal vehicle survives the fault with a ``severity`` from 0 to 1."""
         try:
             return self.fly(0, fault, fault.value(severity)).status is FlightStatus.FINISHED
         except ControllerError:
@@ -107,9 +107,10 @@ class SubjectRunner:
 
 
 def distances(flight: FlightData, without: FlightData, start: float) -> tuple[float, float, float | None]:
-    """Return largest distances of attitude (rad) and altitude (m), and recovery time (s), after ``start`` (s).
+    """Return the largest deviations of attitude (rad) and altitude (m), and the recovery time (s) or None.
 
-    If the flight or that without the fault ends early, the common steps are compared.
+    ``flight`` is compared from ``start`` (s), the start of the fault, with the flight ``without`` the fault. If one of
+    them ends early, the common steps are compared.
     """
     rows = min(len(flight.time), len(without.time))
     after = np.flatnonzero(flight.time[:rows] >= start - 1e-9)
@@ -127,10 +128,13 @@ def distances(flight: FlightData, without: FlightData, start: float) -> tuple[fl
 def boundary(
     survives: Callable[[float], bool], known: dict[float, bool], resolution: float, at: Callable[[float], float]
 ) -> Boundary:
-    """Return the severities, at most ``resolution`` apart, between which a controller is lost, found by bisection.
+    """Return by bisection a survived and a lost severity that are at most ``resolution`` apart.
 
-    ``survives`` flies a severity; ``known`` are results by severity; ``at`` returns the nearest severity that can be
-    flown, as some parameters are integers.
+    Args:
+        survives: Flies with a severity, and returns whether the flight survives.
+        known: Results of flights so far, by severity.
+        resolution: Largest difference between the two severities.
+        at: Returns the nearest severity that can be flown, because some parameters are integers.
     """
     known = dict(known)
     if all(known.values()):
@@ -159,7 +163,7 @@ def _runner(text: str, subject: int, moment: Moment) -> SubjectRunner:
 
 
 def fly_case(text: str, number: int) -> bytes:
-    """Fly a case, by its number, of the campaign written in ``text``; return its flights and boundary as JSON."""
+    """Fly the case with this ``number`` in the campaign ``text``; return its flights and its boundary as JSON."""
     case = ResilienceCampaign.from_text(text).cases[number]
     runner, fault = _runner(text, case.kind, case.moment), TRIED[case.fault]
     flown = [

@@ -1,4 +1,4 @@
-"""Results of a resilience campaign: a file per case, cells of severity, time and fault, and their worst flights."""
+"""Results of a resilience campaign: one file per case, read into cells and squares of the map of results."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ from hsv.flight.resilience.faults import SEVERITIES, TRIED, Moment, TriedFault
 from hsv.flight.resilience.flights import Boundary, FlownFault, fly_case
 
 Outcome = tuple[tuple[FlownFault, ...], Boundary]
-"""Flights of a case, and the severities between which the controller is lost."""
+"""Results of the flights of a case, and the severities between which the controller is lost."""
 
 
 class CaseStore(Store):
-    """The store of the results of a campaign's cases; several campaigns can share a folder."""
+    """Stores the results of a campaign, one file per case; several campaigns can share a folder."""
 
     def __init__(self, out: Path, campaign: ResilienceCampaign) -> None:
         self.folder = out / "cases"
         super().__init__(self.folder, self.folder / ".lock", fly_case)
         self._cases = campaign.cases
-        # The digest is of the code that is loaded: files may change during the flights.
+        # Computed now, because source files may change during the flights.
         self._code = code_digest().encode()
 
     def finished(self, restart: bool) -> set[int]:
-        """Return the numbers of the finished cases."""
+        """Return the numbers of the finished cases, none with ``restart``."""
         return {number for number in range(len(self._cases)) if not restart and self.read(number) is not None}
 
     def path(self, batch: int) -> Path:
-        """Return the file of a case."""
+        """Return the path of the result file of a case, whose number is ``batch``."""
         case = self._cases[batch]
         digest = digest_of([case.text.encode(), self._code])
         return self.folder / f"{case.label}_{digest[:DIGITS]}.json"
 
     def keep(self, batch: int, content: bytes) -> None:
-        """Store the results of a case, and remove those of other code."""
+        """Store the results of a case, and remove those of another version of the code or the case."""
         super().keep(batch, content)
         drop_older(self.path(batch))
 
     def read(self, number: int) -> Outcome | None:
-        """Return the results of a case, None if it was not flown or its file is damaged."""
+        """Return the results of a case; None if the case was not flown or the file is damaged."""
         try:
             values = parse_json(read_text(self.path(number)))
             return tuple(FlownFault(**row) for row in values["flights"]), Boundary(**values["boundary"])
@@ -54,7 +54,7 @@ class CaseStore(Store):
 
 @dataclass(frozen=True)
 class Cell:
-    """The flights of one controller with one fault, severity and time of occurrence, over the vehicles."""
+    """The flights of one controller with one fault, severity and time of occurrence, one per vehicle."""
 
     case: Case
     severity: str
@@ -62,32 +62,32 @@ class Cell:
 
     @property
     def survived(self) -> int:
-        """Flights that came to their end."""
+        """Number of flights that reached their end."""
         return sum(flight.survived for flight in self.flights)
 
     @property
     def share(self) -> float:
-        """Share of flights that came to their end."""
+        """Share, from 0 to 1, of the flights that reached their end."""
         return self.survived / len(self.flights)
 
     @property
     def worst(self) -> FlownFault:
-        """The flight that was lost first, or went farthest from that without the fault."""
+        """The flight that was lost first or, if none was lost, with the largest deviation of attitude."""
         return min(self.flights, key=_rank)
 
     @property
     def attitude(self) -> float | None:
-        """Largest distance of attitude, rad."""
+        """Largest deviation of attitude in all flights, rad; None if the controller always crashed."""
         return max((f.attitude for f in self.flights if f.attitude is not None), default=None)
 
     @property
     def altitude(self) -> float | None:
-        """Largest distance of altitude, m."""
+        """Largest deviation of altitude in all flights, m; None if the controller always crashed."""
         return max((f.altitude for f in self.flights if f.altitude is not None), default=None)
 
     @property
     def recovery_time(self) -> float | None:
-        """Longest time to recovery, s; None if a flight does not recover."""
+        """Longest recovery time, s; None if any flight does not recover."""
         times = [flight.recovery_time if flight.survived else None for flight in self.flights]
         known = [time for time in times if time is not None]
         return max(known) if len(known) == len(times) else None
@@ -99,13 +99,13 @@ class Cell:
 
 
 def _rank(flight: FlownFault) -> tuple[float, float]:
-    """Return the rank of a flight, the worst first: crashed, else lost first, else farthest off in attitude."""
+    """Return a sort key that puts the worst flight first: crashed, then lost by time, then by attitude deviation."""
     return (1.0, -(flight.attitude or 0.0)) if flight.survived else (0.0, flight.time_to_loss or 0.0)
 
 
 @dataclass(frozen=True)
 class Square:
-    """A fault and a controller on the map: cells by time and severity, and the boundary at each time."""
+    """The results of one controller with one fault: cells by time, ordered by severity, and the boundaries by time."""
 
     fault: str
     subject: Subject
@@ -114,28 +114,28 @@ class Square:
 
     @property
     def worst(self) -> tuple[Cell, FlownFault]:
-        """The worst flight of all, and its cell."""
+        """The cell with the worst flight of all cells, and this flight."""
         cell = min((cell for row in self.cells.values() for cell in row), key=lambda cell: _rank(cell.worst))
         return cell, cell.worst
 
     @property
     def survived(self) -> tuple[int, int]:
-        """Flights that came to their end, and all."""
+        """Number of flights that reached their end, and number of all flights."""
         cells = [cell for row in self.cells.values() for cell in row]
         return sum(cell.survived for cell in cells), sum(len(cell.flights) for cell in cells)
 
 
 @dataclass(frozen=True)
 class ResilienceResults:
-    """A campaign with all of its squares."""
+    """The results of a whole campaign."""
 
     campaign: ResilienceCampaign
     squares: dict[tuple[str, str], Square]
-    """Squares by fault and controller."""
+    """Results by (fault, controller)"""
 
     @classmethod
     def read(cls, campaign: ResilienceCampaign, store: CaseStore) -> ResilienceResults:
-        """Return the results in ``store``, which must have every case."""
+        """Return the results in ``store``; a ``CampaignError`` if a case is missing."""
         squares = {
             (fault, subject.name): Square(fault, subject, {}, {})
             for fault in campaign.faults
@@ -158,12 +158,12 @@ class ResilienceResults:
 
     @property
     def flights(self) -> Sequence[FlownFault]:
-        """All flights but those of the bisections."""
+        """All flights except those of the bisections."""
         return [flight for cell in self.cells for flight in cell.flights]
 
 
 def boundaries_in_words(fault: TriedFault, boundaries: Mapping[Moment, Boundary]) -> list[str]:
-    """Return the survived range of the nominal vehicle at each time as texts; equal texts are given once."""
+    """Return for each time a text on the severities that the nominal vehicle survives; equal texts are given once."""
 
     def in_words(boundary: Boundary) -> str:
         if boundary.survived is None:
@@ -176,7 +176,7 @@ def boundaries_in_words(fault: TriedFault, boundaries: Mapping[Moment, Boundary]
 
 
 def parameter_words(name: str) -> str:
-    """Return the description of a fault's severity: mild, medium and severe values, range, and fixed parameters."""
+    """Return a description of the severity of the fault ``name``: the three values, the range, fixed parameters."""
     fault = TRIED[name]
     fixed = "".join(f", {key.replace('_', ' ')} {value}" for key, value in fault.fixed.items())
     tried = f"{fault.in_words(*fault.values)} ({fault.harmless:g} to {fault.in_words(fault.worst)}){fixed}"
