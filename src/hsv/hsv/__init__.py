@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     __version__: str
 
-# All matrices are small: threads in the linear algebra only wait for each other, and their number changes last bits.
-# Read once, when numpy is imported.
+# One thread for linear algebra: the matrices are small, and the number of threads changes the last bits of results.
+# The variable must be set before numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 __all__ = [
@@ -47,7 +47,7 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version(__name__)
-    # Only where they are asked for: a node imports this package, and not the whole of the simulation.
+    # Import the API only when one of its names is used: nodes import this package, but not the whole simulation.
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from hsv import api

@@ -1,6 +1,6 @@
-"""The library in five lines, for notebooks and scripts: load a scenario, change it, fly it, measure, draw.
+"""Functions for notebooks and scripts: load a scenario, change it, fly it, measure, plot.
 
-Everything here is a name of the package itself::
+All of them are also names of the package :mod:`hsv`::
 
     import hsv
 
@@ -39,7 +39,7 @@ def fly(scenario: Scenario | str) -> Flight:
     """Simulate a scenario, given as an object, a name or a path, in this process.
 
     Raises:
-        ScenarioError: Names the field that is wrong, or what is wrong with the design.
+        ScenarioError: A field or the design is wrong; the message names it.
         RunError: A custom controller failed; the message names it and the step.
     """
     return fly_components(assemble_flight(load(scenario) if isinstance(scenario, str) else scenario))
@@ -48,13 +48,13 @@ def fly(scenario: Scenario | str) -> Flight:
 def sweep(
     name: str, field: str, values: Iterable[object], changes: Mapping[str, object] | None = None
 ) -> dict[object, Flight]:
-    """Return the flights of a scenario with one field at each of ``values``, by value.
+    """Simulate a scenario with one field set to each of ``values``, and return the flights by value.
 
     Args:
         name: Name of a shipped scenario, or path.
         field: Field that varies, as in a scenario file, for example ``"fault[0].effectiveness"``.
         values: Values as written in a scenario file, with their units.
-        changes: Further fields that differ from the file, the same in every flight.
+        changes: Values of further fields, the same in every flight.
 
     Raises:
         ScenarioError, RunError: As :func:`fly`.
@@ -63,9 +63,9 @@ def sweep(
 
 
 def compare(flights: Mapping[str, Flight]) -> dict[str, dict[str, float]]:
-    """Return the metrics of flights side by side, SI: by metric, then by the label of the flight.
+    """Return the metrics (SI) of several flights, by name of the metric and then by label of the flight.
 
-    A flight that does not define a metric (no step, no fault) is not in its row, nor is a row without any.
+    A metric that is undefined in a flight, for example because there is no fault, is missing for this flight.
     """
     measured = {label: flight.metrics for label, flight in flights.items()}
     rows = {name: {label: m[name] for label, m in measured.items() if name in m} for name in METRICS}
@@ -82,22 +82,22 @@ def montecarlo(
     factors: Mapping[str, tuple[object, object]] | None = None,
     workers: int = 1,
 ) -> DataFrame:
-    """Return the flights of a campaign as a table: a row per flight with its sample, end, metrics and fingerprint.
+    """Fly a campaign; return a table with one row per flight: sample, end, metrics and fingerprint.
 
-    The units (SI) of its columns are in ``attrs["units"]``. A script that uses several workers must call this under
-    ``if __name__ == "__main__"``.
+    The SI units of the columns are in ``attrs["units"]``. A script that uses several workers must call this function
+    under ``if __name__ == "__main__"``.
 
     Args:
         scenario: Name of a shipped scenario, or path.
-        samples: Number of flights; not used for corners.
-        seed: Determines all samples.
+        samples: Number of flights; ignored for corners.
+        seed: Seed from which all samples are drawn.
         method: ``uniform``, ``latin_hypercube``, ``sobol`` or ``corners`` (all combinations of extreme values).
-        scale: Factor on the bounds of the uncertain parameters; 0 leaves them alone.
-        factors: Least and largest value, as a file has them, by field of the scenario.
-        workers: Processes; 1: this process, 0: one per processor.
+        scale: Factor on the bounds of the uncertain parameters; with 0 they do not vary.
+        factors: Least and largest value of further fields, by field, written as in a scenario file.
+        workers: Number of processes: 1 to fly in this process, 0 for one per processor.
 
     Raises:
-        CampaignError, ScenarioError, DesignError: Names the setting that is wrong.
+        CampaignError, ScenarioError, DesignError: A setting is wrong; the message names it.
     """
     from hsv.flight.campaign.campaign import plan
     from hsv.flight.campaign.executors import make_executor
@@ -121,38 +121,40 @@ def trim(
     vehicle: str = "",
     coupling: str = "",
 ) -> Trim:
-    """Return the equilibrium at a condition of numbers (SI) or of texts with units, such as ``"85500 ft"``.
+    """Return the equilibrium at an altitude and a velocity: level, or climbing and accelerating.
 
-    Its ``quantities`` are state and input by name, with their units.
+    A flight condition is a number in SI units or a text with a unit, such as ``"85500 ft"``. State and input of the
+    result are in its ``quantities``, by name, with their SI units.
 
     Args:
-        altitude: m, or a text with its unit; empty: the published one, or the middle of the vehicle's envelope.
-        velocity: m/s, or a text with its unit; likewise.
-        climb_rate: m/s, or a text with its unit.
-        acceleration: m/s^2, or a text with its unit.
-        vehicle: Name or path; empty: the paper's.
-        coupling: Set of inertial coupling, or a multiple of the derived one; empty: the vehicle's own.
+        altitude: Altitude (m); empty: a published one, or the middle of the vehicle's envelope.
+        velocity: Velocity (m/s); empty: likewise.
+        climb_rate: Climb rate (m/s).
+        acceleration: Acceleration (m/s^2).
+        vehicle: Name of a shipped vehicle, or path; empty: the paper's vehicle.
+        coupling: Name of a set of inertial coupling, or a multiple of ``derived``; empty: the vehicle's own.
 
     Raises:
-        QuantityError, TrimError, VehicleError: Names the argument that is wrong, or says that nothing balances there.
+        QuantityError, VehicleError: An argument is wrong; the message names it.
+        TrimError: There is no equilibrium.
     """
     described = load_vehicle(vehicle or DEFAULT_VEHICLE)
     return trim_at(described.coupled(coupling), *described.condition(altitude, velocity), climb_rate, acceleration)
 
 
 def plot(flights: Flight | Mapping[str, Flight], *, units: str = UnitSystem.metric) -> Figure:
-    """Return the paper's eight panels over time, of one flight or of several by label.
+    """Return a figure with the paper's eight plots over time, six for rigid vehicles, of one flight or of several.
 
-    Dotted is the reference, shaded what follows the first fault.
+    The dotted reference and the shaded time from the first fault on are those of the first flight.
 
     Args:
-        flights: One, or several by label.
+        flights: One flight, or several by label.
         units: ``metric`` (SI with degrees), ``si`` or ``paper`` (feet and degrees).
 
     Raises:
-        QuantityError: ``units`` are none of these.
+        QuantityError: ``units`` is none of these.
     """
-    # Drawing takes a second to import, and a script may do without.
+    # Imported here, because the import takes a second, and not every script plots.
     from hsv.pages.plots import flight_figure
 
     shown = {"flight": flights} if isinstance(flights, Flight) else flights

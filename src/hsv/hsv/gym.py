@@ -1,17 +1,18 @@
-"""Environments of Gymnasium; importing this module registers ``hsv/Track-v0``, alone and as a vector.
+"""Gymnasium environments; importing this module registers ``hsv/Track-v0`` as a single and as a vector environment.
 
-An agent takes the place of the controller. In step k it sees
+An agent replaces the controller of a scenario, and an episode is one flight. The observation of step k (18, SI) is
 
-    [x^(k); x^_f(k) - x_r(k)]    measurement or estimate (9) and its error (9), SI; the error has q_f in place of q,
+    [x^(k); x^_f(k) - x_r(k)],
 
-and its action a gives the input u(k) = u_r(k) + u_n(k) + diag(:data:`SCALE`) a, which the loop limits to U. Values of a
-outside [-1, 1] are admitted. The reward of a step is, with the true state x that follows,
+the measured or estimated state (9), then its deviation from the reference (9), in which the filtered pitch rate q_f
+replaces q. The action a (2) gives the input u(k) = u_r(k) + u_n(k) + diag(:data:`SCALE`) a, which is limited to U;
+values of a outside [-1, 1] are admitted. The reward of a step is, with the true state x after the step,
 
     T / (1 + ((h - h_r) / 100 m)^2 + ((V - V_r) / 20 m/s)^2 + |a|^2),
 
-so that the sum over an episode is at most its duration in seconds. An episode is a flight of the scenario. An
-episode has one step for each command, also for the last state. The last step returns that state again. It terminates
-when the answered state is outside the range of the model, and is truncated at the end of the flight.
+where T is the control period. The sum over an episode is thus at most its duration in seconds. An episode has one step
+for every command of a flight, including the command at the last state; this last step returns the last state again. The
+episode terminates when the returned state is outside the range of the model, and is truncated at the end of the flight.
 """
 
 from __future__ import annotations
@@ -47,10 +48,10 @@ from hsv.model.signals import N_INPUTS, N_STATES, PITCH_RATE
 __all__ = ["SCALE", "TrackEnv", "TrackVectorEnv"]
 
 SCALE = np.array([0.5, 0.25])
-"""Change of fuel equivalence ratio and elevator deflection (rad) for an action of 1; powers of two, which keep bits"""
+"""Change of fuel equivalence ratio and elevator deflection (rad) for an action of 1; powers of two scale exactly"""
 
 _TOLERATED = np.array([100.0, 20.0])
-"""Errors of altitude (m) and velocity (m/s) that halve the reward"""
+"""Error of altitude (m), and error of velocity (m/s), that halves the reward"""
 
 _OBSERVATION = Box(-np.inf, np.inf, (2 * N_STATES,), np.float64)
 _ACTION = Box(-1.0, 1.0, (N_INPUTS,), np.float64)
@@ -60,7 +61,7 @@ Info = dict[str, Any]
 
 
 class _Draws:
-    """The flights of a scenario from which an episode is drawn; the arguments are those of :class:`TrackEnv`."""
+    """The set of flights from which every episode is drawn; the arguments are those of :class:`TrackEnv`."""
 
     def __init__(self, scenario: str, scale: float, factors: Factors | None) -> None:
         name = Path(scenario).stem
@@ -79,7 +80,7 @@ class _Draws:
         self.unchanged = replace(components, controller=limits)
 
     def draw(self, random: np.random.Generator) -> tuple[Components, int]:
-        """Return the components of a flight, and its number in the campaign; 0 if nothing is drawn."""
+        """Draw a flight; return its components and its number in the campaign, 0 if there is only one flight."""
         if self._campaign is None:
             return self.unchanged, 0
         flight = int(random.integers(MAX_SAMPLES))
@@ -90,26 +91,29 @@ class _Draws:
 
 @dataclass
 class _Group:
-    """Flights of the consecutive ``rows`` that share a register, and their step."""
+    """Flights of consecutive environments that are simulated together, one per lane of a register."""
 
     rows: range
+    """Indices of the environments"""
     flights: list[Struct]
-    """One per lane; spare lanes repeat the last flight"""
+    """One flight per lane; spare lanes repeat the last flight"""
     memory: np.ndarray
     references: list[Struct]
     step: int = 0
+    """The current step k, which is common to all flights"""
     over: bool = False
+    """Whether the episodes are over and begin anew in the next step"""
 
     def fly(self, half: int) -> None:
-        """Simulate a half of the current step."""
+        """Simulate one half of the current step, ``lib.SENSE`` or ``lib.ACT``."""
         core.fly(self.flights, self.memory, self.step, self.step + 1, half)
 
 
 class _Episodes:
-    """The current episodes of some rows, in groups of as many as there are lanes."""
+    """The current episodes of n environments, in groups of at most as many as the core has lanes."""
 
     def __init__(self, draws: _Draws, randoms: Sequence[np.random.Generator], *, recorded: bool = False) -> None:
-        """Begin an episode for each row, drawn with its own random numbers; steps are kept if ``recorded``."""
+        """Begin an episode for each of the random generators, which draws it; keep the steps if ``recorded``."""
         self._draws, self._randoms = draws, randoms
         self.recorded: list[History] | None = [] if recorded else None
         self._count = count = len(randoms)
@@ -126,21 +130,25 @@ class _Episodes:
 
     @property
     def nominal_input(self) -> np.ndarray:
-        """u_r + u_n (n, 2), the input of an action of zero."""
+        """u_r + u_n (n, 2), the inputs for actions of zero."""
         return self._u_r + self.history.nominal_input
 
     @property
     def observation(self) -> np.ndarray:
-        """Observations (n, 18)."""
+        """Observations (n, 18), see :mod:`hsv.gym`."""
         error = self.history.estimate - self._x_r
         error[:, PITCH_RATE] = self.history.filtered_pitch_rate - self._x_r[:, PITCH_RATE]
         return np.concatenate((self.history.estimate, error), 1)
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Fly a step with finite ``actions`` (n, 2), or begin anew where an episode is over.
+        """Simulate a step with finite ``actions`` (n, 2); an episode that is over begins anew instead.
 
         Returns:
-            Reward, whether the episode terminates, and whether it is truncated (n each).
+            Rewards (n), 0 for an episode that begins anew; masks (n) of the episodes that terminate; masks (n) of
+            those that are truncated.
+
+        Raises:
+            ControllerError: An action is not finite.
         """
         if not np.isfinite(actions).all():
             raise ControllerError(f"action = {actions.tolist()}: expected finite numbers")
@@ -201,47 +209,48 @@ class _Episodes:
 
 
 class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
-    """Track the reference of a scenario with fuel equivalence ratio and elevator, see :mod:`hsv.gym`.
+    """An environment in which the agent tracks the reference of a scenario by fuel and elevator, see :mod:`hsv.gym`.
 
-    ``info`` has ``nominal_input``, u_r + u_n (2), and ``flight``, the number of the flight drawn.
+    ``info`` has ``nominal_input``, u_r + u_n (2), and ``flight``, the number of the flight in its campaign.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012 (as in the base class)
     observation_space, action_space = _OBSERVATION, _ACTION
 
     def __init__(self, scenario: str = "case1", scale: float = 0.0, factors: Factors | None = None) -> None:
-        """Read a scenario; its controller does not fly.
+        """Read a scenario, whose controller is replaced by the agent.
 
-        Without distributions in the scenario, ``scale`` and ``factors``, every episode is the flight of ``hsv
-        simulate``. Otherwise each is a flight of the campaign :func:`hsv.montecarlo` with these arguments.
+        If the scenario has no distributions and nothing varies, every episode is the flight of ``hsv simulate``.
+        Otherwise every episode is a random flight of the campaign :func:`hsv.montecarlo` with these arguments.
 
         Args:
             scenario: Name of a shipped scenario, or path.
-            scale: Factor on the bounds of the vehicle's uncertain parameters; 0 leaves them alone.
-            factors: Least and largest value, as a file has them, by field, such as ``fault[0].effectiveness``.
+            scale: Factor on the bounds of the vehicle's uncertain parameters; with 0 they do not vary.
+            factors: Least and largest value of further fields, written as in a scenario file, by field, such as
+                ``fault[0].effectiveness``.
 
         Raises:
-            CampaignError, ScenarioError: Names the setting that is wrong.
+            CampaignError, ScenarioError: A setting is wrong; the message names it.
         """
         self._draws = _Draws(scenario, scale, factors)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, Info]:
-        """Begin an episode; ``options`` are not used."""
+        """Begin an episode; return the first observation (18) and ``info``. ``options`` are not used."""
         super().reset(seed=seed)
         self._episodes = _Episodes(self._draws, [self.np_random], recorded=True)
         return self._episodes.observation[0], self._info
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, Info]:
-        """Fly a control period with a finite ``action`` (2)."""
+        """Simulate a control period with a finite ``action`` (2); return the values that Gymnasium prescribes."""
         [reward], [terminated], [truncated] = self._episodes.step(np.asarray(action, float)[None])
         return self._episodes.observation[0], float(reward), bool(terminated), bool(truncated), self._info
 
     @property
     def flight(self) -> Flight:
-        """The flight of the steps of this episode so far, with history, metrics and fingerprint.
+        """The flight in this episode up to the current step, with history, metrics and fingerprint.
 
         Raises:
-            RunError: There was no step yet.
+            RunError: The episode has no step yet.
         """
         if not self._episodes.recorded:
             raise RunError("flight: no step since the episode began, expected step() first")
@@ -254,11 +263,11 @@ class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
 
 class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
-    """Several :class:`TrackEnv`, flown in the lanes of the core; each row has the bits of a single environment.
+    """Several :class:`TrackEnv`, simulated side by side in the lanes of the core with the same bits as alone.
 
-    Row i has the seed of the reset plus i. Flights that share a register also share the step: when one of them
-    diverges, the others are truncated, and at the next step all of them begin anew. Flights that the core cannot fly
-    side by side, for example because the engine of one fails, fly alone.
+    Environment i has the seed of the reset plus i. Flights that are simulated side by side have a common step: when one
+    of them diverges, the others are truncated, and all begin anew in the next step. Flights that the core cannot
+    simulate side by side, for example because the engine of one fails, are simulated alone.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 (as in the base class)
@@ -266,7 +275,7 @@ class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     def __init__(
         self, num_envs: int = 1, scenario: str = "case1", scale: float = 0.0, factors: Factors | None = None
     ) -> None:
-        """Read a scenario for ``num_envs`` flights; other arguments and errors as :class:`TrackEnv`."""
+        """Read a scenario for ``num_envs`` environments; other arguments and errors as for :class:`TrackEnv`."""
         self.num_envs = num_envs
         self.single_observation_space, self.single_action_space = _OBSERVATION, _ACTION
         self.observation_space, self.action_space = (batch_space(space, num_envs) for space in (_OBSERVATION, _ACTION))
@@ -276,7 +285,11 @@ class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, Info]:
-        """Begin all episodes with a ``seed``, or one for each row; ``options`` are not used."""
+        """Begin all episodes, with one ``seed`` or with one per environment; ``options`` are not used.
+
+        Returns:
+            First observations (n, 18), and ``info`` with arrays over the environments.
+        """
         rows = range(self.num_envs)
         seeds = [int(seed) + i for i in rows] if isinstance(seed, int | np.integer) else seed or [None for _ in rows]
         self._randoms = [self._randoms[i] if each is None else np_random(each)[0] for i, each in enumerate(seeds)]
@@ -284,7 +297,11 @@ class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         return self._episodes.observation, self._infos
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, Info]:
-        """Fly a control period with finite ``actions`` (n, 2); episodes that are over begin anew instead."""
+        """Simulate a control period with finite ``actions`` (n, 2); an episode that is over begins anew instead.
+
+        Returns:
+            Observations (n, 18), rewards (n), masks (n) of terminated and of truncated episodes, and ``info``.
+        """
         found = self._episodes.step(np.asarray(actions, float))
         return self._episodes.observation, *found, self._infos
 
