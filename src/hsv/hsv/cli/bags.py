@@ -48,7 +48,7 @@ def replay(
     refuse_vacuous(opened)
     values = flown_parameters(opened, parameters)
     controller = controller_of(values)
-    # Every section needs the controller: that of a single node in the bag's parameters may lack it.
+    # The parameters of every node need the controller; in the bag, those of some nodes may lack it.
     values = values.updated({"controller": controller})
     processes = engine.processes_of(controller, estimated(values))
     if node and node not in processes:
@@ -131,7 +131,7 @@ def _replay_json(result: ProcessComparison) -> dict[str, Any]:
 
 
 def _difference(difference: Difference | None, expected: str, actual: str) -> dict[str, Any] | None:
-    """Return a difference as JSON, or ``None``; the two names are the keys of its two values."""
+    """Return a difference as JSON, or None; ``expected`` and ``actual`` are the keys of its two values."""
     if difference is None:
         return None
     return {
@@ -162,7 +162,7 @@ def diff(
     if not 0.0 <= tolerance < math.inf:
         raise ParameterError(f"tolerance = {tolerance}: expected a finite number, not below zero")
     bags = Bag(first), Bag(second)
-    # A topic that both lack is no difference.
+    # A topic that is in neither bag is not a difference.
     topics = [topic for topic in TOPICS if all(topic in bag.roles for bag in bags)]
     alone = {topic: bag for bag in bags for topic in TOPICS if topic in bag.roles and topic not in topics}
     if not topics:
@@ -271,7 +271,7 @@ def export(
     else:
         if exaggeration is not None:
             raise ParameterError("exaggeration: expected with --scene, tables hold what was recorded")
-        # Tables lie in the bag's folder, so that bags/* remains a list of bags.
+        # Tables are written into the bag's folder, so that bags/* contains bags only.
         home = opened.folder.absolute()
         out = out or home / (f"{home.name}.{chosen[0]}" if chosen[0].single else chosen[0])
         written = tables.export(opened, topic or [name for name in TOPICS if name in opened.roles], chosen[0], out)

@@ -1,4 +1,4 @@
-"""The ratios of ``hsv bench``: two sides of the same work, measured alternately, and their change since another run."""
+"""The measurements of ``hsv bench``: ratios of two run times, and their change since a recorded run."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ from hsv.graph.launcher import Launcher, executable, parameter_arguments
 from hsv.graph.preparation import prepare
 
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-ffp-contract=off")
-"""The best flags of the C compiler that keep the bits: a fused multiply-add rounds once where the core rounds twice."""
+"""Fastest flags of the C compiler that keep all bits; fused multiply-adds, which round only once, are excluded."""
 
 _PERIOD = 0.02
 
 
 RESOLUTION = 0.05
-"""Largest relative change that the same commit shows from run to run on an idle machine."""
+"""Largest relative change of a ratio between two runs of the same commit on an idle machine."""
 
 
 class Recorded(NamedTuple):
-    """A figure of a recorded run: its group, ratio, and the 10th and 90th percentile of the ratios."""
+    """A ratio of a recorded run: its group, median, and 10th and 90th percentile."""
 
     group: str
     ratio: float
@@ -59,14 +59,19 @@ class Recorded(NamedTuple):
 
 @dataclass(frozen=True)
 class Figure:
-    """A measured ratio: the times (s) of both sides, pair by pair, and the largest ratio that is promised."""
+    """A measured ratio of two run times."""
 
     name: str
     what: str
+    """Description of the measured work"""
     against: str
+    """Description of the work with which it is compared"""
     ours: tuple[float, ...]
+    """Times (s) of the measured work, one per pair of runs"""
     theirs: tuple[float, ...]
+    """Times (s) of the other work, in the same order"""
     limit: float
+    """Largest ratio that the project promises"""
     note: str = ""
 
     @property
@@ -82,19 +87,19 @@ class Figure:
 
     @property
     def verdict(self) -> str:
-        """Comparison of the ratio with the limit, in words."""
+        """Text on whether the ratio is within the limit."""
         limit = f"at most {self.limit:g}"
         return f"{limit}, as promised" if self.ratio <= self.limit else f"WORSE than the limit, {limit}"
 
     def as_dict(self, group: str) -> dict[str, Any]:
-        """Return the figure with all samples for the JSON that :func:`read_run` reads."""
+        """Return the figure with all times, for the JSON file that :func:`read_run` reads."""
         judged = {"ratio": self.ratio, "spread": self.spread, "verdict": self.verdict}
         return {**asdict(self), "group": group, **judged}
 
     def slower(self, before: Recorded) -> float:
-        """Return the relative change since a recorded run, positive if the figure became slower.
+        """Return the relative change of the ratio since a recorded run, positive if it became slower.
 
-        It is zero up to :data:`RESOLUTION`, and where the percentiles overlap.
+        A change counts as zero if it is at most :data:`RESOLUTION`, or if the ranges of the percentiles overlap.
         """
         low, high = self.spread
         change = self.ratio / before.ratio - 1.0
@@ -107,9 +112,9 @@ def interleaved(
     repeats: int,
     clock: Callable[[], float] = time.thread_time,
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the times (s) of both sides, measured alternately after one discarded run of each.
+    """Run two jobs alternately, ``repeats`` times each after one discarded run; return the times (s) of both.
 
-    The default clock is the processor time of the thread, which other programs influence little.
+    The default clock is the processor time of this thread, which other programs influence little.
     """
     times: list[list[float]] = []
     for _ in range(repeats + 1):
@@ -124,16 +129,16 @@ def interleaved(
 
 
 def readable(seconds: float) -> str:
-    """Return a time with three digits, in s, ms or us."""
+    """Return a time as text with three digits, in s, ms or us."""
     scale, unit = (1.0, "s") if seconds >= 1.0 else (1e3, "ms") if seconds >= 1e-3 else (1e6, "us")
     return f"{scale * seconds:.3g} {unit}"
 
 
 def read_run(path: Path) -> tuple[str, Mapping[str, Recorded]]:
-    """Return the commit of a run that ``hsv bench --json`` printed to a file, and its figures by name.
+    """Return the commit and the figures by name of a run, from a file with the output of ``hsv bench --json``.
 
     Raises:
-        QuantityError: It cannot be read, or is no such output.
+        QuantityError: The file cannot be read, or has other contents.
     """
     try:
         run = parse_json(read_text(path))
@@ -149,7 +154,7 @@ def read_run(path: Path) -> tuple[str, Mapping[str, Recorded]]:
 
 
 def groups(scale: float = 1.0) -> dict[str, Callable[[], list[Figure]]]:
-    """Return the measurements by group; ``scale`` multiplies the number of repetitions."""
+    """Return a function for each group of measurements, by name; ``scale`` multiplies the number of repetitions."""
 
     def times(number: int) -> int:
         return max(2, round(scale * number))
@@ -163,7 +168,7 @@ def groups(scale: float = 1.0) -> dict[str, Callable[[], list[Figure]]]:
 
 
 def machine() -> str:
-    """Return processor, cores, system, Python and the load of the machine, in one line."""
+    """Return a line of text with processor, cores, system, Python version and load of this machine."""
     info = Path("/proc/cpuinfo").read_text().splitlines()
     models = [line.partition(": ")[2] for line in info if line.startswith("model name")]
     system = f"{platform.system()}, Python {platform.python_version()}, load average {os.getloadavg()[0]:.1f}"
@@ -171,9 +176,9 @@ def machine() -> str:
 
 
 def c_flight(components: Components) -> Callable[[], History]:
-    """Return a function that flies ``components`` by the loop in C alone, compiled for this processor.
+    """Return a function that simulates ``components`` by the C loop alone, compiled here for this processor.
 
-    The equipment must be ideal. The function returns the history, which its next flight overwrites.
+    The equipment must be ideal. The function returns the history; its next call overwrites this history.
 
     Raises:
         RunError: There is no C compiler, or the build failed.
@@ -199,7 +204,7 @@ def c_flight(components: Components) -> Callable[[], History]:
 
 
 def against_c(repeats: int) -> list[Figure]:
-    """Return Case 1 flown from Python against its loop in C alone."""
+    """Measure the simulation of Case 1, called from Python, against the C loop alone."""
     components = assemble_flight(load_scenario("case1"))
     in_c = c_flight(components)
     ours, theirs = interleaved(lambda: fly(components), in_c, repeats)
@@ -209,10 +214,10 @@ def against_c(repeats: int) -> list[Figure]:
 
 
 def against_imports(repeats: int) -> list[Figure]:
-    """Return the processor time of commands against that of a Python that only imports numpy.
+    """Measure the processor time of commands against that of a Python process that only imports numpy.
 
     Raises:
-        RunError: There is no ``hsv`` on the search path, or it failed.
+        RunError: There is no ``hsv`` on the search path, or a command failed.
     """
     if (command := shutil.which("hsv")) is None:
         raise RunError("no hsv on the search path: expected it to be installed")
@@ -233,7 +238,10 @@ def against_imports(repeats: int) -> list[Figure]:
 
 
 def corners(repeats: int, workers: int) -> list[Figure]:
-    """Return the wall time of the 1024 corners of Case 1 against that of as many flights in C alone, with workers."""
+    """Measure the wall time of a campaign of all 1024 corners of Case 1 against as many flights of the C loop alone.
+
+    Both use the same number of worker processes.
+    """
     campaign = plan("case1", method="corners")
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder, make_executor(workers) as flying:
 
@@ -263,7 +271,7 @@ def _fly_c(text: str, batch: int) -> bytes:
 
 
 def against_ring(repeats: int, duration: float = 60.0) -> list[Figure]:
-    """Return a lap of the graph against a lap of the bare ring, measured alternately."""
+    """Measure a step of the ROS 2 graph against one of bare processes that pass the same messages in a ring."""
     pairs = [(graph_lap(duration), ring_lap(round(duration / _PERIOD))) for _ in range(repeats)]
     ours, theirs = zip(*pairs, strict=True)
     what, against = "lap of the graph, separate processes, recorded", "bare ring, EventsExecutor, same recorder"
@@ -271,7 +279,7 @@ def against_ring(repeats: int, duration: float = 60.0) -> list[Figure]:
 
 
 def graph_lap(duration: float) -> float:
-    """Return the mean time (s) of a step of the first ``duration`` (s) of Case 1 over DDS, recorded.
+    """Fly the first ``duration`` (s) of Case 1 over DDS, with recording; return the mean wall time (s) of a step.
 
     Raises:
         RunError: A process ended before its time, or the workspace is not built.
@@ -293,7 +301,10 @@ def graph_lap(duration: float) -> float:
 
 
 def ring_lap(laps: int) -> float:
-    """Return the mean time (s) of a lap of bare processes with the messages and the recorder of the graph.
+    """Pass the graph's messages ``laps`` times around a ring of bare processes with the same recorder.
+
+    Returns:
+        Mean wall time (s) of one round.
 
     Raises:
         RunError: A process ended before its time, or the workspace is not built.

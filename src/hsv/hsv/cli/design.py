@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from hsv.model.lpv.linearisation import Mode
 
 _DESIGN_SECONDS = {"baseline": 175.0, "adjustable": 294.0}
-"""Measured time of these two designs, with 1025 flights each."""
+"""Measured computation times (s) of these two designs, with 1025 flights each."""
 
 AltitudeOption = Annotated[
     str, Option(help="Altitude with unit, e.g. '85500 ft'; default: a published point, or the envelope's middle.")
@@ -63,7 +63,7 @@ HALF_WIDTHS = {
     "FZ fuel": "1",
     "FZ elevator": "rad",
 }
-"""Columns of a table of invariant sets, with SI units: half-widths of the rigid states, and of the feedback on them."""
+"""Headings of a table of invariant sets, with SI units: half-widths of the rigid states and of the feedback F Z."""
 
 
 def trim(
@@ -140,7 +140,7 @@ def linearise(
 
 
 def _described(model: LinearModel, units: UnitSystem) -> dict[str, Any]:
-    """Return a linear model as JSON: its numbers are in ``units``, which the names of the matrices say."""
+    """Return a linear model as JSON; its numbers are in ``units``, whose name is in the keys of the matrices."""
     values = {name: value.tolist() if hasattr(value, "tolist") else value for name, value in model.as_dict().items()}
     matrices = {f"{name}_{units}": values.pop(name) for name in "ABCD"}
     points = (("state", model.states), ("input", model.inputs))
@@ -153,7 +153,7 @@ def _described(model: LinearModel, units: UnitSystem) -> dict[str, Any]:
 
 
 def _damping(mode: Mode) -> float | None:
-    """Return the damping ratio; ``None`` for a pole at the origin, whose sign is a matter of rounding."""
+    """Return the damping ratio, None for a pole at the origin, whose computed sign is a rounding error."""
     return mode.damping_ratio if round(mode.natural_frequency, 9) else None
 
 
@@ -172,7 +172,7 @@ def _pole_table(poles: list[Mode]) -> Table:
     for mode in poles:
         damping = _damping(mode)
         table.add_row(
-            # A pole at the origin is zero but for rounding.
+            # A pole at the origin has a rounding error.
             significant(round(mode.pole.real, 9) + 0.0),
             f"±{significant(mode.pole.imag)}" if mode.pole.imag else "0",
             significant(round(mode.natural_frequency, 9)),
@@ -217,11 +217,11 @@ def design(
     if check and (out or force or tau or compare_sets):
         raise ParameterError("check: --out, --force, --tau or --compare-sets given, expected --check alone")
     target = out or Path(f"{source.stem}.yaml")
-    # Before the minutes that a design takes.
+    # Check the files before the computation, which takes minutes.
     shipped = load_subject(source.with_suffix(".yaml")) if check else None
     for path in () if check else (target, certificate_path(target)):
         check_new(path, "out", force)
-    import cvxpy  # noqa: F401  where it is missing, the command ends before the estimate
+    import cvxpy  # noqa: F401  if it is missing, the command ends before it prints the estimate
 
     size = "adjustable" if inputs.adjustable else "baseline"
     output.print_estimate(_DESIGN_SECONDS[size], json, f" for a design of the size of {size}")
@@ -256,7 +256,7 @@ def design(
 
 
 def _half_widths(half_width: np.ndarray | None, feedback: np.ndarray | None, *size: float | None) -> list[float] | None:
-    """Return half-widths of the rigid states and of the feedback, and a size; ``None`` without a set."""
+    """Return the half-widths of the five rigid states and the two inputs, and the size if given; None without a set."""
     if half_width is None or feedback is None or None in size:
         return None
     return [*half_width[:5], *feedback, *(value for value in size if value is not None)]
@@ -280,7 +280,7 @@ def _check(shipped: Subject, found: ControlDesign, json: bool) -> None:
 
 
 def _summary(report: dict[str, Any]) -> None:
-    """Print the numbers by which a design is judged; those of Algorithm 1 where its factor is adjustable."""
+    """Print the main numbers of the report on a design, with those of Algorithm 1 if the tube factor is adjustable."""
     feedback, tube, flights = report["feedback"], report["tube"], report["tube"]["flights"]
     lines = {
         "vertices": report["vertices"],

@@ -1,4 +1,4 @@
-"""The ``hsv`` script: the table of its commands, and the entry point, which holds back Ctrl-C while modules load."""
+"""The entry point of the ``hsv`` command, and the table of its commands."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ MOVED = {
     "study": "is called hsv-paper sensitivity now, and its limits hsv-paper limits",
     "cluster": "is gone: start Dask workers on other hosts and use --scheduler, see docs/montecarlo.md",
 }
-"""New names of commands that were renamed."""
+"""Messages about commands that were renamed or removed, by old name."""
 
 
 def main() -> None:
-    """Run the command line; an interruption while modules load ends in one line, as later on."""
+    """Run the command line; Ctrl-C ends it with a message of one line, even while modules are loaded."""
     try:
-        # SIGTERM, too, ends child processes and removes temporary files, as Ctrl-C does.
+        # SIGTERM then also ends child processes and removes temporary files, as Ctrl-C does.
         take_interrupts()
         from hsv.cli.main import run
 

@@ -1,4 +1,4 @@
-"""Commands that fly: one flight over DDS or in this process, campaigns, and the two halves of a run for launchers."""
+"""Commands that fly: one flight over DDS or in this process, campaigns, and two commands for other launchers."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def run(
     clock: dict[str, float] = {}
 
     def line(node: str, text: str) -> None:
-        # The addresses of the live view are for the user.
+        # The user needs the addresses of the live view even without --verbose.
         if verbose or WARNING in text or (node == LIVE.label and text.startswith("live ")):
             output.report_line(node, text)
 
@@ -272,7 +272,7 @@ def _conclude(
     every: bool = False,
     wall_time: float | None = None,
 ) -> None:
-    """Print the summary of the flight in a closed ``bag``, and write its report into the bag's folder."""
+    """Print the summary of the flight in a closed ``bag``; with ``report``, write its report into the bag's folder."""
     from hsv.bags.flight import flight_data
     from hsv.bags.info import describe
     from hsv.bags.reader import Bag
@@ -294,7 +294,7 @@ def _conclude(
             write_report([recorded], page, units=units)
             files["report"] = page
         except RecordingError as error:
-            unwritten = error  # the flight itself is complete, and is reported first
+            unwritten = error  # raised after the summary, because the flight itself is complete
     description = describe(recorded)
     flown = FlightSummary(
         parse_scenario(recorded.text("scenario.toml"), recorded.custom_data.get("scenario", "")),
@@ -314,7 +314,7 @@ def _conclude(
 
 
 class _FlyByDefault(TyperGroup):
-    """Takes a first word that is no command of the group for the scenario to fly."""
+    """A group of commands that takes the first word for a scenario to fly if it is not one of the commands."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         if args and args[0] not in (*self.commands, *ctx.help_option_names):
@@ -331,7 +331,7 @@ class Sampling(StrEnum):
 
 
 _SAMPLES = 1000
-"""Number of flights of a campaign, if none is given."""
+"""Default number of flights of a campaign."""
 
 montecarlo = typer.Typer(
     cls=_FlyByDefault,

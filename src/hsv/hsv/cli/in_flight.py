@@ -1,4 +1,4 @@
-"""Commands on a running flight: each becomes a client node that talks to the graph, however that was started."""
+"""Commands on a running flight: each becomes a client node of the graph, no matter how the graph was started."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def topic(
 
 
 def _become(command: str, namespace: str, **options: Any) -> NoReturn:
-    """Run the client node with a command of ``hsv_bringup.commands`` in place of this process."""
+    """Replace this process by the client node with a command of ``hsv_bringup.commands``."""
     from hsv.bags.description import CLIENT
     from hsv.graph.launcher import become
 

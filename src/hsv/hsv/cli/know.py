@@ -1,4 +1,4 @@
-"""Commands to know what there is, whether a controller is reproducible, and how fast this machine is."""
+"""Commands that list what there is, check whether a controller is reproducible, and measure this machine."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _list_controllers(name: str, json: bool) -> None:
         try:
             description = (controller_class(known).__doc__ or "").strip().partition("\n")[0]
         except HsvError as error:
-            description = str(error)  # of an installed package that cannot be loaded
+            description = str(error)  # a package that is installed but cannot be loaded
         titles[known] = description
     _known(Kind.controllers, name, titles)
     output.print_titles({name: titles[name]} if name else titles, json)
@@ -132,7 +132,7 @@ def _list_faults(name: str, units: UnitSystem, json: bool) -> None:
 
 
 def _fault_parameters(type: str, units: UnitSystem) -> Iterator[dict[str, Any]]:
-    """Yield a row per parameter of a fault type, and per channel if its unit depends on the channel."""
+    """Yield a row for each parameter of a fault type, or one for each channel if the unit depends on the channel."""
     from hsv.model.faults.table import FAULT_KINDS, fault_parameters
 
     channels = FAULT_KINDS[type].channels
@@ -175,7 +175,7 @@ def _list_equipment(name: str, units: UnitSystem, json: bool) -> None:
 
 
 def _equipment_sets(units: UnitSystem) -> dict[str, dict[str, Any]]:
-    """Return the sets by name: the table of a scenario that may name them, their source and numbers."""
+    """Return the equipment sets by name, each with the scenario table that can name it, its source and its numbers."""
     from hsv.model.actuators import ACTUATOR_SETS
     from hsv.model.plant import EQUIPMENT_PARAMETERS
     from hsv.model.sensors import SENSOR_SETS

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from hsv.base.errors import RecordingError
 
 SHOWN_EXCURSIONS = 5
-"""Number of departures from the tube that are listed one by one."""
+"""Maximum number of excursions from the tube that are listed one by one."""
 
 
 class Program(StrEnum):
-    """Choice of a viewer."""
+    """Viewers from which the user can choose."""
 
     foxglove = "foxglove"
     lichtblick = "lichtblick"
@@ -167,7 +167,7 @@ def info(
 
 
 def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, Any], RecordingError | None]:
-    """Return the contents of a bag, and the error if it is damaged; print them unless as ``json``."""
+    """Return the contents of a bag, and the error if it is damaged, or None; without ``json``, print the contents."""
     from hsv.bags.flight import MEASURED, flight_data
     from hsv.bags.info import describe
     from hsv.bags.steps import completeness
@@ -244,7 +244,7 @@ def _fault(units: UnitSystem, fault: dict[str, Any]) -> str:
 
 
 def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str, str]:
-    """Return a line for each kind of equipment that is not ideal."""
+    """Return a text for each kind of equipment that is not ideal, such as sensors, by kind."""
     from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
     from hsv.pages.panels import AIR_PANELS
 
@@ -267,7 +267,7 @@ def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str,
 
 
 def _numbers(values: dict[str, Any] | None) -> str:
-    """Return the numbers of a part of a description by their keys; of those after the first, zeros are left out."""
+    """Return as text the numbers in ``values`` with their keys; zeros are left out, except for the first number."""
     if values is None:
         return "not recorded"
     numbers = [(key.replace("_", " "), v) for key, v in values.items() if isinstance(v, int | float)]

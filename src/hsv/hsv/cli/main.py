@@ -52,14 +52,14 @@ EXTRAS = {
     "pyarrow": "campaign",
     "websockets": "live",
 }
-"""Extra of the package that installs an imported module; the base installation lacks these modules."""
+"""Modules that the base installation lacks, and the extra of the package that installs each of them."""
 
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 """Error for an unknown option, a missing argument and the like; typer exports only this subclass of it."""
 
 
 class _StrictCommand(TyperCommand):
-    """A command that refuses an option given twice, of which click silently takes the last, and an empty one."""
+    """A command that refuses empty options, and options given twice, of which typer would silently take the last."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         values, _, given = self.make_parser(ctx).parse_args(args=[*args])
@@ -76,9 +76,9 @@ def application(commands: Mapping[str, Command], *, prog: str = "hsv", listed: b
 
     Args:
         commands: Places of the commands by name. A command ``a-b`` is the function, or group of commands, ``a_b`` of
-            its module, with an underscore at the end where Python itself has the name.
+            its module, with an underscore at the end if ``a_b`` is a name of Python's own.
         prog: Name of the command line.
-        listed: Whether only names and descriptions are needed, as for ``hsv --help``. Options take most of the time.
+        listed: Whether only names and descriptions are needed, as for ``hsv --help``; to build options takes long.
     """
     app = typer.Typer(
         name=prog,
@@ -102,7 +102,7 @@ def application(commands: Mapping[str, Command], *, prog: str = "hsv", listed: b
     for group in groups:
         for registered in group.registered_commands:
             registered.cls = _StrictCommand
-            # The terminal folds the text: typer keeps the line breaks of all paragraphs but the first.
+            # Join the lines of each paragraph, because typer keeps the line breaks of all paragraphs but the first.
             paragraphs = (inspect.getdoc(registered.callback) or "").split("\n\n")
             registered.help = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
     return app
@@ -139,7 +139,7 @@ def run(prog: str, commands: Mapping[str, Command], description: str, moved: Map
         prog: Name of the command line.
         commands: Places of its commands by name.
         description: First sentence of its help.
-        moved: What to say of commands that were renamed, by their old names.
+        moved: Messages about commands that were renamed or removed, by old name.
     """
     completing = f"_{prog.upper()}_COMPLETE" in os.environ
     if completing:
@@ -157,14 +157,14 @@ def run(prog: str, commands: Mapping[str, Command], description: str, moved: Map
         if first not in commands and not first.startswith("-"):
             hint = did_you_mean(first, [name for name, command in commands.items() if command.panel])
             raise QuantityError(f"command {first!r}: unknown{hint} (see {prog} --help)")
-        # Only the given command is built: all of them take as long as numpy.
+        # Build only the given command: to build all of them takes as long as to import numpy.
         listed = first in _HELP and not completing
         app = application({first: commands[first]} if first in commands else commands, prog=prog, listed=listed)
         app.info.help = description
         # Outside typer's standalone mode, a usage error is one line as well.
         code = app(words, prog_name=prog, standalone_mode=False)
         if code == _INTERRUPTED:
-            raise KeyboardInterrupt  # typer swallows it
+            raise KeyboardInterrupt  # typer turns the exception into this code
         if sys.stdout:
             sys.stdout.flush()
         sys.exit(code)
@@ -221,6 +221,6 @@ def _end(code: int) -> None:
         try:
             stream.flush()
         except OSError:
-            # At its end Python would try once more, complain on several lines, and change the exit code.
+            # Otherwise Python flushes again at exit, prints an error on several lines, and changes the exit code.
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     sys.exit(code)

@@ -33,7 +33,7 @@ UnitsOption = Annotated[
 
 
 def check_target(path: Path, field: str, *suffixes: str) -> None:
-    """Refuse a file that ends in none of the ``suffixes``, or that could not be written, before any work is done."""
+    """Refuse, before any work is done, a file name with none of the ``suffixes``, or a file that cannot be written."""
     if suffixes and path.suffix not in suffixes:
         ends = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
         raise ParameterError(f"{field} = {str(path)!r}: expected a file that ends in {ends}")
@@ -43,14 +43,14 @@ def check_target(path: Path, field: str, *suffixes: str) -> None:
 
 
 def check_new(path: Path, field: str, force: bool) -> None:
-    """Refuse a file that could not be written, or that exists unless ``force`` is given."""
+    """Refuse a file that cannot be written or, without ``force``, one that exists."""
     check_target(path, field)
     if path.exists() and not force:
         raise ParameterError(f"{field} = {str(path)!r}: exists, expected a new file, or --force to overwrite it")
 
 
 def check_folder(path: Path, field: str) -> None:
-    """Refuse a folder that could not be written or made; it is not made yet."""
+    """Refuse a folder that cannot be written to or created; the folder is not created here."""
     there = path.absolute()
     while not os.path.lexists(there):
         there = there.parent
@@ -70,7 +70,7 @@ def writing(path: Path, field: str) -> Iterator[None]:
 
 
 def _takes_files(folder: Path) -> bool:
-    # Permissions do not tell: a file system may be read-only, or hold no files.
+    # To check the permissions is not enough: the file system may be read-only, or may not hold files.
     try:
         Path(mkdtemp(dir=folder)).rmdir()
     except OSError:

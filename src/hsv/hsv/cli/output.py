@@ -33,7 +33,7 @@ _COLUMN = 12
 
 
 def _visible(text: str) -> str:
-    """Return ``text`` with control, bidirectional and invisible characters escaped, which could fool a reader."""
+    """Return ``text`` with escapes for control, bidirectional and invisible characters, which could mislead."""
     if text.isprintable():
         return text
     hidden = (character not in "\n\t" and category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp") for character in text)
@@ -41,10 +41,10 @@ def _visible(text: str) -> str:
 
 
 class _Terminal(Console):
-    """A console that prints every text as it stands, whatever a file or a node has put into it."""
+    """A console that shows hidden characters in texts from files and nodes as escapes."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Yield the output of the base class, with hidden characters made visible."""
+        """Yield the segments of the base class, with escapes for hidden characters."""
         for segment in super().render(renderable, options):
             yield Segment(segment.text if segment.control else _visible(segment.text), segment.style, segment.control)
 
@@ -59,9 +59,9 @@ class Interrupted(Exception):  # noqa: N818 - an interruption by the user is no 
 
 @contextmanager
 def resumable(folder: Path) -> Iterator[Callable[[Path], None]]:
-    """Report after Ctrl-C, in one line, where the results are: finished ones in ``folder``, if it exists.
+    """Turn Ctrl-C into a message of one line that finished results are in ``folder``, if it exists.
 
-    Yields a function to be called with the path of the results once all flights are finished.
+    Yields a function to call with the path of the results once all flights are finished; a message then names it.
     """
     complete: list[Path] = []
     try:
@@ -77,7 +77,7 @@ def resumable(folder: Path) -> Iterator[Callable[[Path], None]]:
 
 
 def unit_key(unit: str) -> str:
-    """Return how JSON keys spell a unit at their end: ``ft_per_s``, ``sqrt_slug_ft``; nothing for 1."""
+    """Return the suffix of a JSON key for a unit, such as ``ft_per_s`` or ``sqrt_slug_ft``; empty for ``1``."""
     words = re.sub(r"(\w+)\^0\.5", r"sqrt_\1", unit.replace("lbf/ft^2", "psf"))
     return "" if unit == "1" else words.replace("/", "_per_").replace(" ", "_")
 
@@ -92,17 +92,17 @@ def to_json(quantities: Mapping[str, Quantity], units: UnitSystem) -> dict[str, 
 
 
 def json_system(units: UnitSystem) -> UnitSystem:
-    """Return the units of JSON: strict SI, unless the paper's units are requested."""
+    """Return the units to use in JSON: strict SI, unless the paper's units are requested."""
     return UnitSystem.si if units is UnitSystem.metric else units
 
 
 def print_json(values: Mapping[str, Any]) -> None:
-    """Print ``values`` as JSON on standard output; a number that is not finite, which JSON lacks, as null."""
+    """Print ``values`` as JSON on standard output; numbers that are not finite become null."""
     sys.stdout.write(json_text(values, indent=2) + "\n")
 
 
 def say(*lines: object) -> None:
-    """Print each line as it stands; only the terminal folds it, so that a path can be copied."""
+    """Print each line without inserting line breaks, so that a long path can be copied from the terminal."""
     for line in lines:
         console.print(line if isinstance(line, Text) else str(line), soft_wrap=True)
 
@@ -117,7 +117,7 @@ def print_bag_warnings(*bags: Bag) -> None:
 
 
 def print_estimate(seconds: float, as_json: bool, remark: str = "") -> None:
-    """Print on standard error how long a computation takes on one processor; nothing for a program."""
+    """Print on standard error how long a computation takes on one processor, and a remark; nothing if ``as_json``."""
     if not as_json:
         errors.print(f"about {duration_in_words(seconds)} on one processor{remark}", soft_wrap=True)
 
@@ -128,7 +128,7 @@ def report_error(problem: object) -> None:
 
 
 def report_line(source: str, text: object, style: str = "dim") -> None:
-    """Print a line of a node, or of the command itself, on standard error."""
+    """Print on standard error a line with the name of its source, a node or this command."""
     errors.print(Text.assemble((f"{source}:", style), f" {text}"), soft_wrap=True)
 
 
@@ -152,7 +152,7 @@ def print_titles(titles: Mapping[str, str], as_json: bool) -> None:
 
 
 def folded(text: str, indent: int = 0, first: int = 0) -> str:
-    """Return ``text`` folded between words to the width of the terminal, or 80 columns; paths stay whole.
+    """Return ``text`` wrapped between words to the width of the terminal, or 80 columns; paths are not broken.
 
     The first line begins with ``first`` spaces, the others with ``indent``.
     """
@@ -161,9 +161,9 @@ def folded(text: str, indent: int = 0, first: int = 0) -> str:
 
 
 def print_section(title: str, lines: Mapping[str, object]) -> None:
-    """Print named texts under a title, a line each, folded between words; paths stay whole, to be copied.
+    """Print named texts under a title, wrapped between words; paths are not broken, so that they can be copied.
 
-    After a line break, a text continues on a line of its own.
+    The part of a text after a line break is printed below, without its name.
     """
     console.print(Text(title, "bold"))
     width = max(map(len, lines)) + 4
@@ -174,10 +174,10 @@ def print_section(title: str, lines: Mapping[str, object]) -> None:
 
 
 def new_table(*headings: str, title: str = "", right: Collection[str] = (), head: bool = True) -> Table:
-    """Return an empty table without lines, folded between words to the terminal's width.
+    """Return an empty table without rules, as wide as the terminal at most; text in cells wraps between words.
 
-    ``right`` are the headings of the columns of numbers, which are aligned at the right and not folded; ``head`` shows
-    the headings.
+    ``right`` are the headings of the columns of numbers, which are aligned on the right and do not wrap. The headings
+    are printed if ``head`` is true.
     """
     style: dict[str, Any] = {"title_justify": "left", "box": None, "pad_edge": False, "header_style": "bold"}
     table = Table(title=title or None, show_header=head, **style)
@@ -188,9 +188,9 @@ def new_table(*headings: str, title: str = "", right: Collection[str] = (), head
 
 
 def print_rows(rows: Sequence[Mapping[str, str | float | None]]) -> None:
-    """Print rows whose keys are the headings: numbers at the right, to five digits; ``-`` for none.
+    """Print rows, which have their cells by heading: numbers with five digits, aligned on the right; None is ``-``.
 
-    If the rows are wider than the terminal, the last column stands below the others, a paragraph a row.
+    If the rows are wider than the terminal, the cell in the last column is printed below its row.
     """
     columns = []
     for heading in rows[0]:
@@ -210,7 +210,10 @@ def print_rows(rows: Sequence[Mapping[str, str | float | None]]) -> None:
 def print_matrix(
     title: str, rows: Sequence[str], columns: Sequence[str], cells: Sequence[Sequence[RenderableType]]
 ) -> None:
-    """Print a matrix of ``cells`` by row, as many columns side by side as fit; names fold at their underscores."""
+    """Print a matrix of ``cells`` (rows, columns), in blocks of as many columns as fit into the terminal.
+
+    The names of columns are broken at underscores.
+    """
     count = max(1, (console.width - max(map(len, rows))) // _COLUMN)
     for first in range(0, len(columns), count):
         headings = [column.replace("_", "\n") for column in columns[first : first + count]]
@@ -228,7 +231,7 @@ def quantity_table(
 ) -> Table:
     """Return a table of quantities with the unit of each column below its heading.
 
-    ``columns`` are SI units by heading, ``rows`` name and values (SI) of each item, or None in place of the values.
+    ``columns`` has the SI units by heading. A row has the name of an item and its values (SI); None prints dashes.
     """
     named = {name: unit_in(units, unit) for name, unit in columns.items()}
     headings = [f"{name}\n{'' if unit == '1' else unit}" for name, unit in named.items()]
@@ -268,7 +271,7 @@ def _progress() -> Progress:
 
 @contextmanager
 def stages() -> Iterator[Callable[[str, int, int], None]]:
-    """Yield a callback (stage, done, total) that shows one bar a stage, on a terminal only."""
+    """Yield a callback (stage, done, total) that shows one progress bar per stage, on a terminal only."""
     with _progress() as bar:
         tasks: dict[str, Any] = {}
 
@@ -282,13 +285,13 @@ def stages() -> Iterator[Callable[[str, int, int], None]]:
 
 @contextmanager
 def flights(title: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Yield a callback (flights finished) that shows flights per second and the remaining time."""
+    """Yield a callback (number of finished flights) that shows progress, flights per second and the remaining time."""
     with _progress() as bar:
         task = bar.add_task(title, total=total, note="starting the workers")
         begun: list[tuple[float, int]] = []
 
         def report(finished: int) -> None:
-            # Flights of an interrupted campaign do not count in the pace.
+            # Flights that were finished before this start of the command do not count in the rate.
             begun[:1] = begun[:1] or [(time.monotonic(), finished)]
             start, before = begun[0]
             rate = (finished - before) / max(time.monotonic() - start, 1e-9)

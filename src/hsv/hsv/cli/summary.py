@@ -1,4 +1,4 @@
-"""Summaries of a flight and of a campaign: on the terminal, as JSON, as a page."""
+"""Summaries of a flight and of a campaign, on the terminal and as JSON."""
 
 from __future__ import annotations
 
@@ -28,35 +28,36 @@ _LISTED = 5
 
 @dataclass(frozen=True)
 class FlightSummary:
-    """A flight that has ended, for its summary."""
+    """The data of a flight that has ended, from which its summary is printed."""
 
     scenario: Scenario
     metrics: Mapping[str, float]
     """Metrics by name, in SI units."""
     fingerprint: str | None
-    """Fingerprint of the flight; ``None`` if the recording is not complete."""
+    """Fingerprint of the flight; None if the recording is not complete."""
     design_hash: str
+    """Digest of the design, with which :func:`as_published` finds the published fingerprint."""
     ending: str
     """``finished``, ``diverged`` or ``broken off``."""
     simulated_time: float
     """Simulated time (s) of the last step."""
     wall_time: float | None
-    """Wall time (s) that the flight took, where it is known."""
+    """Wall time (s) that the flight took; None if unknown."""
     not_covered: Sequence[str] | None
-    """Items of the flight that the certificate does not cover; ``None``: not known."""
+    """Items of the flight that the certificate does not cover; None if unknown."""
     step_times: dict[str, Any] | None = None
-    """Wall times of the steps of the control law where they are known, see :func:`hsv.bags.info.describe`."""
+    """Statistics of the wall times of steps, see :func:`hsv.bags.info.describe`; None if unknown."""
     files: Mapping[str, Path] = field(default_factory=dict)
-    """Written files by name."""
+    """Paths of the written files, by the names under which they are printed."""
 
 
 def report_flight(
     flight: FlightSummary, units: UnitSystem, json: bool, strict: bool = False, every: bool = False
 ) -> None:
-    """Print the summary of a flight; with ``every`` it names the metrics that have no limit, too.
+    """Print the summary of a flight; with ``every``, metrics without a limit are marked as not judged.
 
     Raises:
-        RunError: The flight diverged or was broken off, and the message says when; or with ``strict`` broke a limit.
+        RunError: The flight diverged or was broken off, or, with ``strict``, it violated a limit.
     """
     scenario, time, wall_time = flight.scenario, flight.simulated_time, flight.wall_time
     finished = flight.ending == "finished"
@@ -88,7 +89,7 @@ def report_flight(
             **({"control law": step_times_in_words(flight.step_times)} if flight.step_times else {}),
             **({"not covered": "; ".join(flight.not_covered)} if flight.not_covered else {}),
             **flight.files,
-            # On a line of its own, it is as wide as a terminal.
+            # The fingerprint is almost as wide as a terminal, so it has a line of its own.
             "fingerprint": f"{published_in_words(flight.fingerprint, same)}\n{flight.fingerprint or ''}".rstrip(),
         }
         print_metrics(scenario.title, flight.metrics, units, judged, every)
@@ -113,7 +114,7 @@ def print_metrics(
 ) -> None:
     """Print metrics (SI) in groups with their units and, where ``judged`` is given, with their verdicts.
 
-    ``every``: whether to say of metrics without a limit that they are not judged.
+    With ``every``, metrics without a limit are marked as not judged.
     """
     table = output.new_table("metric", "value", "unit", "verdict", title=title, right=["value"], head=False)
     table.columns[2].no_wrap = True
@@ -138,7 +139,7 @@ def print_metrics(
 
 
 def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, flown: int | None = None) -> None:
-    """Print the summary of a campaign and write its page; ``flown`` is the number of flights flown just now."""
+    """Print the summary of a campaign, and write its page; ``flown`` is the number of flights just flown, if known."""
     from hsv.flight.campaign.summary import CONFIDENCE, distributions, shares, worst_flights
     from hsv.pages.campaign import write_campaign_page
 
@@ -211,7 +212,7 @@ def _print_campaign(results: Results, units: UnitSystem) -> None:
 
 
 def sample_words(sample: Mapping[str, float], units: UnitSystem) -> str:
-    """Return a sample (SI; uncertain parameters are relative changes) on one line."""
+    """Return a sample (SI) as a line of text; relative changes are in percent, except in strict SI."""
     from hsv.model.dynamics import COEFFICIENT_UNITS
 
     percent = () if units is UnitSystem.si else COEFFICIENT_UNITS
@@ -220,7 +221,7 @@ def sample_words(sample: Mapping[str, float], units: UnitSystem) -> str:
 
 
 def _outcome(name: str, value: float, units: UnitSystem) -> tuple[str, str]:
-    """Return an outcome of a flight (SI) as it is printed, and its unit."""
+    """Return the value (SI) of the outcome ``name`` as a number in ``units``, and its unit, both as text."""
     from hsv.flight.campaign.sample_runner import OUTCOMES
 
     number, unit = in_system(value, OUTCOMES.get(name, "1"), units, share=is_share(name))
