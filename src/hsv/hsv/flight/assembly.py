@@ -43,7 +43,7 @@ def scenario_parameters(scenario: Scenario) -> dict[str, Any]:
 
 
 def own_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the flat parameters of a custom controller, whose class is imported; empty for a shipped one or a node."""
+    """Return the flat parameters of a custom controller, whose class is imported; otherwise return none."""
     if scenario.controller in SHIPPED_CONTROLLERS:
         return {}
     if scenario.controller.startswith(NODE):
@@ -68,7 +68,10 @@ def flight_parameters(scenario: Scenario) -> dict[str, Any]:
 
 
 def assemble(values: Mapping[str, Any], design: ControlDesign | None = None) -> Components:
-    """Return the five components for the flat parameters ``values``; ``design`` is the one in them, if parsed."""
+    """Return the five components of the loop for the flat parameters ``values``.
+
+    ``design`` is the design in ``values`` if it has been parsed before.
+    """
     design = design or design_of(values)
     return Components(**{block.name: block.build(values, design) for block in LOOP})
 

@@ -64,7 +64,10 @@ class Block:
     """Whether the component is built from a control design."""
 
     def build(self, values: Mapping[str, Any], design: ControlDesign | None = None) -> Any:
-        """Return the component for the flat parameters ``values``; ``design`` is the one in them, if parsed."""
+        """Return the component for the flat parameters ``values``.
+
+        ``design`` is the design in ``values`` if it has been parsed before.
+        """
         module, _, path = self.built_by.partition(":")
         build = attrgetter(path)(import_module(module))
         return build(values, design) if self.designed else build(values)

@@ -30,7 +30,7 @@ from hsv.model.signals import N_INPUTS, N_STATES, VARYING
 
 @dataclass
 class Components:
-    """The components of the loop by the names of their blocks, see :mod:`hsv.flight.blocks`."""
+    """The five components of the closed loop, named like their blocks in :mod:`hsv.flight.blocks`."""
 
     plant: Plant
     notch_filter: NotchFilter
@@ -39,7 +39,7 @@ class Components:
     fault_injector: FaultInjector
 
     def perturbed(self, perturbation: Mapping[str, float]) -> Components:
-        """Return the loop with a vehicle perturbed by relative changes; all other components are shared."""
+        """Return the loop with relative changes of vehicle parameters, by name; all other components are shared."""
         return replace(self, plant=self.plant.perturbed(perturbation))
 
 
@@ -52,7 +52,7 @@ def fly(components: Components) -> Flight:
 
     Raises:
         ControllerError: A custom controller failed; the message names it and the step.
-        ParameterError: The controller runs in a node of its own.
+        ParameterError: The controller is a separate node.
     """
     rows = components.plant.steps + 1
     if components.controller.library is not None:
@@ -73,9 +73,9 @@ def is_ideal(components: Components) -> bool:
 
 @contextmanager
 def watched(controller: Controller, rows: int) -> Iterator[tuple[History, Callable[..., Any]]]:
-    """Yield the memory for a flight of a controller in a library, and the function that sends a request to its process.
+    """Yield a history of ``rows`` steps, and the function that sends a request to the process of a library controller.
 
-    The memory is a history of ``rows`` steps, shared with the child process that runs the library.
+    The process writes the flights that are requested into the history, which is in shared memory.
 
     Raises:
         ControllerError: The child process crashed or made no progress; the message names the step.
@@ -129,7 +129,7 @@ def fly_into(history: History, components: Components) -> tuple[int, dict[str, S
 
 
 NO_CALL = Struct("hsv_call", function=None, state=None, par=None)
-"""Call of no external block: the core uses its own law."""
+"""An empty call: there is no external block, and the core uses its own law."""
 
 
 def flight_struct(components: Components, history: History, **others: Any) -> Struct:

@@ -32,10 +32,10 @@ def corners(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, f
 
 
 def fraction(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, float]]:
-    """Return the nominal vehicle, then a quarter of the corners, or all of fewer than ten parameters; fixed order.
+    """Return the nominal vehicle, then a quarter of the corners, or all with fewer than ten parameters.
 
-    The quarter is a regular fraction of resolution VI: two of ten signs are products of five others. Any three
-    parameters therefore still occur in all combinations of their signs.
+    The order is fixed. The quarter is a regular fraction of resolution VI: two of ten signs are products of five
+    others. Any three parameters therefore still occur in all combinations of their signs.
     """
     names = list(bounds)
     nominal, *rows = corners(bounds, share)
@@ -47,7 +47,7 @@ def fraction(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, 
 
 
 def screening_corners(bounds: Mapping[str, float], share: float = 1.0) -> list[Corner]:
-    """Return the nominal vehicle, then 32 corners of ``share`` times the at most 15 bounds, in a fixed order.
+    """Return the nominal vehicle, then 32 corners of ``share`` times the bounds (at most 15), in a fixed order.
 
     The corners are the 16 runs of a Hadamard matrix and their mirror images. Any three parameters occur in all
     combinations of their signs.
@@ -58,7 +58,7 @@ def screening_corners(bounds: Mapping[str, float], share: float = 1.0) -> list[C
 
 
 def region_parameters(inputs: Mapping[str, Any], vehicle: Vehicle, share: float = 1.0) -> dict[str, Any]:
-    """Return the flat parameters of the flight that the ``inputs`` (SI) of a design declare, without the design's.
+    """Return the flat parameters of the flight that the ``inputs`` (SI) of a design declare, without the design itself.
 
     The lost elevator effectiveness is ``share`` (0 to 1) times the declared loss (paper eq. 47).
     """

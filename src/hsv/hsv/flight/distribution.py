@@ -21,7 +21,7 @@ KINDS = {"uniform": "[least, largest]", "normal": "[mean, standard deviation]"}
 """Kinds of distributions by their key in a file, each with the meaning of its two values."""
 
 TRUNCATION = 3.0
-"""Standard deviations from the mean to either end of a normal distribution."""
+"""Number of standard deviations from the mean to each end of a truncated normal distribution."""
 
 _BELOW = 0.0013498980316300946
 """Probability that a normal variable is more than three standard deviations below its mean."""
@@ -68,7 +68,7 @@ def standard_quantiles(shares: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, kw_only=True)
 class Distribution:
-    """A random number between ``low`` and ``high``, in ``unit``."""
+    """The distribution of a random number between ``low`` and ``high``, in ``unit``."""
 
     unit: str
     low: float
@@ -104,7 +104,8 @@ def read_distribution(given: Mapping[str, Any], unit: str, field: str, *, whole:
     """Return the distribution in the inline table ``given`` for a scenario's ``field``, whose numbers are in ``unit``.
 
     Raises:
-        QuantityError: Unknown kind, no pair of quantities in this unit, wrong order, or no integers although ``whole``.
+        QuantityError: The kind is unknown, or the values are no pair of quantities in this unit, in the wrong order, or
+            not integers although ``whole``.
     """
     forms = " or ".join(f"{{ {kind} = {pair} }}" for kind, pair in KINDS.items())
     if len(given) != 1 or next(iter(given)) not in KINDS:

@@ -86,7 +86,7 @@ def step_statistics(seconds: Sequence[float]) -> dict[str, float]:
 
 
 def step_times_in_words(step_times: dict[str, Any]) -> str:
-    """Return one line of text with the wall times of the laws by node, and of a step of the whole loop if known."""
+    """Return one line with the wall times of the control laws by node, and of a whole step of the loop if known."""
     times = [
         f"{name} {times['median_ms']:.3g} ms in the median, 99 % {times['p99_ms']:.3g}, largest {times['max_ms']:.3g}"
         for name, times in step_times["nodes"].items()

@@ -35,13 +35,13 @@ class History(_Matrices):
 
     @classmethod
     def empty(cls, rows: int, *, estimated: bool = True) -> History:
-        """Return a history of ``rows`` uninitialised steps; ``estimated`` adds an estimate besides the true state."""
+        """Return a history of ``rows`` uninitialised steps; ``estimated``: with memory for an estimated state."""
         numbers = cls.numbers() if estimated else SIGNAL_COLUMNS + AUXILIARY_COLUMNS
         return cls.over(np.empty(rows * numbers), rows, estimated=estimated)
 
     @classmethod
     def of(cls, **signals: np.ndarray) -> History:
-        """Return a history with these ``signals`` (n + 1 rows each), by name; the others are NaN."""
+        """Return a history with the given ``signals`` (n + 1 rows each), by name; all others are NaN."""
         history = cls.empty(len(next(iter(signals.values()))), estimated=False)
         history.signals[:] = history.auxiliary[:] = np.nan
         for name, values in signals.items():
@@ -60,7 +60,7 @@ class History(_Matrices):
 
     @staticmethod
     def numbers() -> int:
-        """Return the number of values per step, with an estimated state."""
+        """Return the number of values per step, including an estimated state."""
         return SIGNAL_COLUMNS + AUXILIARY_COLUMNS + N_STATES
 
     state = _signals(X, Q_F, "State x (n + 1, 9)")

@@ -76,7 +76,7 @@ class LoadedLibrary:
 
     @contextmanager
     def _reason(self) -> Iterator[None]:
-        """Replace the return value in an error by the reason why the FMU failed."""
+        """In an error that is raised in this context, replace the return value by the reason why the FMU failed."""
         try:
             yield
         except RunError as error:

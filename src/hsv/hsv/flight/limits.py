@@ -53,7 +53,7 @@ def not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, float]) -> l
 
 
 def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float], system: UnitSystem) -> str:
-    """Return one line: whether a flight kept its limits, which it did not keep, and the metrics without a limit."""
+    """Return one line: whether a flight kept its limits, which limits it broke, and which metrics have no limit."""
     text = limits_kept(judged, system)
     words = criteria_not_judged(judged, metrics, system)
     if others := len(not_judged(judged, metrics)) - len(words):
@@ -69,7 +69,7 @@ def criteria_not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, flo
 
 
 def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem) -> str:
-    """Return the verdict sentence without the metrics that are not judged."""
+    """Return in words whether a flight kept its limits, and which limits it did not keep."""
     if not judged:
         return "not judged: the scenario has no limits"
     if all(verdict.within for verdict in judged.values()):

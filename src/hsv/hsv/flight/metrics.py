@@ -201,8 +201,8 @@ def _metrics(flight: FlightData) -> dict[str, float]:
 def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
     """Return rise time (s), settling time (s) and overshoot (share of the step) of a step response, by name.
 
-    ``time`` (n) is in seconds, ``error`` (n) is the tracking error; its first value is the size of the step. A time
-    that is not reached is omitted. Without a step the result is empty.
+    ``time`` (n) is in seconds, ``error`` (n) is the tracking error; its first value is the size of the step. A time is
+    omitted if the response does not rise or settle. Without a step the result is empty.
     """
     if len(time) < 2 or abs(error[0]) < 1e-6:
         return {}

@@ -34,7 +34,7 @@ _FLIGHTS = 2
 
 @dataclass(frozen=True)
 class Finding:
-    """The result of a check: its name, its number of flights, and in words where bytes first differ, or empty."""
+    """The result of a check: its name, its number of flights, and in words where bytes first differ, if they do."""
 
     check: str
     flights: int
@@ -52,7 +52,7 @@ def findings(scenario: Scenario) -> Iterator[Finding]:
     """Fly ``scenario`` in every way that must give the same flight, and yield the findings.
 
     Raises:
-        ScenarioError, RunError: It cannot be flown, or the controller failed in the first flight.
+        ScenarioError, RunError: The scenario cannot be flown, or the controller failed in the first flight.
     """
     parts = assemble_flight(scenario)
     first = fly(parts)

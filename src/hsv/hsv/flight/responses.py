@@ -27,9 +27,9 @@ def lag_response(
     scheduled: np.ndarray,
     lag: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the response of the error e (k, n) and of the feedback (k, 2) to the lag of the plan, from zero.
+    """Return the response of the error e (k, n) and of the feedback (k, 2) to the lag of the plan, in closed loop.
 
-    The loop is closed. The n states of e are those of the rigid body (5), the notch filter and the actuators.
+    The error starts at zero. The n states of e are those of the rigid body (5), the notch filter and the actuators.
 
     Args:
         polytope: Model of the vehicle.

@@ -142,7 +142,7 @@ _LIMITS = tuple(
 )
 
 _NO_KEYS = ("name", "own", "settings")
-"""Fields that are not keys of a file."""
+"""Fields of a scenario that are not keys of its file."""
 
 _CONTROLLER_TABLES = dict.fromkeys(("tube", "integral", "effectiveness"), "tube_mpc") | {"robust_mpc": "robust_mpc"}
 """Tables that only one of the shipped controllers reads, each with the name of that controller."""
@@ -159,7 +159,7 @@ def scenario_names() -> list[str]:
 def scenario_text(name: str) -> str:
     """Return the complete TOML text of a scenario, given by name or path.
 
-    It includes the scenarios that it extends and the vehicle, unless that is a shipped one. Library paths are absolute.
+    The text includes the extended scenarios, and the vehicle unless it is shipped. Paths of libraries are absolute.
 
     Raises:
         ScenarioError: Scenario, file or vehicle does not exist or cannot be read, or a path leads out of its folder.

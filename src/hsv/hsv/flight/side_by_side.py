@@ -75,7 +75,10 @@ class TubeLevels:
             self.set = Struct("hsv_tube_set", notch=notch.data, shape=tube.shape, centre=tube.centre)
 
     def worst(self, flight: FlightData) -> float | None:
-        """Return the largest level (e - c)' P (e - c) of the flight, None if no set applies to it."""
+        """Return the largest level (e - c)' P (e - c) of the tube error e in the flight, None if no set applies to it.
+
+        The set has the centre c and the shape P.
+        """
         if not self.set:
             return None
         given = [doubles(vector(each)) for each in (flight.history.state, flight.history.deviation, flight.reference)]

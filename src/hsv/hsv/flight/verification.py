@@ -158,12 +158,12 @@ def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
 
 
 def share_of(inputs: Mapping[str, Any]) -> float:
-    """Return the share of fault and parameter bounds that W' covers (eq. 47): the largest tau, or 1 if tau is fixed."""
+    """Return the share of fault and parameter bounds that the set W' covers (eq. 47): largest tau, 1 if it is fixed."""
     return float(max(inputs["adjustable"]["tau"])) if inputs.get("adjustable") else 1.0
 
 
 def flight_checks(subject: Subject) -> Checks:
-    """Yield the checks of flights at the corners that determine a bound of W (eq. 19), and at a sample of all corners.
+    """Yield the checks of flights at the corners that set a bound of W (eq. 19), and at a sample of all corners.
 
     Errors must stay in the set (eq. 26), and plans in the stated range, which is within the bounds of eq. 30. The check
     of the pitch acceleration is our own.
@@ -214,7 +214,10 @@ def _worst(subject: Subject, field: str, flown: Sequence[Evidence]) -> Checks:
 
 
 def _lag_check(name: str, subject: Subject, flown: Sequence[Evidence]) -> Check:
-    """Return the check of the feedback to the plan's lag. It is our own; actuators of the paper have no dynamics."""
+    """Return the check that the feedback to the lag of the plan stays within its bounds.
+
+    The check is our own: actuators of the paper have no dynamics, so that their plan has no lag.
+    """
     lower, upper = lag_feedback(subject)
     room = min(float(min((f.lag[0] - lower).min(), (upper - f.lag[1]).min())) for f in flown)
     return above(f"{name}, room to its bounds", room, -ROUNDING)
@@ -243,7 +246,7 @@ def bounding_corners(subject: Subject) -> list[Corner]:
 def scenario_checks(
     subject: Subject, scenario: Scenario, over: Sequence[Corner] = ({},), progress: Progress = lambda *_: None
 ) -> Checks:
-    """Fly ``scenario`` with each vehicle in ``over`` and check level (eq. 26), disturbances (eq. 19), plan (eq. 30).
+    """Fly ``scenario`` with each change in ``over``; check level (eq. 26), disturbances (eq. 19) and plan (eq. 30).
 
     Raises:
         DesignError: The controller of the scenario is not the tube law.
