@@ -139,7 +139,7 @@ def moving_air(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def _over_the_period(topics: Mapping[str, Columns], field: str) -> np.ndarray:
-    """Return a field (n) of the forces in the period that begins with each step; NaN if lost, empty if not in the bag."""
+    """Return a field (n) of the forces in the period that begins with each step; NaN if lost, empty if absent."""
     if FORCES not in topics or field not in topics[FORCES]:
         return np.empty(0)
     forces = topics[FORCES]
