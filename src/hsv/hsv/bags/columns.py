@@ -1,15 +1,15 @@
-"""The messages of a topic, and their fields as arrays.
+"""The messages of a topic, and their fields as columns: arrays with one row per message.
 
-The names of the columns are field paths such as ``header.stamp``. Times and durations become int64 nanoseconds (n,),
-numbers arrays (n,), and arrays or sequences of numbers arrays (n, length). Arrays of objects (n,) hold texts, sequences
-of different lengths, and lists of messages as lists of dictionaries.
+A column is named by the path of its field, such as ``header.stamp``. For n messages, times and durations become int64
+nanoseconds (n,), numbers arrays (n,), and arrays or sequences of numbers arrays (n, length). Texts, sequences of
+different lengths, and lists of messages (as lists of dictionaries) become arrays of objects (n,).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import Any
 
@@ -25,11 +25,11 @@ from hsv.bags.messages import ENCAPSULATION, MessageError, Structure
 from hsv.base.errors import RecordingError, SignalError
 
 Read = Callable[[str], Sequence[Any] | NDArray[Any]]
-"""Function that returns the values of all messages at a field path."""
+"""Function that returns the values of one field, given by its path, in all messages."""
 
 
 class Columns(dict[str, NDArray[Any]]):
-    """Arrays by field path; reading a field that the definition does not have raises a RecordingError."""
+    """Fields of a topic's messages: arrays by field path. A field that the definition lacks raises a RecordingError."""
 
     def __init__(self, source: str = "") -> None:
         super().__init__()
@@ -37,7 +37,7 @@ class Columns(dict[str, NDArray[Any]]):
         """Source of the messages, for error messages."""
 
     def rows(self, rows: NDArray[np.intp]) -> Columns:
-        """Return the chosen rows of every column."""
+        """Return a copy with only the given rows of every column."""
         chosen = Columns(self.source)
         chosen.update((name, column[rows]) for name, column in self.items())
         return chosen
@@ -47,10 +47,10 @@ class Columns(dict[str, NDArray[Any]]):
 
 
 def read_at_once(types: Typesdict, message_type: str, messages: Sequence[bytes]) -> Read | None:
-    """Return a function that reads ``messages`` (at least one, CDR) of one layout at once.
+    """Return a function that reads a field of all ``messages`` (at least one, CDR) at once, if they have one layout.
 
-    It is None if they differ in layout, are big-endian, or have texts or messages in a sequence; then use
-    :func:`read_one_by_one`.
+    Return None if the messages differ in layout, are big-endian, or have texts or messages in a sequence. Such messages
+    must be read with :func:`read_one_by_one`.
     """
     try:
         structure = Structure(types, message_type, messages[0])
@@ -65,17 +65,17 @@ def read_at_once(types: Typesdict, message_type: str, messages: Sequence[bytes])
         texts = {n: [text.decode() for text in rows[n].tolist()] for n in names if structure.dtype[n].kind == "S"}
     except UnicodeDecodeError:
         return None
-    # Sequences of texts or messages have no place in the structure: they are empty.
+    # A sequence of texts or messages is not part of the structure: it is empty in every message.
     return lambda path: texts[path] if path in texts else rows[path] if path in names else [[] for _ in messages]
 
 
 def read_one_by_one(messages: Sequence[object]) -> Read:
-    """Return a function that reads deserialized messages of any layout."""
+    """Return a function that reads a field of deserialized ``messages``, whose layouts may differ."""
     return lambda path: list(map(attrgetter(path), messages))
 
 
 def columns_of(types: Typesdict, message_type: str, read: Read, source: str = "") -> Columns:
-    """Return the columns of the messages of a type that ``read`` reads; ``source`` is for error messages."""
+    """Return the columns of messages of a type, with values from ``read``; ``source`` is for error messages."""
     columns = Columns(source)
 
     def gather(kind: str, prefix: str) -> None:
@@ -141,24 +141,22 @@ class Track:
     """Source of the messages, for error messages."""
 
     def cut(self, count: int) -> Track:
-        """Return the first ``count`` messages."""
+        """Return a copy with only the first ``count`` messages."""
         return self.rows(range(min(count, len(self.data))))
 
-    def rows(self, rows: Iterable[int]) -> Track:
-        """Return the messages in the given ``rows``."""
-        chosen = [(self.times[row], self.data[row]) for row in rows]
-        times, data = [time for time, _ in chosen], [message for _, message in chosen]
-        return Track(self.topic, self.type, self.types, times, data, self.source)
+    def rows(self, rows: Sequence[int]) -> Track:
+        """Return a copy with only the messages at the indices ``rows``."""
+        return replace(self, times=[self.times[row] for row in rows], data=[self.data[row] for row in rows])
 
     def columns(self) -> Columns:
-        """Return all decoded messages, one array per field; raise a RecordingError if one does not fit."""
+        """Return all fields of all messages, one array per field; raise a RecordingError if a message does not fit."""
         types = self.types.fielddefs
         read = read_at_once(types, self.type, self.data) if self.data else None
         read = read or read_one_by_one([message for _, message in self.decode()])
         return columns_of(types, self.type, read, f"{self.source}: topic {self.topic}")
 
     def decode(self) -> Iterator[tuple[int, Any]]:
-        """Yield time (ns) and deserialized message; raise a RecordingError if one does not fit its definition."""
+        """Yield each message as (time in ns, deserialized message); raise a RecordingError if its bytes do not fit."""
         for time, message in zip(self.times, self.data, strict=True):
             try:
                 yield time, deserialized(self.types, message, self.type)

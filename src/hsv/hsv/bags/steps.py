@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,21 +16,19 @@ from hsv.bags.recover import RECOVERED
 from hsv.base.errors import RecordingError
 
 MAX_STEPS, MAX_PERIOD = 5_000_000, 1.0
-"""Steps of the longest flight, 100 000 s, at the usual period of 0.02 s; and the longest period, s."""
+"""Largest number of steps, 100 000 s at the usual period of 0.02 s, and longest period, s, that a bag may announce."""
 
 
 def cut_off(bag: Bag) -> bool:
-    """Return whether the last messages may be missing, because the recorder was killed."""
+    """Return whether the last messages may be missing: the bag lacks its end or a file, or is a recovered one."""
     return not bag.complete or RECOVERED.items() <= bag.custom_data.items()
 
 
 def joined(bag: Bag, topics: Sequence[str]) -> dict[str, Columns]:
-    """Return the columns of ``topics`` for the steps that all of them have; without such a step, a RecordingError."""
+    """Return the columns of ``topics`` at the steps that all of them have; raise a RecordingError if there is none."""
     columns = {topic: bag.columns(topic) for topic in topics}
     steps = [found["step"] for found in columns.values()]
-    common = steps[0]
-    for found in steps:
-        common = np.intersect1d(common, found)
+    common = reduce(np.intersect1d, steps, steps[0])
     if not len(common):
         raise RecordingError(f"{bag.path}: holds no complete step, expected a flight")
     if all(np.array_equal(found, common) for found in steps):
@@ -48,7 +47,7 @@ def expected_stamps(bag: Bag) -> NDArray[np.int64]:
     announcement they end with the last recorded step.
 
     Raises:
-        RecordingError: A message does not fit its definition, or tells of more steps than any flight has.
+        RecordingError: A message does not fit its definition, or the announced steps or period exceed the limits.
     """
     found = np.unique(np.concatenate([np.array([], np.int64), *_stamps(bag).values()]))
     announced = _announced(bag) or _numbered(bag)
@@ -75,7 +74,7 @@ def _announced(bag: Bag) -> tuple[float, int] | None:
 
 
 def _numbered(bag: Bag) -> tuple[float, int] | None:
-    """Return period (s) and last step from the numbers of the recorded steps, or None."""
+    """Return period (s) and last step from the numbers of the recorded steps, or None without recorded steps."""
     last: tuple[float, int] | None = None
     for topic, stamps in _stamps(bag).items():
         steps = bag.columns(topic).get("step", np.array([], np.uint64))
@@ -91,10 +90,7 @@ def _stamps(bag: Bag) -> dict[str, NDArray[np.int64]]:
 def complete_stamps(bag: Bag) -> NDArray[np.int64]:
     """Return the stamps (ns) of the complete steps, which are recorded on all step topics of the bag."""
     stamps = list(_stamps(bag).values())
-    common = np.unique(stamps[0]) if stamps else np.array([], np.int64)
-    for stamp in stamps:
-        common = np.intersect1d(common, stamp)
-    return common
+    return reduce(np.intersect1d, stamps, stamps[0] if stamps else np.array([], np.int64))
 
 
 def lost_seconds(bag: Bag) -> float:
