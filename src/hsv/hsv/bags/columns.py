@@ -126,7 +126,7 @@ def expecting_fields(source: object) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Track:
-    """The messages of one topic in their order."""
+    """The recorded or replayed messages of one topic in their order, with times and type."""
 
     topic: str
     type: str

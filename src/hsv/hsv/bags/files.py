@@ -114,7 +114,7 @@ class Unpacker:
             raise RecordingError(f"{path}: {error}") from None
         self._limit = self._left = max(MAX_UNPACKED, MAX_RATIO * len(data))
         self.data = self.unpacked(data)[0]
-        """Contents of the file, as far as it can be unpacked"""
+        """Contents of the file, as far as it can be unpacked."""
 
     def unpacked(self, data: bytes, compression: str | None = None) -> tuple[bytes, bool]:
         """Return the decompressed ``data``, up to the first damage, and whether they are complete.

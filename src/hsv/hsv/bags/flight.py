@@ -105,7 +105,7 @@ def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def held(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return, for each link (measurement, command) that held an old payload, the mask (n) of the steps of this."""
+    """Return, for each link (measurement, command) that held an old payload, the mask (n) of these steps."""
     ends = {}
     if MEASUREMENT in topics:
         ends["measurement"] = state_columns(topics[STATE]), state_columns(topics[MEASUREMENT], "state.")

@@ -197,7 +197,7 @@ def _step_times(bag: Bag) -> dict[str, Any] | None:
                     nodes[node] = {name: float(values[name]) for name in statistics}
         stamps = bag.times(STATE)
     except (RecordingError, ValueError, AttributeError):
-        return None  # the diagnostics of something else
+        return None  # the diagnostics of another program
     period = float(stamps[1] - stamps[0]) / 1e6 if len(stamps) > 1 else 0.0
     return {"period_ms": period, "nodes": nodes} if nodes and period else None
 

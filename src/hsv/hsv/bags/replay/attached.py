@@ -54,7 +54,7 @@ from hsv.model.faults.injector import FaultInjector
 from hsv.model.vehicle import vehicle_label
 
 DESIGN, SCENARIO = "design.yaml", "scenario.yaml"
-"""Attachments with the parameters of the design, and with those of the scenario, which override them."""
+"""Names of the attachments with the parameters of the design and of the scenario; the latter override the former."""
 
 _OF_THE_RUN = {
     p.name for p in (*PACE_PARAMETERS, *RECORDER_PARAMETERS, *CERTIFICATE_PARAMETERS, *LOCKSTEP_PARAMETERS)
