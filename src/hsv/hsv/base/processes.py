@@ -45,11 +45,11 @@ def interrupt(number: int, frame: FrameType | None) -> None:
     """Handle a signal: raise ``KeyboardInterrupt`` at once, or after the current import or uninterrupted function.
 
     Imports are not interrupted, because that of a compiled module would fail with another error, and callbacks of the
-    import system swallow the exception. Instead, a timer calls this function again after ``_LATER``;
-    it would outlive an ``exec`` of another program.
+    import system swallow the exception. Instead, a timer, which survives an ``exec`` of another program, calls this
+    function again after ``_LATER``.
 
     Raises:
-        KeyboardInterrupt: The exception need not be postponed.
+        KeyboardInterrupt: Unless it must be postponed.
     """
     while frame is not None:
         if frame.f_code in _WHOLE or frame.f_code.co_filename.startswith("<frozen importlib"):
@@ -89,7 +89,7 @@ def ignore_ctrl_c_at_end() -> None:
 
 
 def end_with_parent(parent: int) -> None:
-    """Have Linux terminate this process when the thread that started it, of the process ``parent``, ends."""
+    """Have Linux terminate this process when the thread of the process ``parent`` that started it ends."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
         if os.getppid() != parent:  # it has ended already

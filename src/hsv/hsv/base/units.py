@@ -102,7 +102,7 @@ def unit_system(name: str) -> UnitSystem:
 
 
 def unit_in(system: UnitSystem, unit: str) -> str:
-    """Return the unit of ``system`` for the SI ``unit``; in most quotients, only the dividend changes."""
+    """Return the unit that ``system`` shows for the SI ``unit``; of most quotients, only the dividend is converted."""
     if system is UnitSystem.si:
         return unit
     own = PAPER_UNITS if system is UnitSystem.paper else METRIC_UNITS
@@ -156,7 +156,7 @@ def duration_in_words(seconds: float) -> str:
 
 
 def si_unit_of(text: object) -> str:
-    """Return the SI base units of the quantity ``text``; ``"1"`` without a unit or a quantity."""
+    """Return the SI base units of the quantity ``text``, or ``"1"`` if it has no unit or is not a quantity."""
     try:
         base = _squared(_number_and_unit(text)[1] if isinstance(text, str) else "")[1]
     except ValueError:
@@ -190,7 +190,10 @@ def has_unit(text: object) -> bool:
 
 
 def in_unit_of(values: Sequence[float], unit: str, text: object) -> tuple[list[float], str]:
-    """Return ``values``, given in the SI ``unit``, in the unit of the quantity ``text``, and a space with that unit."""
+    """Return ``values``, given in the SI ``unit``, in the unit of the quantity ``text``.
+
+    The second result is that unit after a space; without a unit in ``text``, it is the SI ``unit`` or empty.
+    """
     found = _QUANTITY.fullmatch(text.strip()) if isinstance(text, str) else None
     own = (found["unit"] or "") if found else ""
     if not own:

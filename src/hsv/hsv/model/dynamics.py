@@ -163,7 +163,7 @@ class Structure:
 
     @cached_property
     def tables(self) -> dict[str, dict[str, str]]:
-        """SI units of the coefficients by their names, within each table of a vehicle file."""
+        """For each table of a vehicle file, the names and SI units of its coefficients."""
         found: dict[str, dict[str, str]] = {}
         for name in self.names:
             table, unit = _PLACES[name]

@@ -81,12 +81,12 @@ def computation(values: Mapping[str, object], period: float) -> tuple[int, float
 
 
 def measurement_link(values: Mapping[str, object]) -> Struct:
-    """Return the sensors' link that values of :data:`MEASUREMENT_LINK_PARAMETERS` describe."""
+    """Return the link from the sensors, given values of :data:`MEASUREMENT_LINK_PARAMETERS`."""
     return _link(MEASUREMENT_LINK, values, 0)
 
 
 def command_link(values: Mapping[str, object], period: float) -> Struct:
-    """Return the controller's link from :data:`COMMAND_LINK_PARAMETERS`; whole periods of computing time delay it."""
+    """Return the link from the controller; its delay includes the whole periods of :func:`computation`."""
     return _link(COMMAND_LINK, values, computation(values, period)[0])
 
 

@@ -58,11 +58,11 @@ EQUIPMENT_PARAMETERS = (
     *MEASUREMENT_LINK_PARAMETERS,
     COMPUTATION_PARAMETER,
 )
-"""Parameters of actuators, air, sensors and links, which are ideal by default; also tables of a scenario."""
+"""Parameters of actuators, air, sensors and links, ideal by default; a scenario has tables of the same names."""
 
 
 def check_equipment(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> None:
-    """Raise a ParameterError for a wrong value of :data:`EQUIPMENT_PARAMETERS` or of the link to the actuators."""
+    """Raise a ParameterError for a wrong value of :data:`EQUIPMENT_PARAMETERS` or of the command link."""
     actuator_data(values, vehicle, period)
     atmosphere_data(values, period)
     sensor_data(values, period)
@@ -77,7 +77,7 @@ _CALM = CALM.tolist()
 
 
 def plant_faults(scheduled: Sequence[ScheduledFault], period: float, before: Struct | None = None) -> Struct:
-    """Return those of the ``scheduled`` faults that act in the plant; faults also in ``before`` keep their memory."""
+    """Return the ``scheduled`` faults of the plant, for the core; faults also in ``before`` keep their memory."""
     sides = {"effector": (DYNAMICS, EFFECTOR), "engine": (ENGINE_SIDE,), "sensor": (SENSOR,)}
     rows = {name: fault_rows(side, scheduled, period, before and getattr(before, name)) for name, side in sides.items()}
     return Struct("hsv_plant_faults", **rows)

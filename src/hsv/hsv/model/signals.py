@@ -41,7 +41,7 @@ class SignalType(NamedTuple):
 
     name: str
     unit: str
-    """SI unit, or ``"1"``; several, separated by commas, apply to the numbers in turn; empty if it is not numeric"""
+    """SI unit, or ``"1"``; several, separated by commas, apply to the numbers in turn; empty for mixed contents"""
     size: int
 
 

@@ -107,7 +107,7 @@ def check_equilibrium(where: str, size: float, u: np.ndarray, vehicle: VehiclePa
     """Check the imbalance ``size`` of an equilibrium, and that the input ``u`` (2) is within the limits of ``vehicle``.
 
     Raises:
-        TrimError: One of them is not; the message names ``where`` and the reason.
+        TrimError: The imbalance is too large or an input outside; the message names ``where`` and the reason.
     """
     if not size < CONVERGED:
         raise TrimError(f"{where}: no equilibrium there, expected a condition inside the trimmable envelope")

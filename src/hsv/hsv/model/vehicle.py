@@ -290,7 +290,7 @@ def missing_parameters(values: Mapping[str, Any]) -> list[str]:
 
 
 def named_parameters(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parameters of the vehicle called ``vehicle.name`` in ``values``, by default those of the paper's.
+    """Return the parameters of the vehicle called ``vehicle.name`` in ``values``, or of the default vehicle.
 
     Raises:
         VehicleError: There is no vehicle of that name.

@@ -87,7 +87,7 @@ def transforms(sample: Sample, exaggeration: float | None = None) -> list[Transf
 
 
 def segments(frame: Airframe) -> dict[str, np.ndarray]:
-    """Return the stations (m) of the segment ends of ``fore_body`` and ``aft_body``, outward from the centre."""
+    """Return the stations (m) of the segment ends of each part of the body, from the centre of gravity outward."""
     return {
         "fore_body": np.array([0.0, *np.linspace(frame.inlet, frame.fore_body, FORE_SEGMENTS + 1)]),
         "aft_body": np.array([0.0, *np.linspace(frame.nozzle, -frame.aft_body, AFT_SEGMENTS + 1)]),

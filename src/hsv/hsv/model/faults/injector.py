@@ -84,7 +84,10 @@ class FaultInjector:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
-        """Return the injector that values of :attr:`PARAMETERS` describe; an ideal link does not need the vehicle's."""
+        """Return the injector that values of :attr:`PARAMETERS` describe.
+
+        Those of the vehicle and of its initial trim are used only if the link is not ideal.
+        """
         v = validate(FAULT_PARAMETERS, values)
         period, seed = v["period"], v[SEED_PARAMETER.name]
         link = command_link(values, period)

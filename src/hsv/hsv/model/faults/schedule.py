@@ -22,7 +22,7 @@ class ScheduledFault(NamedTuple):
 
 
 class ActiveFault(NamedTuple):
-    """A fault within its start and stop, where an intermittent one may pause, and its first step."""
+    """A fault between its start and stop, and its first step; an intermittent fault stays active while it pauses."""
 
     fault: Fault
     since: int

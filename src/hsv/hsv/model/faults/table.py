@@ -303,7 +303,7 @@ class Fault:
         """Check that the fault comes and goes no faster than the control ``period`` (s).
 
         Raises:
-            ParameterError: It is faster; the message names the parameter.
+            ParameterError: Its period is shorter than that; the message names the parameter.
         """
         cycle = self.parameters.get("intermittent_period", math.inf)
         if cycle < period:
@@ -331,7 +331,7 @@ class Fault:
 
 
 def read_fault(channel: str, kind: str, parameters: Sequence[str]) -> Fault:
-    """Return the fault whose ``parameters`` are texts ``name=quantity``; the only required one needs no name."""
+    """Return the fault whose ``parameters`` are texts ``name=quantity``; a single required one needs no name."""
     known = {parameter.name: parameter.of(channel) for parameter in fault_parameters(channel, kind)}
     due = [parameter.name for parameter in FAULT_KINDS[kind].parameters if parameter.default is None]
     given = {}

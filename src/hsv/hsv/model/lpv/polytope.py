@@ -89,8 +89,8 @@ def evaluate(weights: Struct, values: np.ndarray) -> np.ndarray:
 class Polytope:
     """A discrete-time polytopic model (paper eq. 12) scheduled by altitude (m) and velocity (m/s).
 
-    ``A`` (r, n, n) and ``B`` (r, n, m) are ordered by altitude, then velocity: vertex i * r_velocity + j has the weight
-    i of ``altitude`` and j of ``velocity``. The scheduling variables are clamped to the breakpoints.
+    ``A`` (r, n, n) and ``B`` (r, n, m) are ordered by altitude, then velocity: the weight of vertex i * r_velocity + j
+    is weight i of ``altitude`` times weight j of ``velocity``. The scheduling variables are clamped to the breakpoints.
     """
 
     A: np.ndarray

@@ -68,7 +68,7 @@ class PolytopicModel:
             return zero_order_hold(*self.exact(altitude, velocity), self.period)
 
         ranges = self.vehicle.altitude_range, self.vehicle.velocity_range
-        # Inside the intervals, off the samples.
+        # Midpoints of equal intervals, which are not samples.
         altitudes, velocities = (
             (low + (high - low) * (np.arange(_POINTS) + 0.5) / _POINTS).tolist() for low, high in ranges
         )

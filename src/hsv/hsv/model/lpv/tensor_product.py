@@ -129,7 +129,7 @@ def smallest_weight(breakpoints: np.ndarray, weights: np.ndarray) -> float:
 
 
 def relaxed(weights: np.ndarray, least: float) -> np.ndarray:
-    """Return the weights (s, r) after the simplex is enlarged about its centre until a weight of ``least`` is zero."""
+    """Return the weights (s, r) in a simplex enlarged about its centre until the smallest one, ``least``, is zero."""
     excess = max(0.0, -least)
     return np.asarray((weights + excess) / (1.0 + weights.shape[1] * excess))
 
