@@ -113,7 +113,7 @@ class _Episodes:
     """The current episodes of n environments, in groups of at most as many as the core has lanes."""
 
     def __init__(self, draws: _Draws, randoms: Sequence[np.random.Generator], *, recorded: bool = False) -> None:
-        """Begin an episode for each of the random generators, which draws it; keep the steps if ``recorded``."""
+        """Begin one episode per generator in ``randoms``, which is used to draw it; keep all steps if ``recorded``."""
         self._draws, self._randoms = draws, randoms
         self.recorded: list[History] | None = [] if recorded else None
         self._count = count = len(randoms)

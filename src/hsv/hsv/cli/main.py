@@ -76,9 +76,9 @@ def application(commands: Mapping[str, Command], *, prog: str = "hsv", listed: b
 
     Args:
         commands: Places of the commands by name. A command ``a-b`` is the function, or group of commands, ``a_b`` of
-            its module, with an underscore at the end if ``a_b`` is a name of Python's own.
+            its module, with an underscore at the end if ``a_b`` is a Python builtin.
         prog: Name of the command line.
-        listed: Whether only names and descriptions are needed, as for ``hsv --help``; to build options takes long.
+        listed: Whether only names and descriptions are needed, as for ``hsv --help``; building the options takes long.
     """
     app = typer.Typer(
         name=prog,

@@ -188,7 +188,7 @@ def new_table(*headings: str, title: str = "", right: Collection[str] = (), head
 
 
 def print_rows(rows: Sequence[Mapping[str, str | float | None]]) -> None:
-    """Print rows, which have their cells by heading: numbers with five digits, aligned on the right; None is ``-``.
+    """Print a table of ``rows``, each with its cells by heading; numbers have five digits, and None prints a dash.
 
     If the rows are wider than the terminal, the cell in the last column is printed below its row.
     """

@@ -53,7 +53,7 @@ class ResultStore(Store):
         return {batch for batch in batches if self._is_whole(batch)}
 
     def finish(self) -> None:
-        """Join the files of all batches to the result file and delete them, unless the result file exists."""
+        """Join the files of all batches into the result file and delete them, unless the result file exists."""
         if self.out.exists():
             return
         temporary = self.out.with_name(self.out.name + ".unfinished")
