@@ -71,7 +71,7 @@ def controller_names() -> list[str]:
 
 
 def names_code(controller: str) -> bool:
-    """Return whether ``controller`` is the place of a class, a library or an FMU: no registered name and no node."""
+    """Return whether ``controller`` is the place of a class, a library or an FMU, not a registered name or a node."""
     return library_place(controller) is not None or (":" in controller and not controller.startswith(NODE))
 
 
@@ -104,7 +104,9 @@ def controller_class(name: str) -> ControllerClass:
 
 
 def class_place(name: str) -> str:
-    """Return the place ``package.module:Class`` of the controller ``name`` without loading it, or a library's as given.
+    """Return the place of the class of the controller ``name``, ``package.module:Class``, without loading it.
+
+    The name of a controller in a library or an FMU is returned unchanged.
 
     Raises:
         ParameterError: There is no such controller.

@@ -183,7 +183,7 @@ def _effectiveness(certificate: Mapping[str, Any]) -> float:
 
 
 def commanded(design: ControlDesign) -> np.ndarray:
-    """Return the largest magnitude (2) of each certified input: plan plus feedback, or the limits without a plan."""
+    """Return the largest magnitude (2) of the inputs in the tube: plan plus feedback, or limits without plan bounds."""
     bounds = design.plan_bounds
     if bounds is None:
         return np.maximum(np.abs(design.input_minimum), np.abs(design.input_maximum))

@@ -1,25 +1,25 @@
-/* Notch filter, nominal trajectory and tube law of a design, blocks of hsv_block.h in C99: written by
- * "hsv export-controller", with the numbers of the design in design.h.
+/* Notch filter, nominal trajectory and tube law of a design as blocks of hsv_block.h in C99, written by
+ * "hsv export-controller". design.h contains the numbers of the design.
  *
- * Stepped once a period T, k = 0, 1, 2, ..., in this order:
+ * The blocks are stepped once per period T, k = 0, 1, 2, ..., in this order:
  *
  *   notch_filter        pitch rate -> q_f and s (eq. 38, eq. 39)
  *   nominal_trajectory  x, x_r, d_r -> x_n and u_n (eq. 11, eq. 20, eq. 32 to eq. 35)
- *   tube_law            x, q_f, x_r, u_r, x_n, u_n, and s where the plan is filtered -> u (eq. 36, eq. 48, eq. 54)
+ *   tube_law            x, q_f, x_r, u_r, x_n, u_n, and s if the plan is filtered -> u (eq. 36, eq. 48, eq. 54)
  *
- * The block "controller" steps the three in this order: x, x_r, d_r, u_r -> u before and after the limits, and the
- * outputs of the other two.
+ * The block "controller" steps all three: x, x_r, d_r, u_r -> u before and after the limits, and the outputs of the
+ * first two blocks.
  *
  * The equations are those of X. Yang, W. Lv, H. Mi, C. Hu, Y. Hu, "Tube-MPC Control via Notch Filter for Flexible
- * Air-Breathing Hypersonic Vehicle with Actuator Fault", 2022. They are in the headers, which are those of the bench.
- * x is the measured state; x_r and u_r are the reference of the step, and d_r is its defect: the state to which x_r(k)
- * and u_r(k) lead in a period, less x_r(k + 1), zero where the reference stands still. The caller of tube_law limits u
- * to U (eq. 29), tube_data.minimum to tube_data.maximum. Of core.h and real.h, which are those of the bench, only the
- * types hsv_notch, hsv_polytope, hsv_nominal and hsv_tube and the number type double are used here.
+ * Air-Breathing Hypersonic Vehicle with Actuator Fault", 2022. The headers, the same as in the bench, contain them. x
+ * is the measured state; x_r and u_r are the reference of the step. d_r is its defect: the state to which x_r(k) and
+ * u_r(k) lead in a period, minus x_r(k + 1). It is zero while the reference is constant. The caller of tube_law limits
+ * u to U (eq. 29), tube_data.minimum to tube_data.maximum. Of core.h and real.h only the types hsv_notch, hsv_polytope,
+ * hsv_nominal and hsv_tube and the number type double are used here.
  *
  *   cc -std=c99 -O3 -ffp-contract=off -shared -fPIC -o controller.so controller.c
  *
- * No library function is called and no memory allocated; a step takes less than 4 KiB of stack. Every compiler gives
+ * No library function is called and no memory is allocated; a step needs less than 4 KiB of stack. Every compiler gives
  * the same bits as long as it does not contract a product and a sum into one operation.
  */
 #include "design.h"
@@ -79,8 +79,8 @@ static const hsv_signal nominal_inputs[] = {
 static const hsv_signal nominal_outputs[] = {
     {"deviation", HSV_STATE_UNITS, HSV_STATES},
     {"nominal_input", HSV_INPUT_UNITS, HSV_INPUTS},
-    {"gain_index", "1", 1},      /* of the nested family, 0 the outermost */
-    {"nominal_status", "1", 1}}; /* OUTSIDE_FAMILY for x_n plus OUTSIDE_ENVELOPE for altitude and velocity */
+    {"gain_index", "1", 1},      /* index of the gain in the nested family, 0 for the outermost */
+    {"nominal_status", "1", 1}}; /* sum of OUTSIDE_FAMILY (of x_n) and OUTSIDE_ENVELOPE (of altitude and velocity) */
 
 const hsv_block nominal_trajectory = {
     .abi_version = HSV_BLOCK_ABI_VERSION, .name = "nominal_trajectory", .source = "design.h",
@@ -88,7 +88,7 @@ const hsv_block nominal_trajectory = {
     .input_count = HSV_COUNT(nominal_inputs), .inputs = nominal_inputs,
     .output_count = HSV_COUNT(nominal_outputs), .outputs = nominal_outputs};
 
-/* Tube law; its state: the integrals, then s of the filter of the plan */
+/* Tube law; its state consists of the integrals, then the states of the plan's notch filter */
 
 static int32_t step_tube_law(int64_t k, const double *in, double *out, double *state, const double *par)
 {
@@ -134,7 +134,7 @@ const hsv_block tube_law = {
     .output_count = HSV_COUNT(tube_outputs), .outputs = tube_outputs,
     .parameter_count = HSV_COUNT(tube_parameters), .parameters = tube_parameters};
 
-/* Controller: the three blocks, and the limits of u; its state and parameters are theirs */
+/* Controller: the three blocks with their states and parameters, and the limits of u */
 
 static int32_t step_controller(int64_t k, const double *in, double *out, double *state, const double *par)
 {

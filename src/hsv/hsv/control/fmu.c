@@ -1,12 +1,12 @@
 /* A block of hsv_block.h as an FMU for co-simulation, FMI 3.0. fmu_block.h, which is written at the export, includes
- * the source of the block and has its sizes.
+ * the source of the block and defines its sizes.
  *
- * Value references count the inputs, the parameters and the outputs of the block in its order; the last one is time.
- * fmi3DoStep reads the inputs, steps the block, once for each control period, and gives the outputs. A block with
- * FMU_STEP_AT_START is stepped once more, when its initialisation begins, and gives the outputs of the start.
+ * Value references count the inputs, the parameters and the outputs of the block in this order; the last one is time.
+ * fmi3DoStep steps the block once for each control period with the present inputs, and sets the outputs. A block with
+ * FMU_STEP_AT_START is also stepped when its initialisation begins, which sets the outputs at the start.
  *
- * There is no heap: instances and saved states have their place in arrays. A saved state has no pointers, so that
- * its bytes can be restored in another process. */
+ * No heap is used: instances and saved states lie in static arrays. A saved state contains no pointers, so that its
+ * bytes can be restored in another process. */
 #include "fmu_block.h"
 
 #include "fmi3Functions.h"
@@ -16,7 +16,7 @@ enum { FMU_INSTANCES = 16, FMU_SAVED = 64, FMU_GIVEN = FMU_INPUTS + FMU_PARAMETE
 
 typedef struct {
     double start, values[FMU_TIME], state[FMU_STATE];
-    int64_t k, begun; /* next step; whether the instance is initialised */
+    int64_t k, begun; /* number of the next step; whether the instance is initialised */
 } FmuMemory;
 
 typedef struct {
@@ -24,11 +24,11 @@ typedef struct {
     fmi3InstanceEnvironment environment;
     fmi3LogMessageCallback log;
     int used;
-} FmuInstance; /* or a saved state, which has a memory only */
+} FmuInstance; /* also a saved state, which uses only "memory" */
 
 static FmuInstance instances[FMU_INSTANCES], saved_states[FMU_SAVED];
 
-/* Return whether a place was free, which is taken now; threads may ask at the same time. */
+/* Return whether the array element was free, and mark it as used; several threads may call this at the same time. */
 static int take(int *used) { return !__atomic_exchange_n(used, 1, __ATOMIC_ACQ_REL); }
 
 static fmi3Status fail(const FmuInstance *instance, const char *message)
@@ -191,7 +191,7 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte bytes[]
     return found;
 }
 
-/* Three further functions do nothing and succeed; all others return an error or no instance. */
+/* The following three functions do nothing and succeed; all remaining ones return an error or no instance. */
 static fmi3Status done(void) { return fmi3OK; }
 static fmi3Status not_supported(fmi3Instance instance) { return fail(instance, "function: not supported by this FMU"); }
 static fmi3Instance no_instance(void) { return NULL; }

@@ -107,7 +107,7 @@ class Governor:
     def __init__(
         self, nominal: Struct, rigid: VehicleParameters, period: float, bounds: PlanBounds, rate: np.ndarray
     ) -> None:
-        """Plan with a ``period`` (s), within the ``bounds`` of a design and the rate limits ``rate`` (2, per s)."""
+        """Plan with the control ``period`` (s), the ``bounds`` of a design and rate limits ``rate`` (2, per s)."""
         self._nominal, self._rigid, self._period, self._rate = nominal, rigid, period, rate
         free = KEPT_FREE * (bounds.input_maximum - bounds.input_minimum)
         self._low, self._high = bounds.input_minimum + free, bounds.input_maximum - free
@@ -180,7 +180,7 @@ class Governor:
         return half
 
     def _corner(self, corners: Sequence[Corner], leg: Leg, half: int, name: str, beginning: Beginning) -> Corner:
-        """Return the earliest corner that ends ``leg``, after ``corners``, with a plan that fits; ``half`` in steps."""
+        """Return the earliest corner at the end of ``leg`` with a fitting plan; ``half`` is its half-width in steps."""
         begin = self._steps(corners[-1].time)
 
         def end(length: int) -> Corner:

@@ -59,7 +59,7 @@ class NominalProblem:
 
 
 def step_deviation(vehicle: VehicleParameters, start: tuple[float, float], target: tuple[float, float]) -> np.ndarray:
-    """Return x_n(0) (5), SI, of a step: trim at ``start`` minus trim at ``target``, both altitude and velocity, SI."""
+    """Return x_n(0) (5) of a step, SI: trim at ``start`` minus trim at ``target``, each altitude and velocity."""
     return np.asarray((trim(vehicle, *start).state - trim(vehicle, *target).state)[:N_RIGID])
 
 

@@ -220,7 +220,7 @@ class Unknown:
 
 
 Inequalities = Callable[..., Sequence[np.ndarray]]
-"""Function of the unknown matrices that returns symmetric matrices, affine in them and to be positive semidefinite."""
+"""Function of the unknown matrices that returns symmetric matrices, affine in them, to be positive semidefinite."""
 
 Cost = Callable[..., float]
 """Function of the unknown matrices that returns the cost, which is linear in them."""
@@ -228,9 +228,9 @@ Cost = Callable[..., float]
 
 @dataclass(frozen=True)
 class _Inequality:
-    """Linear matrix inequality G(x) = constant (k, k) + sum_j x[acting[j]] slopes[j] >= 0; j indexes a unknowns.
+    """Linear matrix inequality G(x) = constant + sum_j x[acting[j]] slopes[j] >= 0.
 
-    ``acting`` (a) are their positions in x, and ``slopes`` has the shape (a, k, k).
+    ``constant`` (k, k); ``acting`` (a) are indices in x, and ``slopes`` (a, k, k) the matrices that belong to them.
     """
 
     constant: np.ndarray

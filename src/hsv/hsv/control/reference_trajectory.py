@@ -251,14 +251,14 @@ def _blend(
 
 
 def _in_steps(times: np.ndarray, period: float) -> np.ndarray:
-    """Return ``times`` (s) in steps, not rounded except for values that only rounding keeps from an integer."""
+    """Return ``times`` (s) in steps; a value that differs from an integer only by rounding becomes that integer."""
     steps = times / period
     nearest = np.round(steps)
     return np.where(np.abs(steps - nearest) < 1e-9 * np.maximum(1.0, nearest), nearest, steps)
 
 
 def _evaluate(instants: np.ndarray, commands: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return altitude and velocity (r, 2) at the integer ``steps`` (r), and their change per step (r, 2) from there.
+    """Return altitude and velocity (r, 2) at the integer ``steps`` (r), and their slope per step (r, 2) after each.
 
     The corners have the times ``instants`` (b), in steps, and the altitudes and velocities ``commands`` (b, 2).
     """

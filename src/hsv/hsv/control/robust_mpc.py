@@ -51,7 +51,7 @@ class RobustMpc(Controller):
         """Do nothing: this law has no state."""
 
     def step(self, inputs: ControllerInput) -> TubeResult:
-        """Return the input of this step, with an error that is the deviation from the reference, and without a set."""
+        """Return the result of this step; its error is x - x_r of the rigid states, and it has no invariant set."""
         feedback, total, u, _ = tube_step(self.kernel, self._memory, inputs, monitored=False)
         finite = math.isfinite(total[0]) and math.isfinite(total[1])
         return TubeResult(

@@ -846,8 +846,8 @@ def preflight(design: ControlDesign, certificate: str = "") -> str:
     A modified design may fly as long as the conditions for its safety hold. The gains are stable at every vertex; F has
     a common Lyapunov function (eq. 24), and so has every K (eq. 34). The invariant set monitored in flight is the
     certified one, it contains e = 0, and it is invariant at every vertex under the feedback in flight. Actuators, range
-    of tau, ``nominal.filtered`` and ``nominal.interpolated`` are as certified. If one of these fails, the design is
-    refused. Any other difference from the certificate is a warning, and so is a missing certificate.
+    of tau, ``nominal.filtered`` and ``nominal.interpolated`` are as certified. If one of these or any other required
+    check fails, the design is refused. Other differences from the certificate, or a missing one, are a warning.
 
     Args:
         design: The design to check.

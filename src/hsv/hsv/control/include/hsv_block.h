@@ -1,7 +1,7 @@
-/* A block of the HSV bench in C: what a shared library exports so that its function is stepped in the loop.
+/* A block of the HSV bench in C, such as a controller: a shared library exports it, and the loop steps its function.
  *
- * A block is a constant of the type hsv_block under a symbol of its own. It says what goes in, what comes out, what it
- * keeps from step to step and which numbers it can be given; its function "step" is called once a control period:
+ * A block is an exported constant of the type hsv_block. It declares inputs, outputs, the size of the state that it
+ * keeps from step to step, and parameters. Its function "step" is called once per control period:
  *
  *     #include "hsv_block.h"
  *
@@ -25,51 +25,52 @@
  *
  *     cc -std=c99 -O2 -ffp-contract=off -shared -fPIC -I"$(hsv include)" -o trimmed.so trimmed.c
  *
- * A scenario flies it as its controller with controller = "trimmed.so:trimmed", the path from the scenario's folder;
- * its table [trimmed] then has the key "share".
+ * A scenario uses it with controller = "trimmed.so:trimmed", where the path is relative to the folder of the scenario;
+ * the table [trimmed] of the scenario then has the key "share".
  *
- * Plain C99. SI units and radians. "-ffp-contract=off" keeps a flight's bits the same on every processor.
+ * The language is C99; units are SI, with angles in radians. With "-ffp-contract=off" a flight has the same bits on
+ * every processor.
  */
 #ifndef HSV_BLOCK_H
 #define HSV_BLOCK_H
 
 #include <stdint.h>
 
-/* Changes whenever a library built before would be misread. */
+/* Version of these structs; it changes if libraries built with an older header would be misread. */
 #define HSV_BLOCK_ABI_VERSION 1
 
 #define HSV_COUNT(array) ((int64_t)(sizeof(array) / sizeof((array)[0])))
 
-/* A signal: so many numbers, one after the other. */
+/* A signal: "size" consecutive numbers. */
 typedef struct {
     const char *name; /* letters, digits and underscores */
-    const char *unit; /* "1" where there is none; several, separated by ", ", are repeated number by number */
+    const char *unit; /* "1" if dimensionless; several units, separated by ", ", apply to the numbers in turn */
     int64_t size;
 } hsv_signal;
 
-/* Numbers that a scenario may give, in the table of the block's name. */
+/* A parameter: numbers that a scenario may set, in the table with the name of the block. */
 typedef struct {
     const char *name;        /* the key: letters, digits and underscores */
-    const char *unit;        /* SI, "1" where there is none; a scenario may write another one of its kind */
-    const char *description; /* in a few words */
+    const char *unit;        /* SI unit, "1" if dimensionless; a scenario may use another unit of the same kind */
+    const char *description; /* a few words */
     int64_t size;
-    const double *value; /* (size) where a scenario gives none */
-    double minimum;      /* least and largest admissible number; both 0: any */
+    const double *value; /* (size) default values */
+    double minimum;      /* smallest and largest admissible number; both 0: no limits */
     double maximum;
 } hsv_parameter;
 
 /* Compute step k = 0, 1, 2, ... of a run. Return 0; any other value ends the flight.
  *
- * in: the input signals, one after the other. out: the output signals; write all of them. state: the memory from step
- * to step, zero at k = 0. par: the parameters, one after the other. The four do not overlap; do not write in and par.
- * Keep no other memory (static variables, heap, random numbers): flights would no longer repeat.
+ * in: the input signals, one after the other. out: the output signals; write all of them. state: kept from step to
+ * step, zero at k = 0. par: the parameters, one after the other. The four arrays do not overlap; do not write to "in"
+ * and "par". Keep no other state (static variables, heap, random numbers): flights would not be reproducible.
  */
 typedef int32_t (*hsv_step)(int64_t k, const double *in, double *out, double *state, const double *par);
 
 typedef struct {
     int64_t abi_version; /* HSV_BLOCK_ABI_VERSION */
-    const char *name;    /* letters, digits and underscores: names the block in messages, and its table in scenarios */
-    const char *source;  /* path of its source from the library's folder, kept with recorded flights; NULL: none */
+    const char *name;    /* name in messages and of the table in scenarios: letters, digits and underscores */
+    const char *source;  /* path of the source relative to the library, to be stored with recorded flights, or NULL */
     hsv_step step;
     int64_t state_size;
     int64_t input_count;
@@ -80,7 +81,7 @@ typedef struct {
     const hsv_parameter *parameters;
 } hsv_block;
 
-/* The order of a state of the vehicle, of its reference and of a deviation from it. */
+/* Order of the entries of a vehicle state, of its reference and of a deviation from the reference. */
 enum {
     HSV_ALTITUDE,
     HSV_VELOCITY,
@@ -95,11 +96,11 @@ enum {
 };
 #define HSV_STATE_UNITS "m, m/s, rad, rad, rad/s, kg^0.5 m, kg^0.5 m/s, kg^0.5 m, kg^0.5 m/s"
 
-/* The order of an input of the vehicle. */
+/* Order of the entries of a vehicle input. */
 enum { HSV_FUEL_EQUIVALENCE_RATIO, HSV_ELEVATOR_DEFLECTION, HSV_INPUTS };
 #define HSV_INPUT_UNITS "1, rad"
 
-/* Where a controller finds what it is given. */
+/* Positions of the signals in the input "in" of a controller. */
 enum {
     HSV_ESTIMATE = 0,                                        /* x, measured or estimated, pitch rate not filtered */
     HSV_FILTERED_PITCH_RATE = HSV_ESTIMATE + HSV_STATES,     /* q_f */
@@ -110,9 +111,9 @@ enum {
     HSV_FILTER_STATE = HSV_NOMINAL_INPUT + HSV_INPUTS        /* s before this step's update, two a section */
 };
 
-/* The inputs and outputs of a controller. It may leave out inputs at the end; HSV_FILTER_STATE_INPUT follows where it
- * reads the notch filter's state, with as many numbers as the filter has that it flies with. The output is the
- * unsaturated input of the vehicle, which the bench clips to its limits. */
+/* The inputs and outputs of a controller. It may omit inputs at the end. If it reads the state of the notch filter,
+ * HSV_FILTER_STATE_INPUT follows; its size must be that of the filter in flight. The output is the unsaturated input of
+ * the vehicle, which the bench clips to its limits. */
 #define HSV_CONTROLLER_INPUTS \
     {"estimate", HSV_STATE_UNITS, HSV_STATES}, \
     {"filtered_pitch_rate", "rad/s", 1}, \
