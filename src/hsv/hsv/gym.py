@@ -241,7 +241,10 @@ class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._episodes.observation[0], self._info
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, Info]:
-        """Simulate a control period with a finite ``action`` (2); return the values that Gymnasium prescribes."""
+        """Simulate a control period with a finite ``action`` (2).
+
+        Return the observation (18), the reward, whether the episode terminates, whether it is truncated, and ``info``.
+        """
         [reward], [terminated], [truncated] = self._episodes.step(np.asarray(action, float)[None])
         return self._episodes.observation[0], float(reward), bool(terminated), bool(truncated), self._info
 
@@ -287,8 +290,7 @@ class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     ) -> tuple[np.ndarray, Info]:
         """Begin all episodes, with one ``seed`` or with one per environment; ``options`` are not used.
 
-        Returns:
-            First observations (n, 18), and ``info`` with arrays over the environments.
+        Return the first observations (n, 18), and ``info`` with arrays over the environments.
         """
         rows = range(self.num_envs)
         seeds = [int(seed) + i for i in rows] if isinstance(seed, int | np.integer) else seed or [None for _ in rows]
@@ -299,8 +301,7 @@ class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, Info]:
         """Simulate a control period with finite ``actions`` (n, 2); an episode that is over begins anew instead.
 
-        Returns:
-            Observations (n, 18), rewards (n), masks (n) of terminated and of truncated episodes, and ``info``.
+        Return observations (n, 18), rewards (n), masks (n) of terminated and of truncated episodes, and ``info``.
         """
         found = self._episodes.step(np.asarray(actions, float))
         return self._episodes.observation, *found, self._infos

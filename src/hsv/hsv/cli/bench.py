@@ -76,12 +76,12 @@ class Figure:
 
     @property
     def ratio(self) -> float:
-        """Median of the ratios of the pairs."""
+        """Median of the ratios of ``ours`` to ``theirs``."""
         return float(np.median(np.divide(self.ours, self.theirs)))
 
     @property
     def spread(self) -> tuple[float, float]:
-        """10th and 90th percentile of the ratios of the pairs."""
+        """10th and 90th percentile of the ratios of ``ours`` to ``theirs``."""
         low, high = np.percentile(np.divide(self.ours, self.theirs), (10.0, 90.0))
         return float(low), float(high)
 
@@ -238,10 +238,7 @@ def against_imports(repeats: int) -> list[Figure]:
 
 
 def corners(repeats: int, workers: int) -> list[Figure]:
-    """Measure the wall time of a campaign of all 1024 corners of Case 1 against as many flights of the C loop alone.
-
-    Both use the same number of worker processes.
-    """
+    """Measure the wall time of the 1024 corners of Case 1 against as many flights of the C loop, on as many workers."""
     campaign = plan("case1", method="corners")
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder, make_executor(workers) as flying:
 
@@ -301,10 +298,7 @@ def graph_lap(duration: float) -> float:
 
 
 def ring_lap(laps: int) -> float:
-    """Pass the graph's messages ``laps`` times around a ring of bare processes with the same recorder.
-
-    Returns:
-        Mean wall time (s) of one round.
+    """Pass the graph's messages ``laps`` times around a ring of bare processes, recorded; return the mean time (s).
 
     Raises:
         RunError: A process ended before its time, or the workspace is not built.

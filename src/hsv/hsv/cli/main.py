@@ -129,7 +129,7 @@ def options(
         bool, Option("--traceback", envvar="HSV_TRACEBACK", help="Print the traceback of errors, too.")
     ] = False,
 ) -> None:
-    """Declare the options of the command line itself; its description is given to :func:`run`."""
+    """Declare the options that precede a command; :func:`run` gets the description of the command line."""
 
 
 def run(prog: str, commands: Mapping[str, Command], description: str, moved: Mapping[str, str] | None = None) -> None:
@@ -192,7 +192,7 @@ def run(prog: str, commands: Mapping[str, Command], description: str, moved: Map
 
 
 def _usage(error: Any, prog: str) -> str:
-    """Return typer's error on one line; a wrong value and a missing choice are reported in the form of all errors."""
+    """Return typer's error as one line; wrong values and missing choices are worded as in the library's own errors."""
     message = " ".join(error.format_message().split())
     if parameter := getattr(error, "param", None):
         name = max(parameter.opts, key=len).lstrip("-")

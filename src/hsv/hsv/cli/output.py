@@ -133,7 +133,7 @@ def report_line(source: str, text: object, style: str = "dim") -> None:
 
 
 def print_written(paths: Sequence[Path], as_json: bool, **others: Any) -> None:
-    """Print the names of written files; as JSON with their sizes, and with ``others``."""
+    """Print the paths of written files; ``as_json`` prints JSON with their sizes and with ``others``."""
     if as_json:
         print_json({"written": [{"path": str(path), "size_bytes": path.stat().st_size} for path in paths], **others})
     else:
@@ -210,10 +210,7 @@ def print_rows(rows: Sequence[Mapping[str, str | float | None]]) -> None:
 def print_matrix(
     title: str, rows: Sequence[str], columns: Sequence[str], cells: Sequence[Sequence[RenderableType]]
 ) -> None:
-    """Print a matrix of ``cells`` (rows, columns), in blocks of as many columns as fit into the terminal.
-
-    The names of columns are broken at underscores.
-    """
+    """Print a matrix of ``cells`` (rows, columns), as many columns side by side as fit; names break at underscores."""
     count = max(1, (console.width - max(map(len, rows))) // _COLUMN)
     for first in range(0, len(columns), count):
         headings = [column.replace("_", "\n") for column in columns[first : first + count]]

@@ -36,7 +36,7 @@ _BATCHES = 256
 """Number of batches into which a campaign is divided, as far as :data:`_BATCH_LIMITS` permit"""
 
 _BATCH_LIMITS = (32, 256)
-"""Minimum and maximum number of flights in a batch; all sizes used are multiples of the minimum, to fill all lanes"""
+"""Minimum and maximum number of flights in a batch; sizes are multiples of the minimum, which fills the core's lanes"""
 
 _SEEDS = int(SEED_PARAMETER.maximum) + 1
 
@@ -227,14 +227,12 @@ def plan(
 ) -> Campaign:
     """Return the campaign that varies a vehicle's uncertain parameters, a scenario's distributions and ``factors``.
 
-    The bounds of the paper's vehicle are those of section 5.1.
-
     Args:
         scenario_name: Name of a shipped scenario, or path of a TOML file.
         method: One of :data:`METHODS`; ``"corners"`` flies all combinations of the factors' least and largest values.
         samples: Number of flights; ignored for corners.
         seed: Seed from which all samples are drawn.
-        scale: Factor on the bounds of the uncertain parameters; with 0 they do not vary.
+        scale: Factor on the bounds of the uncertain parameters (section 5.1 of the paper); with 0 they do not vary.
         commit: Git commit of the program.
         factors: Least and largest value of further fields, by field, written as in a scenario file.
 

@@ -66,9 +66,7 @@ class Executor:
     def fly(
         self, job: Job, text: str, batches: Iterable[int], label: Callable[[int], str] = "batch {}".format
     ) -> Iterator[tuple[int, bytes]]:
-        """Fly batches of the campaign ``text``; yield the number and the result of each, in any order.
-
-        ``label`` returns the name of a batch for messages.
+        """Fly batches; yield the number and the result of each, in any order. ``label`` names a batch in messages.
 
         Raises:
             RunError: A batch crashes the process that flies it, or the connection to the scheduler is lost.
@@ -308,11 +306,7 @@ def make_executor(workers: int, scheduler: str = "", notice: Notice = lambda wor
 
 @contextmanager
 def _connected(address: str, notice: Notice) -> Iterator[Any]:
-    """Yield a client of the scheduler at ``address`` as soon as the scheduler has at least one worker.
-
-    Raises:
-        CampaignError: The address is malformed, no Dask scheduler answers, or no worker comes in time.
-    """
+    """Yield a client of the scheduler at ``address``, which has at least one worker; a ``CampaignError`` otherwise."""
     from distributed import Client
     from distributed.comm import get_address_host_port
 

@@ -114,8 +114,6 @@ def run_campaign(
 def locked(path: Path, complaint: str) -> Iterator[None]:
     """Hold an exclusive lock on the file ``path``, which is created for this purpose and removed afterwards.
 
-    A file left by a process that was killed is not locked.
-
     Raises:
         CampaignError: Another process holds the lock, with the message ``complaint``, or the file cannot be created.
     """

@@ -34,10 +34,7 @@ TUBE_LIMIT = 1.0
 
 @dataclass(frozen=True)
 class Share:
-    """Number of flights within a limit, with the 95 % confidence interval of their share.
-
-    The limit is in SI units. It is None for the statement that a flight reaches its end.
-    """
+    """Number of flights within a limit (SI; None for reaching the end), and its 95 % confidence interval as a share."""
 
     name: str
     limit: float | None

@@ -33,8 +33,7 @@ class FlightVariants:
     def __init__(self, scenario: Scenario, design: Mapping[str, Any], library: str | None = None) -> None:
         """Assemble the flight of a scenario with the parameters of a design, by name.
 
-        ``library`` is the expected SHA-256 of the controller's shared library, empty for a controller without library.
-        None skips this check.
+        ``library`` is the expected SHA-256 of the controller's shared library, empty without one; None skips the check.
         """
         if library is not None and library_digest(scenario.controller) != library:
             raise CampaignError(

@@ -43,13 +43,13 @@ class FlownFault:
     survived: bool
     """Whether the flight reached its end within the range of the model"""
     attitude: float | None
-    """Largest deviation of angle of attack or pitch angle after the start of the fault, rad; None after a crash"""
+    """Largest deviation of angle of attack or pitch angle after the fault, rad; None if the controller crashed"""
     altitude: float | None
-    """Largest deviation of altitude after the start of the fault, m; None after a crash"""
+    """Largest deviation of altitude after the fault, m; None if the controller crashed"""
     recovery_time: float | None
     """Time from the start of the fault until the deviations stay within the bands, s; None if they do not"""
     time_to_loss: float | None
-    """Time from the start of the fault to the loss of the flight, s; None if it was not lost, or after a crash"""
+    """Time from the start of the fault to the loss of the flight, s; None if not lost or the controller crashed"""
     crashed: str | None
     """Error of the controller if it crashed, otherwise None"""
 
@@ -76,7 +76,7 @@ class SubjectRunner:
         self._without: dict[int, Flight] = {}
 
     def fly(self, vehicle: int, fault: TriedFault | None = None, value: float = 0.0) -> Flight:
-        """Fly the vehicle with this index, with a fault whose severity parameter has a ``value``, or without fault."""
+        """Fly the vehicle with this index, without fault or with a ``fault`` whose severity parameter is ``value``."""
         text = self._subject.file(self._moment, vehicle, fault, value)
         return fly(self._variants.components(parse_scenario(text, self._subject.name)))
 

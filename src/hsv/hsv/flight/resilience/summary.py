@@ -163,7 +163,7 @@ class ResilienceResults:
 
 
 def boundaries_in_words(fault: TriedFault, boundaries: Mapping[Moment, Boundary]) -> list[str]:
-    """Return for each time a text on the severities that the nominal vehicle survives; equal texts are given once."""
+    """Return texts on the severities that the nominal vehicle survives, one per :class:`Moment`, equal texts once."""
 
     def in_words(boundary: Boundary) -> str:
         if boundary.survived is None:
