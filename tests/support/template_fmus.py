@@ -8,9 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
-import pytest
 from fmpy import read_model_description
+from fmpy.container_fmu.cli import create_container_fmu
+from fmpy.container_fmu.config import Component, Configuration
 from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
+from fmpy.template import create_fmu
 
 Edit = Callable[[str], str]
 
@@ -38,8 +40,7 @@ def template_fmu(
         made.modelVariables.append(variable)
         if causality == "output":
             made.outputs.append(Unknown(variable=variable))
-    # FMPy has templates and containers only in versions that need numpy 2, which an installed Jazzy does not have.
-    pytest.importorskip("fmpy.template").create_fmu(made, path)
+    create_fmu(made, path)
     with zipfile.ZipFile(path) as archive:
         xml, source = (archive.read(name).decode() for name in ("modelDescription.xml", "sources/model.c"))
     code, library = path.with_suffix(".c"), path.with_suffix(".so")
@@ -55,8 +56,7 @@ def template_fmu(
 def container_fmu(path: Path, inner: Path) -> None:
     """Write an FMI 2.0 FMU that contains ``inner``, with the same inputs and outputs; its binary is FMPy's own."""
     described = read_model_description(str(inner))
-    config = pytest.importorskip("fmpy.container_fmu.config")
-    component = config.Component(inner.stem, inner, described)
+    component = Component(inner.stem, inner, described)
     made = ModelDescription()
     made.fmiVersion, made.modelName, made.instantiationToken, made.guid = "2.0", "container", "container", "container"
     made.coSimulation = CoSimulation(modelIdentifier="container_fmu")
@@ -80,5 +80,4 @@ def container_fmu(path: Path, inner: Path) -> None:
             made.outputs.append(Unknown(variable=outside))
     folder = path.with_suffix("")
     folder.mkdir()
-    configuration = config.Configuration(False, made, [component], [], mappings)
-    pytest.importorskip("fmpy.container_fmu.cli").create_container_fmu(configuration, folder, path)
+    create_container_fmu(Configuration(False, made, [component], [], mappings), folder, path)
