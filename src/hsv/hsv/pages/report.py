@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,15 @@ from markupsafe import Markup, escape
 
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.bags.reader import Bag
-from hsv.base.errors import RecordingError
+from hsv.base.errors import DesignError, RecordingError
 from hsv.base.units import UnitSystem
+from hsv.control.design import find_design, read_parameters
 from hsv.flight.flight import step_times_in_words
 from hsv.flight.limits import criteria_not_judged, limits_kept, verdict_sentence
 from hsv.flight.metrics import CRITERIA, METRICS, Group, Metric, in_words
 from hsv.flight.scenario import scenario_names
 from hsv.graph.node_parameters import NODE_PARAMETERS
+from hsv.model.vehicle import SHIPPED_VEHICLES, named_parameters
 from hsv.pages.engine import Numbers, Plot, render, write_page
 from hsv.pages.events import Event
 from hsv.pages.flights import DrawnCurve, ReportedRun, reported_runs
@@ -206,12 +209,28 @@ def _grouped(runs: Sequence[ReportedRun]) -> dict[Group, dict[str, Metric]]:
 
 
 def _parameters(part: str, runs: Sequence[ReportedRun]) -> Iterator[tuple[str, str, list[Markup]]]:
-    """Yield name, description and values of each parameter; equal values of all runs are given once."""
-    for name in dict.fromkeys(name for run in runs for name in run.parameters[part]):
-        values = [run.parameters[part].get(name) for run in runs]
-        if all(value == values[0] for value in values):
-            values = values[:1]
-        yield name, DECLARED[name].description if name in DECLARED else "", [_value(name, value) for value in values]
+    """Yield name, description and the value in each run of every parameter that differs between the runs.
+
+    For a single run, these are the parameters that differ from their defaults.
+    """
+    tables = [run.parameters[part] for run in runs]
+    defaults = _defaults(tables[0]) if len(runs) == 1 else tables[0]
+    for name in dict.fromkeys(name for table in tables for name in table):
+        values = [table.get(name) for table in tables]
+        if any(value != defaults.get(name) for value in values):
+            yield name, DECLARED[name].description if name in DECLARED else "", [_value(name, v) for v in values]
+
+
+def _defaults(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the default of each parameter: declared, or that of the shipped vehicle or design named in ``values``."""
+    defaults: dict[str, Any] = {name: parameter.default for name, parameter in DECLARED.items()}
+    if values.get("vehicle.name") in SHIPPED_VEHICLES:
+        defaults |= named_parameters(values)
+    design = str(values.get("design.name", ""))
+    if not Path(design).suffix and "/" not in design:  # a path from a bag is not opened
+        with suppress(DesignError):
+            defaults |= read_parameters(find_design(design))
+    return defaults
 
 
 def _value(name: str, value: Any) -> Markup:
