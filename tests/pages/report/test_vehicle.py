@@ -144,6 +144,12 @@ def test_keys_move_the_time_and_play(opened):
     assert not opened.run("return own.playing")
 
 
+def test_the_side_view_of_a_single_run_uses_the_full_width(opened, screen):
+    screen(1440)
+    width = "return document.querySelector(arguments[0]).getBoundingClientRect().width"
+    assert opened.run(width, "#vehicle .side-view svg") > 0.75 * opened.run(width, "#vehicle")
+
+
 def test_on_paper_the_picture_stays_and_the_controls_go(opened):
     shown(opened, 9.0)
     opened.media(media="print")
