@@ -34,13 +34,13 @@ from hsv.pages.picture import Picture, picture
 from hsv.pages.text import capitalised, quantity, units_of
 
 POINTS = 2000
-"""Maximum number of flights in a scatter plot; of more flights it shows every n-th."""
+"""Maximum number of flights in a scatter plot; with more flights, every n-th is shown."""
 
 BINS = 60
 """Maximum number of bars of a histogram."""
 
 RUN = "run"
-"""Group of the outcomes that are not metrics: end time, and largest level in the tube."""
+"""Group of the outcomes that are not metrics: end time and largest tube level."""
 
 PICTURED = ("altitude_error", "velocity_error", "angle_of_attack", "elevator_deflection")
 """Signals of the picture of all flights."""
@@ -66,7 +66,7 @@ def write_campaign_page(results: Results, out: Path, units: UnitSystem = UnitSys
 
 
 def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> str:
-    """Return the HTML page of a campaign."""
+    """Return the HTML page of a campaign; ``units`` are its initial units."""
     worst, shown, judged = worst_flights(results), distributions(results), shares(results)
     flights = _repeated(results, worst[0].flight)
     differing = [d for d in shown if d.minimum < d.maximum]
@@ -143,7 +143,7 @@ def most_failed(judged: Sequence[Share]) -> Share | None:
 
 
 def _sorted(results: Results, failed: Share, numbers: Numbers) -> Picture:
-    """Return the picture of the metric that fails most: the sorted magnitudes of all flights, and the limit."""
+    """Return the picture of the most often exceeded limit: the limit, and the sorted magnitudes of all flights."""
     values = np.sort(np.abs(results.column(failed.name)))  # flights that do not define the metric come last, as NaN
     across = 100.0 * (np.arange(len(values)) + 0.5) / len(values)
     limit = "bound", None, np.array([0.0, 100.0]), np.full(2, failed.limit)
@@ -155,7 +155,7 @@ def _sorted(results: Results, failed: Share, numbers: Numbers) -> Picture:
 
 
 def _grouped(shown: Sequence[Distribution]) -> dict[str, list[Distribution]]:
-    """Return the distributions by group: the groups of metrics, then the run."""
+    """Return the distributions by group: the groups of metrics, then :data:`RUN`."""
     groups: dict[str, list[Distribution]] = {group: [] for group in (*Group, RUN)}
     for distribution in shown:
         groups[METRICS[distribution.name].group if distribution.name in METRICS else RUN].append(distribution)
@@ -186,7 +186,7 @@ def histogram(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     distinct = np.unique(values.round(9))
     bins: int | np.ndarray = min(BINS, max(10, 2 * round(np.sqrt(len(values)))))
     if 1 < len(distinct) <= BINS:
-        # Times are multiples of the control period, and counts are integers: each value has its own bar.
+        # Times (multiples of the control period) and counts (integers) have one bar per value.
         spacing = float(np.min(np.diff(distinct)))
         bars = round((distinct[-1] - distinct[0]) / spacing) + 1
         bins = distinct[0] + spacing * (np.arange(bars + 1) - 0.5) if bars <= BINS else bins
@@ -195,7 +195,7 @@ def histogram(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _repeated(results: Results, worst: int) -> dict[str, Flight]:
-    """Repeat the flight of the unchanged scenario and the worst flight; return them by name; empty if not flyable."""
+    """Repeat the flight of the unchanged scenario and flight ``worst``; return those that can be flown, by name."""
     flights = {}
     if results.flyable:
         runner = results.sample_runner
@@ -207,7 +207,7 @@ def _repeated(results: Results, worst: int) -> dict[str, Flight]:
 
 
 def _windows(results: Results) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return first step and time (s) of each window, the indices of the windows with data, and the end (s)."""
+    """Return first step and time (s) of each envelope window, the indices of those with data, and the end time (s)."""
     campaign = results.campaign
     plant = Plant.from_parameters({**campaign.design, **campaign.scenario.parameters()})
     reached = np.flatnonzero(np.isfinite(results.envelope.low).all(axis=1))
@@ -270,12 +270,12 @@ def _scatter(results: Results, factor: Factor, drawn: np.ndarray, numbers: Numbe
 
 
 def _limits(results: Results, shown: Distribution) -> list[float]:
-    """Return the limits of a metric inside the range of the data; others would compress the plot."""
+    """Return the limits of a metric that lie within the range of the data; others would compress the plot."""
     limit = limits(results).get(shown.name)
     return [] if limit is None else [end for end in (-limit, limit) if shown.minimum <= end <= shown.maximum]
 
 
 def _curve(flight: Flight, windows: np.ndarray, index: int) -> np.ndarray:
-    """Return a signal of a flight at the first steps of the windows that it reached."""
+    """Return signal number ``index`` of a flight at the first step of each window that the flight has reached."""
     curve = signals(flight)[index]
     return np.asarray(curve[windows[windows < len(curve)]])

@@ -1,6 +1,6 @@
-"""The page engine: templates with style and scripts inside, and curves as numbers in one compressed block.
+"""The page engine: renders templates with style and scripts inline, and packs all curves into one compressed block.
 
-All pages share ``template/base.html.j2``, one stylesheet and the scripts that draw :class:`Plot` with Plotly.
+All pages share ``template/base.html.j2``, one stylesheet and the script that draws each :class:`Plot` with Plotly.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ LIBRARY = files("hsv.pages").joinpath("plotly", "plotly-basic.min.js")
 class Plot:
     """A plot of a page.
 
-    A curve is a dictionary: ``kind`` (how the script draws it), ``label``, ``run`` (the flight with which it is
-    hidden, or None) and ``x`` and ``y``, the numbers of its arrays. A shade has ``kind``, ``from`` and ``to`` (seconds)
-    and ``runs``.
+    A curve is a dictionary with ``kind`` (how the script draws it), ``label``, ``run`` (index of the flight with which
+    it is hidden, or None), and ``x`` and ``y`` (indices of its arrays in :class:`Numbers`). A shade is a coloured time
+    interval with ``kind``, ``from`` and ``to`` (s) and ``runs`` (indices of its flights).
     """
 
     name: str
@@ -49,13 +49,13 @@ class Plot:
     notes: Sequence[Markup] = ()
     """Remarks below the title."""
     x_unit: str | None = None
-    """SI unit of x; None: x is the time, which all plots over time share."""
+    """SI unit of x, or None if x is the time; all plots over time show the same interval."""
     x_share: bool = False
     limits_on: str = "y"
     """The axis that the limits belong to."""
 
     def described(self) -> dict[str, Any]:
-        """Return the description for the script."""
+        """Return the plot as plain data for JSON, from which the page's script draws it."""
         return {
             "name": self.name,
             "units": units_of(self.unit, share=self.share),
@@ -69,13 +69,13 @@ class Plot:
 
 @dataclass
 class Numbers:
-    """Arrays one after the other in single precision: seven digits, more than a plot can show."""
+    """The arrays of all curves of a page, one after the other in single precision, which has seven digits."""
 
     lengths: list[int] = field(default_factory=list)
     blocks: dict[bytes, int] = field(default_factory=dict)
 
     def add(self, values: np.ndarray) -> int:
-        """Return the number of the array; equal arrays are stored once."""
+        """Store an array and return its index; equal arrays are stored once."""
         with np.errstate(over="ignore"):
             block = np.asarray(values, "<f4").tobytes()
         if block not in self.blocks:
@@ -84,21 +84,21 @@ class Numbers:
         return self.blocks[block]
 
     def array(self, index: int) -> np.ndarray:
-        """Return an array by its number."""
+        """Return the stored array with this ``index``, in double precision."""
         return np.frombuffer(list(self.blocks)[index], "<f4").astype(float)
 
     def packed(self) -> Markup:
-        """Return all arrays, compressed."""
+        """Return all arrays as one block, gzipped and base64-encoded."""
         return compressed(b"".join(self.blocks))
 
 
 def compressed(data: bytes) -> Markup:
-    """Return ``data`` gzipped, as base64; the same text for the same data."""
+    """Return ``data`` gzipped and base64-encoded; equal data give equal text."""
     return Markup(base64.b64encode(gzip.compress(data, 9, mtime=0)).decode())
 
 
 def render(template: str, *, plots: Sequence[Plot] = (), numbers: Numbers | None = None, **values: Any) -> str:
-    """Return a page of ``plots`` and ``numbers``; ``values`` fill the template, ``described`` goes to its script."""
+    """Return the page that ``template`` makes of the other arguments; its script gets ``plots`` and ``described``."""
     environment = Environment(
         loader=PackageLoader("hsv.pages", "template"),
         autoescape=template.endswith(".html.j2"),
@@ -106,7 +106,7 @@ def render(template: str, *, plots: Sequence[Plot] = (), numbers: Numbers | None
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.policies["json.dumps_kwargs"] = {}  # in the order of the tables
+    environment.policies["json.dumps_kwargs"] = {}  # do not sort the keys
     environment.filters |= {"number": text.number, "words": in_words}
     environment.globals |= {
         "asset": _asset,
@@ -129,11 +129,11 @@ def _asset(name: str) -> Markup:
 
 
 def write_page(page: str, out: Path, error: type[HsvError]) -> None:
-    """Write a page to the HTML file ``out``; if that fails, raise the ``error``."""
+    """Write a page to the HTML file ``out``; if that fails, raise an exception of type ``error``."""
     try:
         out.write_text(page, encoding="utf-8")
     except OSError as refused:
         if out.is_file():
-            out.unlink()  # half a page
+            out.unlink()  # incomplete
         why = f"{out}: cannot be written ({reason(refused)}), expected an HTML file to write"
         raise error(why) from None

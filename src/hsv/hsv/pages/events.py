@@ -1,4 +1,4 @@
-"""Events of a flight in chronological order: faults, limits, the tube, warnings, changed parameters."""
+"""Events of a flight: faults, limited commands, errors outside the tube, warnings, changed parameters."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from hsv.model.signals import INPUT_NAMES
 from hsv.pages.text import quantity
 
 JOIN_WITHIN = 0.5
-"""Seconds; intervals of one kind that are closer are shown as one."""
+"""Longest time (s) between two events of the same text that are shown as one."""
 
 DIAGNOSTICS_PERIOD = 1.0
-"""Seconds of simulated time between the diagnostics of a node."""
+"""Simulated time (s) between the diagnostics of a node."""
 
 LOG_WARNING = 30
 """Level of a warning in rcl_interfaces/msg/Log; the levels of errors are higher."""
@@ -34,7 +34,7 @@ _DIAGNOSTIC_LEVELS = {1: "warning", 2: "error", 3: "error"}
 
 @dataclass(frozen=True)
 class Event:
-    """An event; ``end`` is None if it lasts until the end of the flight, and ``start`` for an instant."""
+    """An event from ``start`` to ``end`` (s): equal for an instant, None if it lasts until the end of the flight."""
 
     start: float
     end: float | None
@@ -46,11 +46,11 @@ class Event:
 
 
 def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
-    """Return the events of ``bag``, whose ``description`` is that of :func:`hsv.bags.info.describe`."""
+    """Return the events of a flight by start time; ``description`` is the result of :func:`hsv.bags.info.describe`."""
     tube = description["tube"] or {"excursions": ()}
     outside = [Event(e["start_s"], e["end_s"], "tube", "error outside the invariant set") for e in tube["excursions"]]
     events = [*_faults(description), *_joined(outside), *_saturation(bag)]
-    # These are properties of vehicle and hardware, not of a moment: one event at the start.
+    # These hold for vehicle and hardware during the whole flight: one event at the start.
     for steps, text in (
         ("uncertified_steps", "vehicle outside the set that the tube is certified for"),
         ("uncertified_hardware_steps", "hardware or air that the tube is not certified for"),
@@ -72,7 +72,7 @@ def _instant(time: float, kind: str, text: str, subject: str) -> Event:
 
 
 def _messages(bag: Bag, topic: str) -> Iterator[tuple[float, Any]]:
-    """Yield time (s) and message of each message of a topic that the bag may have."""
+    """Yield the time (s) and the decoded message of each message of a topic; nothing if the bag lacks the topic."""
     for time, message in bag.decode(topic) if topic in bag.roles else ():
         yield time * 1e-9, message
 
@@ -106,9 +106,9 @@ def _diagnostics(bag: Bag) -> Iterator[Event]:
 
 
 def _log(bag: Bag) -> Iterator[Event]:
-    """Yield the warnings of this graph; another graph in the domain logs to the same topic."""
+    """Yield the warnings and errors in the log of this graph; other graphs in the domain log to the same topic."""
     for time, message in _messages(bag, ROSOUT):
-        # A logger has the name of its node with dots for slashes.
+        # The name of a logger is that of its node, with dots instead of slashes.
         space, _, node = message.name.rpartition(".")
         if message.level >= LOG_WARNING and space == bag.namespace.strip("/").replace("/", "."):
             kind = "warning" if message.level == LOG_WARNING else "error"
@@ -124,7 +124,7 @@ def _parameter_changes(bag: Bag) -> Iterator[Event]:
 
 
 def _joined(events: Iterable[Event], within: float = JOIN_WITHIN) -> list[Event]:
-    """Return ``events``, which are in the order of time, with neighbouring events of the same text merged."""
+    """Return chronological ``events``, merging those of the same text that are at most ``within`` seconds apart."""
     last: dict[str, int] = {}
     joined: list[Event] = []
     for event in events:

@@ -24,7 +24,7 @@ from hsv.pages.panels import AIR_PANELS, MEASUREMENT_ERRORS, PANELS, Kind, Panel
 
 @dataclass(frozen=True)
 class DrawnCurve:
-    """A curve of one flight, SI: y (n) over the time of the flight, or y (2) at its two ends."""
+    """A curve of one flight in SI units: y (n) at all n steps, or y (2) at the first and the last step."""
 
     kind: Kind
     label: str
@@ -33,25 +33,25 @@ class DrawnCurve:
 
 @dataclass(frozen=True)
 class FlightCurves:
-    """The curves of a flight: time (n; s), panels by name in their order, and curves by name of the panel."""
+    """The curves of a flight: time (n; s), panels by name in the order of the page, and curves by panel name."""
 
     time: np.ndarray
     panels: dict[str, Panel] = field(default_factory=dict)
     curves: dict[str, list[DrawnCurve]] = field(default_factory=dict)
 
     def add(self, panel: Panel, *curves: DrawnCurve) -> None:
-        """Add a panel with its curves; none of elastic states that rest, which a rigid vehicle has."""
+        """Add a panel with its curves, but not elastic states that are always zero, as those of a rigid vehicle."""
         if panel.group == "elastic" and not any(curve.y.any() for curve in curves):
             return
         self.panels[panel.name] = panel
         self.curves[panel.name] = list(curves)
 
     def over(self, curve: DrawnCurve) -> np.ndarray:
-        """Return the times (s) of a curve."""
+        """Return the times (s) of the values of ``curve``."""
         return self.time if len(curve.y) == len(self.time) else self.time[[0, -1]]
 
     def actual(self, name: str) -> np.ndarray | None:
-        """Return the values of the actual curve of a panel, or None without one."""
+        """Return the values of the actual curve of the panel ``name``, or None if there is none."""
         return next((curve.y for curve in self.curves.get(name, ()) if curve.kind is Kind.actual), None)
 
 
@@ -72,13 +72,13 @@ class ReportedRun:
     curves: FlightCurves
     events: list[Event]
     parameters: dict[str, dict[str, Any]]
-    """Parameters of the scenario and of the design in the bag."""
+    """Parameters in the bag by name, under the keys ``scenario`` and ``design``."""
     incomplete: str
     """Numbers of complete and of all steps as text; empty if the bag is complete."""
 
     @property
     def custom(self) -> dict[str, str]:
-        """Custom data of the recorder: run id, commit, design and its hash, ..."""
+        """Custom data that the recorder has written: run id, commit, design and its hash, ..."""
         return dict(self.description["custom_data"])
 
     @property
@@ -98,7 +98,7 @@ class ReportedRun:
 
     @property
     def input_limits(self) -> dict[str, tuple[float, float]]:
-        """Minimum and maximum of each input by the design, SI; empty without a design."""
+        """Minimum and maximum (SI) that the design permits, by input name; empty without a design."""
         design = self.parameters["design"]
         ends = zip(design.get("input.minimum", []), design.get("input.maximum", []), strict=False)
         return dict(zip(INPUT_NAMES, ends, strict=False))
@@ -144,7 +144,7 @@ def _scenario(text: str, name: str) -> tuple[Scenario | None, str]:
 
 
 def flight_curves(bag: Bag) -> FlightCurves:
-    """Return the curves of ``bag`` at the steps contained in all their topics."""
+    """Return the curves of a flight at the steps for which ``bag`` has a message of every drawn topic."""
     topics = dict.fromkeys(curve.topic for panel in PANELS for curve in panel.curves)
     topics |= dict.fromkeys(equipment_topics(bag))
     if TUBE_STATUS not in bag.roles:  # a custom controller has no tube
@@ -152,7 +152,7 @@ def flight_curves(bag: Bag) -> FlightCurves:
     columns = joined(bag, list(topics))
     flight = FlightCurves(columns[STATE]["header.stamp"] * 1e-9)
 
-    # A design without an invariant set has no error.
+    # Without an invariant set, the tube status has no error.
     error = columns[TUBE_STATUS]["error"] if TUBE_STATUS in columns else ()
     components = np.asarray(error, float).reshape(len(flight.time), -1).shape[1]
     for panel in (*PANELS, *map(error_panel, range(components))):

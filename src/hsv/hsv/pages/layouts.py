@@ -19,7 +19,7 @@ def foxglove_layout(name_of: Callable[[str], str]) -> str:
     """Return the layout as JSON.
 
     Args:
-        name_of: Function that returns the name of the topic of a role in the graph that is shown.
+        name_of: Function that returns the name of a topic in the displayed graph from its default name.
     """
     settings: dict[str, Any] = {}
 
@@ -32,7 +32,7 @@ def foxglove_layout(name_of: Callable[[str], str]) -> str:
         return {"value": f"{name_of(role)}.{field}", "label": label, "enabled": True, "timestampMethod": "headerStamp"}
 
     def plot(panel: Panel) -> str:
-        # Viewers do not add fields: centre and half-width of the tube are drawn instead of its ends, other sums not.
+        # Viewers cannot add fields: draw centre and half-width of the tube instead of its bounds, and omit other sums.
         fields = {}
         for curve in panel.curves:
             for field in curve.fields if len(curve.fields) == 1 or panel.group == "tube" else ():
@@ -46,7 +46,7 @@ def foxglove_layout(name_of: Callable[[str], str]) -> str:
         return placed("Plot", values | dict.fromkeys(shown, True))
 
     def rows(panels: Sequence[Panel]) -> Any:
-        """Place up to three plots in a column, or more in rows of two."""
+        """Return the layout of plots: up to three in a column, more in rows of two."""
         across = 1 if len(panels) <= 3 else 2
         starts = range(0, len(panels), across)
         return _split("column", [_split("row", list(map(plot, panels[at : at + across]))) for at in starts])
@@ -76,7 +76,7 @@ def foxglove_layout(name_of: Callable[[str], str]) -> str:
 
 
 def _split(direction: str, parts: list[Any], first: float = 0.0) -> Any:
-    """Return parts side by side or stacked: of equal size, or with ``first`` percent for the first of two."""
+    """Return the layout of ``parts`` in a row or column, of equal size or with ``first`` percent for the first."""
     if len(parts) == 1:
         return parts[0]
     share = first or round(100.0 / len(parts), 3)
@@ -85,7 +85,7 @@ def _split(direction: str, parts: list[Any], first: float = 0.0) -> Any:
 
 
 def _airframe() -> dict[str, Any]:
-    """Return the settings of the 3-D panel, which follows the vehicle and draws no axes of frames."""
+    """Return the settings of the 3-D panel, which follows the vehicle and hides the axes of all frames."""
     moving = transforms(Sample(*[0.0] * len(Sample.__annotations__)))
     frames = dict.fromkeys(end for transform in moving for end in (transform.parent, transform.child))
     grid = {

@@ -1,4 +1,4 @@
-"""The panels of report and live page: a table of quantities over time with their curves."""
+"""The panels of report and live page, that is, their plots over time, and the curves in each."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hsv.model.signals import N_RIGID, STATE_NAMES, STATE_UNITS
 
 
 class Kind(StrEnum):
-    """Kind of a curve; the page draws each kind in its own way, and hides some on request."""
+    """Kind of a curve, which determines its line style; the user can hide some kinds."""
 
     actual = "actual"
     nominal = "nominal"
@@ -27,7 +27,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve: the sum of fields of one topic, or of their columns; a field with a leading ``-`` is subtracted."""
+    """A curve: the sum of ``fields`` of a topic, or of one ``column`` of each; a leading ``-`` subtracts a field."""
 
     kind: Kind
     label: str
@@ -36,7 +36,7 @@ class Curve:
     column: int | None = None
 
     def value(self, read: Callable[[str], Any]) -> Any:
-        """Return the value from the fields that ``read`` returns by their path; NaN if one has too few columns."""
+        """Return the sum of the fields, which ``read`` returns by their path; NaN if a field lacks the column."""
         total: Any = 0.0
         for field in self.fields:
             part: Any = np.asarray(read(field.removeprefix("-")))
@@ -48,7 +48,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Panel:
-    """A quantity over time; ``unit`` is SI."""
+    """A plot of a quantity, in the SI unit ``unit``, over time."""
 
     name: str
     title: str
@@ -68,7 +68,7 @@ GROUPS = {
     "air": "Air",
     "tube": "Tube",
 }
-"""Headings of the groups, in the order of the page."""
+"""Headings of the groups of panels, in the order of the page."""
 
 
 def _state(group: str, title: str, unit: str, field: str, *more: Curve) -> Panel:
@@ -114,24 +114,24 @@ PANELS = (
         shading="tube",
     ),
 )
-"""The panels that every flight has; that of the level only with an invariant set."""
+"""The panels of every flight; that of the tube level has a curve only if the design has an invariant set."""
 
 MEASUREMENT_ERRORS = {
     name: Panel(f"measurement_error_{name}", f"Measured less true {name.replace('_', ' ')}", unit, "sensors")
     for name, unit in zip(STATE_NAMES, STATE_UNITS, strict=True)
 }
-"""Panels by state; the curve is the difference of two topics."""
+"""Panels of the measured minus the true state, by name of the state; the curves come from two topics."""
 
 AIR_PANELS = {
     "wind_forward": Panel("wind_forward", "Wind from behind", "m/s", "air"),
     "wind_up": Panel("wind_up", "Wind from below", "m/s", "air"),
     "density_factor": Panel("density_factor", "Density for that of the model", "1", "air"),
 }
-"""Panels by field of the air."""
+"""Panels of wind and density, by name of the message field."""
 
 
 def error_panel(component: int) -> Panel:
-    """Return the panel of a component of the tube error: five rigid states, then pairs of notch-filter states."""
+    """Return the panel of component 0, 1, ... of the tube error e: five rigid states, then the notch-filter states."""
     if component < N_RIGID:
         title, unit = f"Error of {STATE_NAMES[component].replace('_', ' ')}", STATE_UNITS[component]
     else:
@@ -146,4 +146,4 @@ def error_panel(component: int) -> Panel:
 
 
 LIVE_CURVES = [(panel, curve) for panel in (*PANELS, *map(error_panel, range(N_RIGID))) for curve in panel.curves]
-"""The curves of the live page with their panels, in the order of its columns."""
+"""Panel and curve of every column of :meth:`hsv.pages.live.hub.Hub.history` after the first, which is the time."""

@@ -1,4 +1,4 @@
-"""The picture that a page opens with: a few of its plots as SVG, visible before any script has run."""
+"""The picture at the top of a page: a few of its plots as SVG, visible before any script has run."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from hsv.pages.engine import Numbers, Plot
 from hsv.pages.text import number
 
 WIDTH, HEIGHT = 1000.0, 100.0
-"""Size of a drawing; the page scales it."""
+"""Size of the view box of a drawing, which the page scales."""
 
 DRAWN = ("high", "bound", "reference", "mean", "nominal", "actual")
-"""Kinds of the curves that are drawn, from below; ``high`` is the area between it and the curve ``low``."""
+"""Kinds of the drawn curves, from back to front; ``high`` fills the area between the curves ``low`` and ``high``."""
 
 Tick = tuple[str, float]
-"""Label, and place along the axis in percent of its length."""
+"""Label, and position on the axis in percent of its length."""
 
 
 class Drawing(NamedTuple):
-    """A plot over the axis of a picture."""
+    """A plot of a picture as SVG."""
 
     plot: Plot
     paths: list[tuple[str, str, int | None]]
-    """Classes of the stylesheet, SVG data, and the run with which the path is hidden."""
+    """Each path: its CSS classes, SVG path data, and the index of the run with which it is hidden, or None."""
     ticks: dict[str, list[Tick]]
-    """Ticks by system of units, from below."""
+    """Ticks of the vertical axis, from bottom to top, by system of units."""
 
 
 class Picture(NamedTuple):
-    """Drawings over one axis; a shade has its start and its width in percent."""
+    """Drawings over a common horizontal axis; shades are start and width in percent of the axis."""
 
     drawings: list[Drawing]
     axis: str
@@ -50,7 +50,7 @@ def picture(
     axis: str = "time [s]",
     kinds: Sequence[str] = DRAWN,
 ) -> Picture:
-    """Return the picture of ``plots``, all over 0 ... ``end``, with stretches of the axis shaded."""
+    """Return the picture of ``plots`` over the axis from 0 to ``end``; ``shades`` are shaded intervals of the axis."""
     marked = [(100.0 * start / end, 100.0 * (stop - start) / end) for start, stop in shades]
     drawings = [_drawing(plot, numbers, end, kinds) for plot in plots]
     return Picture(drawings, axis, _ticks(0.0, end, 1.0, 8), marked)
@@ -80,7 +80,7 @@ def _drawing(plot: Plot, numbers: Numbers, end: float, kinds: Sequence[str]) -> 
 
 
 def _path(across: np.ndarray, down: np.ndarray) -> str:
-    """Return SVG path data through the finite points, without those that change less than a tenth of a pixel."""
+    """Return SVG path data through the finite points, without points that move the line by less than about 0.1."""
     drawn = Path(np.column_stack((across, down))).cleaned(remove_nans=True, simplify=True)
     pens, points = {Path.MOVETO: "M", Path.LINETO: "L"}, np.asarray(drawn.vertices)
     codes = np.asarray(drawn.codes).tolist()
@@ -88,7 +88,7 @@ def _path(across: np.ndarray, down: np.ndarray) -> str:
 
 
 def _ticks(low: float, high: float, scale: float, count: int) -> list[Tick]:
-    """Return about ``count`` round numbers of the unit that ``scale`` leads to, within ``low`` ... ``high``."""
+    """Return about ``count`` ticks from ``low`` to ``high`` (SI), at values that ``scale`` turns into round numbers."""
     places = MaxNLocator(nbins=count, steps=[1, 2, 2.5, 5, 10]).tick_values(low * scale, high * scale)
     inside = [float(place) for place in places if low <= place / scale <= high]
     return [(number(round(place, 12), 7), 100.0 * (place / scale - low) / (high - low)) for place in inside]

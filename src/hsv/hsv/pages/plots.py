@@ -19,17 +19,18 @@ _NAMES, _UNITS = (*STATE_NAMES, *INPUT_NAMES), (*STATE_UNITS, *INPUT_UNITS)
 _STATES = ("altitude", "velocity", "angle_of_attack", "pitch_rate", "elastic_rate_1", "elastic_rate_2")
 
 _REMARK_WIDTH = 130
-"""Characters in a line of a remark."""
+"""Maximum number of characters in a line of a remark."""
 
 
 def flight_figure(flights: Mapping[str, FlightData], system: UnitSystem, remarks: Sequence[str] = ()) -> Figure:
-    """Return panels over time, one curve per flight; dotted: the reference, shaded: from the first fault on.
+    """Return a figure of panels over time, with one curve per flight.
 
-    There are eight, or six where every vehicle is rigid, so that its elastic states rest.
+    There are eight panels, or six if all vehicles are rigid. The reference is dotted, and the time from the first fault
+    on is shaded; both are those of the first flight.
 
     Args:
         flights: The flights by label.
-        system: Units that are drawn.
+        system: Units of the axes.
         remarks: Remarks on the flights, such as missing steps, printed above the panels.
     """
     histories = {label: np.hstack((flight.history.state, flight.history.command)) for label, flight in flights.items()}
@@ -64,12 +65,12 @@ def flight_figure(flights: Mapping[str, FlightData], system: UnitSystem, remarks
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Save ``figure`` in the format of the file's ending, without a date, so that equal flights give equal files."""
+    """Save ``figure`` in the format that the suffix of ``path`` names; equal flights give equal files."""
     metadata: dict[str, str | None] = {}
     if path.suffix in (".svg", ".pdf"):
         metadata = {"Date" if path.suffix == ".svg" else "CreationDate": None}
     with matplotlib.rc_context({"svg.hashsalt": "hsv"}):
-        # Whole before it meets the disk: on a full one matplotlib's own errors depend on the format.
+        # Render in memory first: on a full disk, the exceptions of matplotlib would depend on the format.
         whole = BytesIO()
         figure.savefig(whole, format=path.suffix[1:], dpi=110, metadata=metadata)
     path.write_bytes(whole.getvalue())

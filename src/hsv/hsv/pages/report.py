@@ -33,7 +33,7 @@ DECLARED = {p.name: p for table in (LOCKSTEP_PARAMETERS, *NODE_PARAMETERS.values
 """Declarations of all parameters of the nodes by name."""
 
 EVENTS_SHOWN = 200
-"""Maximum number of listed events of a run; the page states the total number."""
+"""Maximum number of listed events of a run; the page states how many are left out."""
 
 PICTURED = ("altitude", "velocity", "angle_of_attack", "level")
 """Panels of the picture at the top of the page."""
@@ -49,7 +49,7 @@ def write_report(bags: Sequence[Bag], out: Path, *, units: UnitSystem = UnitSyst
 
 
 def report_page(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.metric) -> str:
-    """Return the HTML page of the report."""
+    """Return the report of ``runs`` as an HTML page; ``units`` are its initial units."""
     numbers = Numbers()
     plots = [_plot(panel, runs, numbers) for panel in all_panels(runs)]
     drawn = {plot.group for plot in plots}
@@ -94,14 +94,14 @@ def all_panels(runs: Sequence[ReportedRun]) -> list[Panel]:
 
 
 def sentence(runs: Sequence[ReportedRun]) -> Markup:
-    """Return the verdict on one or several flights in all systems of units."""
+    """Return the verdict on one or several flights as HTML in all systems of units."""
     if len(runs) == 1:
         return verdict(runs[0])
     return switched({system: str(escape(f"{capitalised(_several(runs, system))}.")) for system in UnitSystem})
 
 
 def verdict(run: ReportedRun) -> Markup:
-    """Return the verdict on one flight in all systems of units."""
+    """Return the verdict on one flight as HTML in all systems of units."""
     texts = {system: _one(run, verdict_sentence(run.verdicts, run.metrics, system)) for system in UnitSystem}
     return switched({system: str(escape(f"{capitalised(text)}.")) for system, text in texts.items()})
 
@@ -121,7 +121,7 @@ def _several(runs: Sequence[ReportedRun], system: UnitSystem) -> str:
 
 
 def _one(run: ReportedRun, limits: str) -> str:
-    """Return the verdict on the ``limits`` with remarks about an early end and an incomplete recording."""
+    """Return ``limits``, a run's verdict in words, with remarks on a lost flight and an incomplete recording."""
     parts = [f"lost: {run.failure}"] if run.failure else []
     parts.append(limits if run.scenario else run.remark)
     if run.incomplete:
@@ -130,9 +130,9 @@ def _one(run: ReportedRun, limits: str) -> str:
 
 
 def _plot(panel: Panel, runs: Sequence[ReportedRun], numbers: Numbers) -> Plot:
-    """Return the plot of a panel with the curves of all runs; curves common to all are drawn once."""
+    """Return the plot of a panel with the curves of all runs; equal references and bounds are drawn once."""
     curves: list[dict[str, Any]] = []
-    # The curve with the largest range is drawn first, so that it does not hide the others.
+    # The run with the largest range is drawn first, so that it does not hide the others.
     widths = {index: float(np.ptp(y[np.isfinite(y)])) for index, y in enumerate(_actual(panel, runs)) if y is not None}
     for index in sorted(widths, key=lambda index: widths[index], reverse=True):
         own = runs[index].curves
@@ -160,7 +160,7 @@ def _agreed(curve: DrawnCurve, panel: Panel, runs: Sequence[ReportedRun]) -> boo
 
 
 def _faults(run: ReportedRun) -> list[dict[str, Any]]:
-    """Return the faults of a run for the player, without their parameters, which are in the list of events."""
+    """Return the faults of a run for the player, with ``from`` and ``to`` (s) but without their parameters."""
     return [
         {
             "channel": fault["channel"],
@@ -189,7 +189,7 @@ def _belongs(event: Event, panel: Panel) -> bool:
 
 
 def _picture(runs: Sequence[ReportedRun], plots: Sequence[Plot], numbers: Numbers) -> Picture:
-    """Return the picture of the flights; only a single flight shows its nominal trajectory."""
+    """Return the picture of the flights, with the nominal trajectory only if there is a single flight."""
     end = max(run.duration for run in runs) or 1.0
     faults = [event for run in runs for event in run.events if event.kind == "fault"]
     shades = sorted({(event.start, end if event.end is None else event.end) for event in faults})
@@ -199,7 +199,7 @@ def _picture(runs: Sequence[ReportedRun], plots: Sequence[Plot], numbers: Number
 
 
 def _grouped(runs: Sequence[ReportedRun]) -> dict[Group, dict[str, Metric]]:
-    """Return the metrics with a value or a verdict in any of the runs, by group."""
+    """Return the metrics that have a value or a verdict in any run, by group and name."""
     known = {name for run in runs for name in (*run.metrics, *run.verdicts)}
     groups = {
         group: {name: metric for name, metric in METRICS.items() if metric.group is group and name in known}
@@ -242,7 +242,7 @@ def _value(name: str, value: Any) -> Markup:
         case bool():
             return Markup("yes" if value else "no")
         case int() | float():
-            # A frequency in hertz or rad/s is the same in all systems.
+            # Frequencies have the same unit in all systems of units.
             return Markup(f"{number(value, 8)}&nbsp;{unit}") if "frequency" in name else quantity(value, unit, 8)
         case [int() | float() as only]:
             return _value(name, only)

@@ -1,4 +1,4 @@
-"""The results of a resilience campaign as a page, as Markdown, and as scenarios of its worst flights."""
+"""Output of a resilience campaign: an HTML page, a Markdown page, and scenario files of the worst flights."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ SECTIONS = {"map": "Map of survival", "controllers": "Controllers", "cells": "Nu
 
 
 def write_results(results: ResilienceResults, out: Path, command: str) -> list[Path]:
-    """Write page, Markdown and the scenario of each cell's worst flight into ``out``; return page and Markdown.
+    """Write both pages and the scenario of each cell's worst flight to the folder ``out``; return the pages' paths.
 
-    Both print the ``command`` that produces the results. A CampaignError says which file cannot be written.
+    The pages quote the ``command`` that produces the results. A CampaignError names a file that cannot be written.
     """
     folder = out / FLIGHTS
     try:
@@ -58,12 +58,12 @@ def flight_text(cell: Cell) -> str:
 
 
 def vehicle_words(vehicle: int) -> str:
-    """Return the description of a vehicle by its number."""
+    """Return the name of vehicle number ``vehicle`` of a cell: 0 is the nominal vehicle, the others are corners."""
     return f"corner {vehicle}" if vehicle else "nominal vehicle"
 
 
 def sentence(results: ResilienceResults) -> str:
-    """Return the verdict: the number of flights that each controller survives, best controller first."""
+    """Return the verdict: how many flights each controller has survived, best controller first."""
     counts = {}
     for subject in results.campaign.subjects:
         squares = [square for (_, name), square in results.squares.items() if name == subject.name]
@@ -74,7 +74,7 @@ def sentence(results: ResilienceResults) -> str:
 
 
 def resilience_page(results: ResilienceResults, template: str, command: str) -> str:
-    """Return the page or the Markdown text by its ``template``; both state the ``command`` that produces them."""
+    """Return the page that ``template`` makes of the results, as HTML or Markdown; it quotes the ``command``."""
     return render(
         template,
         command=command,

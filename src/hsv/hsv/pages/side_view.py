@@ -1,4 +1,4 @@
-"""Geometry of the side view of the vehicle: outlines with the bending modes at each of their points, as plain data."""
+"""Geometry of the side view of the vehicle, as plain data: outlines with the bending mode at each point."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import numpy as np
 from hsv.model.airframe.geometry import Airframe, Point, airframe
 
 SPACING = 0.5
-"""Metres between the points of an outline, at most."""
+"""Maximum distance (m) along x between neighbouring points of an outline."""
 
 
 @cache
 def geometry() -> dict[str, Any]:
     """Return the geometry that the class ``SideView`` of ``vehicle.js`` draws, ready for JSON.
 
-    Points of outlines are ``[x, z, mode, shape, slope]``: metres in the axes of the body, the index of the elastic
-    coordinate that bends there, and the deflection (kg^-0.5) and its slope by x (kg^-0.5/m) for a coordinate of one.
+    Points are ``[x, z, mode, shape, slope]``: body axes (m), the index of the elastic coordinate that bends the vehicle
+    there, and deflection (kg^-0.5) and slope (kg^-0.5/m) per unit of it. The elevator's outline is ``[x, z]`` only (m).
     """
     frame = airframe()
     chord, thickness = frame.elevator_chord, frame.elevator_thickness
@@ -33,7 +33,7 @@ def geometry() -> dict[str, Any]:
         "axis": [_point(frame, x, 0.0) for x in np.linspace(frame.fore_body, -frame.aft_body, 62)],
         "elevator": {
             "hinge": _point(frame, *frame.elevator_hinge),
-            # Leading edge, top, trailing edge, bottom, about the hinge.
+            # Leading edge, top, trailing edge and bottom, relative to the hinge.
             "outline": [[0.5 * chord, 0.0], [0.0, 0.5 * thickness], [-0.5 * chord, 0.0], [0.0, -0.5 * thickness]],
         },
         "flame": {

@@ -1,4 +1,4 @@
-"""Quantities as pages print them: in every system of units, of which the page shows one."""
+"""Quantities as HTML in all systems of units, of which the page shows one."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ SYSTEMS = {UnitSystem.metric: "SI, degrees", UnitSystem.si: "strict SI", UnitSys
 
 
 def quantity(value: float | None, unit: str, digits: int = 5, *, signed: bool = False, share: bool = False) -> Markup:
-    """Return a value (in its SI ``unit``) with its unit in all systems of units; a dash for None.
+    """Return ``value`` (in the SI ``unit``) with its unit as HTML in all systems of units; a dash for None.
 
-    A ``signed`` value has its sign if it is positive, too; a ``share`` is in percent except in strict SI.
+    A positive ``signed`` value has a plus sign; a ``share`` is in percent except in strict SI.
     """
     if value is None:
         return Markup("–")
@@ -28,19 +28,19 @@ def quantity(value: float | None, unit: str, digits: int = 5, *, signed: bool = 
 
 
 def in_brackets(unit: str, *, share: bool = False) -> Markup:
-    """Return the unit in brackets, as after a heading, in every system of units; nothing for a pure number."""
+    """Return the unit in brackets as HTML in all systems of units; empty for a pure number."""
     names = {system: unit_html(in_system(1.0, unit, system, share=share)[1]) for system in SYSTEMS}
     return switched({system: f" [{name}]" if name else "" for system, name in names.items()})
 
 
 def units_of(unit: str, *, share: bool = False) -> dict[str, dict[str, float | str]]:
-    """Return factor and name of the unit by system, for the page's script."""
+    """Return, by system of units, name and factor (times SI) of the displayed unit, for the page's script."""
     found = {system: in_system(1.0, unit, system, share=share) for system in SYSTEMS}
     return {str(system): {"unit": unit_html(name), "factor": scale} for system, (scale, name) in found.items()}
 
 
 def unit_html(unit: str) -> str:
-    """Return a unit as HTML: exponents raised, factors joined; nothing for a pure number."""
+    """Return a unit as HTML with superscript exponents and dots between factors; empty for a pure number."""
     if unit == "1":
         return ""
     return str(escape(unit)).replace("^0.5", "<sup>½</sup>").replace("^2", "<sup>2</sup>").replace(" ", "·")
@@ -52,7 +52,7 @@ def number(value: float, digits: int = 5) -> str:
 
 
 def capitalised(text: str) -> str:
-    """Return a text with its first letter in upper case, as a sentence begins."""
+    """Return a text with its first letter in upper case."""
     return text[:1].upper() + text[1:]
 
 

@@ -1,4 +1,4 @@
-"""Programs that show a bag, if they are installed, and the layout for them."""
+"""Programs that display a bag, and the layout file for them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hsv.pages.layouts import foxglove_layout
 
 
 class Viewer(NamedTuple):
-    """A program that opens an MCAP file: where it comes from, and how it is called with the path of a file."""
+    """A program that opens MCAP files: its executables, where to get it, and the options before the file."""
 
     name: str
     programs: tuple[str, ...]
@@ -22,7 +22,7 @@ class Viewer(NamedTuple):
     """Whether it draws the vehicle in 3-D, from a copy of the bag, with the layout imported by hand."""
 
     def program(self) -> str | None:
-        """Return the path of the program, None if it is not installed."""
+        """Return the path of the installed executable, or None."""
         return next(filter(None, map(shutil.which, self.programs)), None)
 
 
@@ -43,7 +43,7 @@ def layout_for(bag: Bag) -> Path:
     """Write the layout for the topics of ``bag`` into the bag's folder, and return its path.
 
     Raises:
-        RecordingError: It cannot be written.
+        RecordingError: The layout cannot be written.
     """
     target = bag.folder / "layout_foxglove.json"
     try:

@@ -1,4 +1,4 @@
-"""Commands of the live page to a flight, which are validated before a node is called."""
+"""Commands from the live page to the nodes of a flight, and the validation of requests."""
 
 from __future__ import annotations
 

@@ -17,14 +17,14 @@ class FoxgloveServer(ServerListener):
     """A read-only server of topics for Foxglove and Lichtblick; a slow client misses messages and delays no others."""
 
     def __init__(self, port: int, topics: Mapping[str, str], latched: Iterable[str] = ()) -> None:
-        """Serve ``topics``, types by full name, on ``port`` of this machine (0: any free one, else a ParameterError).
+        """Serve ``topics`` (message types by full name) on ``port`` of this machine; 0 is any free port.
 
-        Of the ``latched`` topics a client that subscribes later receives the earlier messages, too.
+        Late subscribers of ``latched`` topics also receive the earlier messages. A ParameterError names a port in use.
         """
         # Suppress messages about clients that connect and disconnect.
         foxglove.set_log_level(logging.CRITICAL)
         self._latched: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in latched}
-        """Times and bytes of the messages of the run on the latched topics."""
+        """Time (ns) and bytes of all messages of this run, by latched topic."""
         # Keep the context, because its channels are closed with it.
         self._context = foxglove.Context()
         self._channels = {
@@ -60,7 +60,7 @@ class FoxgloveServer(ServerListener):
             self._channels[channel.topic].log(data, log_time=time, sink_id=client.id)
 
     def start_run(self) -> None:
-        """Forget the previous run, here and in the clients."""
+        """Discard the messages of the previous run, here and in the clients."""
         for messages in self._latched.values():
             messages.clear()
         self._server.clear_session()

@@ -30,7 +30,7 @@ class Hub:
     """Collection of the data of the page, written by one thread and read by the server threads."""
 
     def __init__(self, decode: Callable[[str, bytes], Any], about: Mapping[str, str]) -> None:
-        """Start without data; ``decode`` deserializes a message of a topic, ``about`` has title and bag."""
+        """Start without data; ``decode`` deserializes a message of a topic, ``about`` has ``title`` and ``bag``."""
         self._topics = tuple(dict.fromkeys(curve.topic for _, curve in LIVE_CURVES))
         self._steady = frozenset(self._topics) - {TUBE_STATUS}
         """Topics of every step; a custom controller does not publish the tube status."""
@@ -40,7 +40,7 @@ class Hub:
         self._generation = 0
         self._status: dict[str, Any] = {"run": None, "settings": {}, "limits": {}}
         self.version = 0
-        """Number of changes of :meth:`status`."""
+        """Number of changes of :meth:`status` so far."""
         self._reset()
 
     def _reset(self) -> None:
@@ -82,11 +82,11 @@ class Hub:
             self._note(words, round(self.time * 1e-9 / self._period) if step is None else step, warning)
 
     def sample(self) -> None:
-        """Add a row to the history if a new step is complete; the newest is taken."""
+        """Add the newest complete step to the history, unless it has been added already."""
         kept = {topic: self._latest[topic] for topic in self._topics if self._latest[topic]}
         if not kept.keys() >= self._steady:
             return
-        # The messages of a step arrive one after the other: some topics may already have later messages.
+        # The messages of a step arrive one by one: some topics may already have a message of the next step.
         time = min(messages[-1][0] for messages in kept.values())
         step = {topic: next((data for at, data in messages if at == time), b"") for topic, messages in kept.items()}
         if time <= self._sampled or b"" in step.values():
@@ -108,10 +108,10 @@ class Hub:
             self._update(self._status_of(messages))
 
     def history(self, generation: int, first: int) -> tuple[int, int, np.ndarray]:
-        """Return generation, first row and rows for a reader of ``generation``: those from ``first`` on, or all.
+        """Return generation, first index and rows: from ``first`` on if the history still has ``generation``, else all.
 
         The generation changes when the history restarts or is decimated. Rows (n, 1 + curves; single precision) are
-        time (s) and the values of :data:`hsv.pages.panels.LIVE_CURVES`.
+        time (s) and the values (SI) of :data:`hsv.pages.panels.LIVE_CURVES`.
         """
         with self._lock:
             first = first if generation == self._generation else 0
@@ -139,7 +139,7 @@ class Hub:
             {"words": str(fault_in(fault)), "channel": fault.channel, "type": fault.type, "since": int(since)}
             for fault, since in zip(actuator.active, actuator.since, strict=True)
         ]
-        # The faults that have started or ended, scheduled or injected, are events.
+        # Every start and end of a fault, scheduled or injected, is an event.
         before = self._status["faults"]
         for fault in (fault for fault in faults if fault not in before):
             self._note(f"{fault['words']} begins", fault["since"], True)

@@ -18,7 +18,7 @@ def live_page(hub: Hub, port: int) -> str:
     """Return the HTML page for the flight of ``hub``, served on ``port``."""
     plots = []
     for panel, numbered in groupby(enumerate(LIVE_CURVES, 1), lambda numbered: numbered[1][0]):
-        # The script keeps the rows of the flight as arrays: the time is array 0, the curves follow.
+        # The page's script keeps the rows of the flight as arrays: array 0 is the time, the curves follow.
         curves = [{"kind": c.kind, "label": c.label, "run": 0, "x": 0, "y": number} for number, (_, c) in numbered]
         plots.append(Plot(panel.name, panel.title, panel.unit, panel.group, curves))
     groups = {key: heading for key, heading in GROUPS.items() if any(plot.group == key for plot in plots)}
@@ -40,7 +40,7 @@ def live_page(hub: Hub, port: int) -> str:
 
 
 def _kinds() -> dict[str, dict[str, Any]]:
-    """Return the fault types by channel for the form, with the ranges of their parameters."""
+    """Return the fault types for the page's form, by channel and type, with the ranges of their parameters."""
     found: dict[str, dict[str, Any]] = {channel: {} for channel in CHANNELS}
     for name, kind in FAULT_KINDS.items():
         for channel in kind.channels:

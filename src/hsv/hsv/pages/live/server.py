@@ -31,16 +31,16 @@ LAYOUT = "/foxglove.json"
 """Path of the layout for Foxglove and Lichtblick."""
 
 LONGEST_REQUEST = 10_000
-"""Maximum length of a request, bytes."""
+"""Maximum length (bytes) of a request."""
 
 GOING_AWAY = 1001
 """WebSocket close code of a server that stops."""
 
 PERIOD = 0.05
-"""Time between two looks for new data, s."""
+"""Time (s) between checks for new data."""
 
 CLOSE_TIMEOUT = 1.0
-"""Time to wait for clients at the end, s."""
+"""Time (s) to wait for clients when the server stops."""
 
 Answer = Callable[[dict[str, Any]], None]
 """Function that sends the answer to a command: ``accepted``, ``message``, and the ``step`` at which it takes effect."""
@@ -74,7 +74,7 @@ class PageServer:
             "/": ("text/html; charset=utf-8", live_page(hub, self.port).encode()),
             LAYOUT: ("application/json", layout.encode()),
         }
-        """Media type and contents of the served documents, by path."""
+        """Media type and content of each served document, by path."""
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
 
@@ -155,7 +155,7 @@ class PageServer:
             sender.cancel()
 
     async def _send(self, connection: ServerConnection) -> None:
-        """Send changes of the hub, as fast as the client reads, and the last ones at the end."""
+        """Send changes of the hub as fast as the client reads, and the remaining ones when the server stops."""
         known, count, version, ended = 0, 0, -1, False
         with suppress(ConnectionClosed):
             while not ended:
@@ -172,7 +172,7 @@ class PageServer:
                 await asyncio.sleep(PERIOD)
 
     def _receive(self, connection: ServerConnection, text: str | bytes) -> None:
-        """Validate a request and queue its command; every request is answered."""
+        """Validate a request and queue its command, or reply why it is rejected."""
         number: Any = None
 
         def answer(values: dict[str, Any]) -> None:
@@ -192,7 +192,7 @@ class PageServer:
 
 
 def _fields(text: str | bytes) -> dict[str, Any]:
-    """Return the fields of a request; a ParameterError says why it is no JSON object."""
+    """Return the fields of a request; raise a ParameterError if it is not a JSON object."""
     try:
         fields = parse_json(text)
         json.dumps(fields, ensure_ascii=False).encode()

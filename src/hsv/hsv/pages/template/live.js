@@ -1,10 +1,10 @@
 "use strict";
-/* The flight as it comes from the server, and the commands of the page. */
+/* The flight, as received from the server, and the commands of the page. */
 
-const REDRAW = 200; // ms between two drawings of the plots
-const ROWS = 1024; // rows for which there is room at first
+const REDRAW = 200; // time between updates of the plots, ms
+const ROWS = 1024; // initial capacity of the arrays, rows
 
-/* Names of the program in words. */
+/* Return an identifier in words. */
 const words = (name) => name.replaceAll("_", " ");
 
 class Flight {
@@ -13,8 +13,8 @@ class Flight {
     this.width = 1 + charts.panels.reduce((sum, panel) => sum + panel.curves.length, 0);
     this.form = document.getElementById("controls").elements;
     this.token = toolbar.form.elements.token.value;
-    this.shades = new Map(); // of faults, by first step and words
-    this.waiting = new Map(); // requests without an answer, by number
+    this.shades = new Map(); // shaded intervals of faults, by first step and text
+    this.waiting = new Map(); // functions that take the answers to pending requests, by request number
     this.number = 0;
     this.forget();
     charts.window = () => this.window();
@@ -26,7 +26,7 @@ class Flight {
     setInterval(() => this.draw(), REDRAW);
   }
 
-  /* The time window that a zoom has set; otherwise the last seconds of the flight that the toolbar selects, or all. */
+  /* Return the time window of a zoom, otherwise the last seconds that the toolbar selects, or null for everything. */
   window() {
     const last = Number(this.toolbar.form.elements.window.value);
     return this.toolbar.time ?? (last ? [Math.max(0, this.now - last), Math.max(this.now, 1)] : null);
@@ -60,7 +60,7 @@ class Flight {
     this.trim();
   }
 
-  /* Add rows, one after the other in `rows`. */
+  /* Add the rows that `rows` holds, one after the other. */
   add(rows) {
     const added = rows.length / this.width;
     while (this.count + added > this.store[0].length) {
@@ -75,7 +75,7 @@ class Flight {
     this.trim();
   }
 
-  /* The charts draw the rows that are there. */
+  /* Let the charts draw the rows received so far. */
   trim() {
     this.charts.arrays = this.store.map((array) => array.subarray(0, this.count));
     this.now = this.count ? this.store[0][this.count - 1] : 0;
@@ -119,7 +119,7 @@ class Flight {
     this.enable();
   }
 
-  /* Faults that act are shaded up to now, those that have ended up to their end. */
+  /* Shade active faults up to now, and others up to their end. */
   shade() {
     const period = this.status.run?.period || 0, key = (fault) => `${fault.since} ${fault.words}`;
     const acting = new Set(this.status.faults.map(key));
@@ -143,7 +143,7 @@ class Flight {
     state.classList.toggle("bad", Boolean(ending && ending.how !== "finished"));
   }
 
-  /* The controls work while there is a flight, and with the token. */
+  /* Enable the controls if a flight is in progress and the address has the token. */
   enable() {
     const { form } = this, { settings = {}, tau = null, run, ending } = this.status || {};
     const able = Boolean(this.token && !this.over && run && !ending);
@@ -176,7 +176,7 @@ class Flight {
     const { charts } = this, shades = [...this.shades.values()].map((shade) => ({ ...shade, to: Math.min(shade.to, this.now) }));
     for (const panel of charts.panels) {
       panel.shades = shades;
-      // A custom controller has no tube, and a design may have no set.
+      // Hide plots without data: a custom controller has no tube, and a design may have no invariant set.
       panel.element.closest("figure").hidden = this.count > 0 && !panel.curves.some((curve) => charts.arrays[curve.y].some(Number.isFinite));
     }
     const elastic = charts.panels.filter((panel) => panel.name.startsWith("elastic")).flatMap((panel) => panel.curves);

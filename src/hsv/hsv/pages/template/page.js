@@ -1,8 +1,8 @@
 "use strict";
-/* What all pages do: plots drawn by Plotly, those over time in one window, and a toolbar that is kept in the address. */
+/* Common to all pages: plots by Plotly with a common time window, and a toolbar whose settings the address keeps. */
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-/* Units as text: Plotly has no markup. */
+/* Return a unit as plain text for Plotly, which cannot display this markup. */
 const plain = (unit) => unit.replaceAll("<sup>½</sup>", "½").replaceAll("<sup>2</sup>", "²");
 const RUN_COLOURS = 6;
 
@@ -23,7 +23,7 @@ const LOOKS = {
 };
 const SHADES = { fault: "rgba(179,38,30,.09)", saturation: "rgba(214,158,0,.3)", tube: "rgba(91,95,199,.22)" };
 
-/* What the toolbar shows is kept in the address behind the #, after the section. */
+/* The toolbar. Its settings are kept in the address, as `#section&name=value&...`. */
 class Toolbar {
   constructor(form) {
     this.form = form;
@@ -31,7 +31,7 @@ class Toolbar {
     form.addEventListener("change", () => this.changed());
     form.addEventListener("submit", (event) => event.preventDefault());
     form.elements.all?.addEventListener("click", () => this.setTime(null));
-    /* A link within the page goes to a section and keeps the rest; any other address is shown. */
+    /* A link to a section keeps the settings; an address with settings changes them. */
     window.addEventListener("hashchange", () => (location.hash.includes("=") ? this.read() : this.write()));
     this.read();
   }
@@ -40,7 +40,7 @@ class Toolbar {
     return this.form.elements.units.value;
   }
 
-  /* The time window, null for everything. */
+  /* The selected time window, or null for the whole flight. */
   get time() {
     const { from, to } = this.form.elements;
     if (!from || (from.value === "" && to.value === "")) return null;
@@ -69,7 +69,7 @@ class Toolbar {
     this.listeners.forEach((listener) => listener());
   }
 
-  /* The section that the address names, and the settings. */
+  /* Return the section and the settings in the address. */
   static address() {
     const parts = location.hash.slice(1).split("&");
     const section = parts[0].includes("=") ? "" : parts.shift();
@@ -103,7 +103,7 @@ async function inflate(id) {
 }
 
 class Charts {
-  /* `described` is the page's description of its plots; `buffer` holds their arrays, one after the other. */
+  /* `described` is from hsv.pages.engine; `buffer` holds the arrays of all curves, one after the other. */
   constructor(described, buffer, toolbar) {
     Object.assign(this, described, { toolbar });
     let offset = 0;
@@ -117,7 +117,7 @@ class Charts {
     this.panels.forEach((panel) => this.watch.observe(panel.element));
     toolbar.listeners.push(() => this.show());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.show());
-    /* On paper every plot is there, in the light colours and at the width of its place. */
+    /* For printing, draw all plots, in light colours and at the printed width. */
     matchMedia("print").addEventListener("change", () => {
       this.show();
       this.drawAll();
@@ -126,12 +126,12 @@ class Charts {
     this.show();
   }
 
-  /* The window of time that is shown, null for everything. */
+  /* The displayed time window, or null for the whole flight. */
   window() {
     return this.toolbar.time;
   }
 
-  /* Show what the toolbar says; draw what is in sight. */
+  /* Apply the settings of the toolbar and redraw the visible plots. */
   show() {
     const { units } = this.toolbar, time = this.window();
     if (units !== this.units) this.panels.forEach((panel) => { panel.y = null; });
@@ -171,7 +171,7 @@ class Charts {
     return !this.hidden.kinds.has(curve.kind) && !this.hidden.runs.has(String(curve.run));
   }
 
-  /* An array in the units shown; `units` by system, null for none. */
+  /* Return an array in the displayed units; `units` are those by system, or null for an array without a unit. */
   values(index, units) {
     const factor = units ? units[this.units].factor : 1;
     return factor === 1 ? this.arrays[index] : Float64Array.from(this.arrays[index], (value) => value * factor);
@@ -222,7 +222,7 @@ class Charts {
     }));
   }
 
-  /* The range of the values in the time window, with a margin; null without values. */
+  /* Return the range of the values in the time window, with a margin; null without values. */
   extent(panel) {
     const [from, to] = this.time || [-Infinity, Infinity], { factor } = panel.units[this.units];
     const limits = this.limits ? panel.limits : [];
@@ -241,7 +241,7 @@ class Charts {
     return [(low - margin) * factor, (high + margin) * factor];
   }
 
-  /* A zoom of one panel: its time window is that of all, its vertical range its own. */
+  /* Handle a zoom in one panel: the time window applies to all panels, the vertical range only to this one. */
   zoomed(panel, change) {
     const end = (axis, which) => change[`${axis}axis.range[${which}]`];
     const own = end("y", 0) === undefined ? null : [end("y", 0), end("y", 1)];
@@ -256,7 +256,7 @@ class Charts {
   }
 }
 
-/* Start the page; one with plots starts the plotting library, draws them, and lets `connect` do what is its own. */
+/* Start the page: load the plotting library and draw the plots, if there are any, then call `connect`. */
 async function startPage(connect = () => {}) {
   const toolbar = new Toolbar(document.getElementById("toolbar")), described = document.getElementById("described");
   if (!described) return;

@@ -1,20 +1,20 @@
 "use strict";
-/* The vehicle from its side, at the time of a slider in the report, at the newest step on the live page. */
+/* The side view of the vehicle: in the report at the time of a slider, on the live page at the newest step. */
 
 const DEGREE = Math.PI / 180, FOOT = 0.3048;
 const QUANTITIES = ["altitude", "velocity", "angle_of_attack", "pitch_angle", "fuel_equivalence_ratio", "elevator_deflection"];
 const ELASTIC = ["elastic_coordinate_1", "elastic_coordinate_2"];
-/* Kinds of the curves of the vehicle: of an input what moves it, as far as it is recorded. */
+/* Kinds of curves that move the vehicle, in order of preference: the effector of an input, if it is recorded. */
 const ACTUAL = ["effector", "actuator", "actual"];
-/* Pictures a second for readers who prefer little motion. */
+/* Frames per second for users who prefer reduced motion. */
 const CALM_RATE = 2;
 
 const fixed = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits).replace("-", "\u2212") : "–");
 const degrees = (angle) => `${fixed(angle / DEGREE, 2)}°`;
 const outline = (points) => `M${points.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`).join("L")}Z`;
 
-/* One picture. The geometry is that of hsv.pages.side_view; only the bending is exaggerated, angles are as they are. A
-   sample holds SI and radians: {time, QUANTITIES, elastic: [eta_1, eta_2], faults: [{channel, text}], nominal}. */
+/* One side view. Its geometry is from hsv.pages.side_view; the bending is exaggerated, angles are not. A sample, in SI
+   units, is {time, QUANTITIES, elastic: [eta_1, eta_2], faults: [{channel, text}], nominal: another sample}. */
 class SideView {
   constructor(element, geometry) {
     Object.assign(this, { element, geometry, exaggeration: geometry.exaggeration, units: "metric" });
@@ -26,7 +26,7 @@ class SideView {
     return this.element.querySelector(selector);
   }
 
-  /* The mapping of points to the screen: bent, then turned by the pitch angle about the centre of gravity. */
+  /* Return the mappings of points to the screen: bent, then rotated by the pitch angle about the centre of gravity. */
   placed(sample) {
     const cos = Math.cos(sample.pitch_angle), sin = Math.sin(sample.pitch_angle);
     const bend = sample.elastic.map((coordinate) => coordinate * this.exaggeration);
@@ -43,7 +43,7 @@ class SideView {
     return outline(points.map(([px, pz]) => turned(at[0] + px * cos - pz * sin, at[1] + px * sin + pz * cos)));
   }
 
-  /* As long as much fuel burns; it leaves along the nozzle, between the ends of roof and cowl. */
+  /* The flame starts between the ends of roof and cowl; its length is proportional to the fuel equivalence ratio. */
   flame({ bent }, sample) {
     const { roof, cowl, length } = this.geometry.flame, reach = length * Math.max(sample.fuel_equivalence_ratio, 0);
     const middle = roof.map((value, index) => 0.5 * (value + cowl[index]));
@@ -99,7 +99,7 @@ class SideView {
   }
 }
 
-/* The pictures of a page, one for each flight. */
+/* The side views of a page, one for each flight. */
 class Vehicle {
   constructor(charts, toolbar, slider) {
     Object.assign(this, { charts, time: 0, views: [] });
@@ -117,7 +117,7 @@ class Vehicle {
     this.draw();
   }
 
-  /* The curves of a run by quantity, without elastic ones for a rigid vehicle; null unless all others are there. */
+  /* Return the curves of a run by quantity, or null if one is missing; a rigid vehicle has no elastic curves. */
   series(run, kinds) {
     const found = Object.fromEntries([...QUANTITIES, ...ELASTIC].map((name) => {
       const curves = this.charts.panels.find((panel) => panel.name === name)?.curves.filter((curve) => curve.run === run) || [];
@@ -126,7 +126,7 @@ class Vehicle {
     return QUANTITIES.every((name) => found[name]) ? found : null;
   }
 
-  /* The last step that is not after the time; null before the first. */
+  /* Return the last step that is not after the current time, or the first step; null without steps. */
   sample(series) {
     const { arrays } = this.charts, x = arrays[series.altitude.x];
     if (!x?.length) return null;
@@ -152,7 +152,7 @@ class Vehicle {
   }
 }
 
-/* The flight played, over a slider with its faults. */
+/* The player of a flight: a button, and a time slider that shows the faults. */
 class Player {
   constructor(charts, form, toolbar) {
     const { play, time, speed, exaggeration } = form.elements;
