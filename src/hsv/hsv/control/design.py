@@ -106,7 +106,7 @@ def scheduled_changes(values: Mapping[str, Any], minimum: np.ndarray, period: fl
 
 
 def change_parameters(changes: Sequence[tuple[int, np.ndarray]], period: float) -> dict[str, list[float]]:
-    """Return the parameters :data:`TAU_CHANGE_PARAMETERS` for ``changes``: first step and factors tau (5) of each."""
+    """Return parameters :data:`TAU_CHANGE_PARAMETERS` that describe ``changes``, first step and factors (5) of each."""
     return {
         "tau_change.starts": [start * period for start, _ in changes],
         "tau_change.values": [float(value) for _, tau in changes for value in tau],

@@ -1,7 +1,4 @@
-"""Estimator of the elevator effectiveness in flight, with the equations of ``core/effectiveness.h``.
-
-It is an extension of the paper's tube law, off by default.
-"""
+"""Estimator of the elevator effectiveness (``core/effectiveness.h``), an extension of the law, off by default."""
 
 from __future__ import annotations
 

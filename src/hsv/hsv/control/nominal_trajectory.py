@@ -27,7 +27,7 @@ NOMINAL_PARAMETERS = (
 
 
 class NominalResult(NamedTuple):
-    """A step: x_r (9), u_r (2), x_n (9), u_n (2), gain K (2, 9), its index in the family (0: outermost), and status."""
+    """Nominal step: x_r (9), u_r (2), x_n (9), u_n (2), gain K (2, 9), its family index (0: outermost) and status."""
 
     reference: np.ndarray
     reference_input: np.ndarray
@@ -104,7 +104,7 @@ class NominalTrajectory:
         self.law.reset()
 
     def step(self, state: np.ndarray) -> NominalResult:
-        """Return reference, nominal state and input of this step, and advance x_n; ``state`` (9) is measured."""
+        """Return reference, nominal state and input of this step from the measured ``state`` (9), then advance x_n."""
         row = self.reference.row(self._step)
         data = self.reference.data
         reference = data.state[row]

@@ -72,7 +72,7 @@ def tube_data(
     """Return the data of the law as the struct ``hsv_tube`` of the core, by default a feedback on x - x_r alone.
 
     Args:
-        gains: (c, 2, 9) gains F diag(tau), one for each change of tau.
+        gains: (c, 2, 9) gains F diag(tau), each from its first step on.
         minimum: (2) smallest inputs.
         maximum: (2) largest inputs.
         period: Control period T, s.

@@ -558,7 +558,8 @@ class StarNorms(NamedTuple):
 
         Acting channels have a column other than zero. The ellipsoid v' Q^-1 v <= 1 is invariant under
         v(k+1) = A_i v + g_i d with |d| <= 1 if Q - A_i Q A_i' / lam - g_i g_i' / (1 - lam) >= 0 (Abedor, Nagpal and
-        Poolla 1996), where lam is the contraction. The residual is that of this matrix with Q scaled to the identity.
+        Poolla 1996), with contraction lam. A residual is the smallest eigenvalue of this matrix over all vertices, with
+        Q scaled to the identity.
 
         Raises:
             DesignError: A contraction is not between 0 and 1.
