@@ -1,1 +1,1 @@
-"""Launch files, recorder and player of the bench."""
+"""Launch file, recorder, player, live view and command-line client of the bench."""

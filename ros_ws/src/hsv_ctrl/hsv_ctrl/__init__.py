@@ -1,1 +1,1 @@
-"""Notch filter, nominal trajectory and Tube-MPC controller."""
+"""Nodes of the notch filter, the nominal trajectory and the controllers, such as Tube-MPC."""

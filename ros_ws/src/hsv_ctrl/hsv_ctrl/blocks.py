@@ -1,4 +1,4 @@
-"""Nodes that only step their block: the notch filter, and custom controllers."""
+"""Nodes of the notch filter and of controllers without a node of their own, such as custom ones."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class NotchFilterNode(BlockNode):
 
 
 class ControllerNode(BlockNode):
-    """A node that steps the controller named by the parameter ``controller``: a registered one, or a class.
+    """A node that steps the controller that the parameter ``controller`` names, such as a custom class.
 
     Raises:
-        ParameterError: The name is unknown or that of a controller with its own node; or a parameter is wrong, named.
+        ParameterError: The name is unknown or that of a controller with its own node, or another parameter is wrong.
     """
 
     def __init__(self) -> None:
@@ -50,7 +50,7 @@ class ControllerNode(BlockNode):
         self.component = build_controller(values | {"controller": name}, design)
 
     def stepped(self, signals: Signals) -> None:
-        """Report whether the command is limited."""
+        """Publish the diagnostics, with whether the command was limited."""
         self.diagnose(signals, saturated=bool(signals.saturated.any()))
 
 

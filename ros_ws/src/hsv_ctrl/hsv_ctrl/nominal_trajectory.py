@@ -24,14 +24,14 @@ from hsv_node.parameters import declare_design, declare_vehicle
 _SOLVER_FAILED = int(NominalStatus.SOLVER_FAILED)
 
 _PLAN_LOOK = 0.02
-"""Seconds between two looks at a plan that is being computed."""
+"""Time (s) between checks whether a plan is complete."""
 
 
 class NominalTrajectoryNode(BlockNode):
     """A node that publishes reference and nominal state for each measurement, and accepts commands in flight.
 
-    A command is planned in a thread. It is announced with the first step that it changes, and the flight waits at that
-    step until the plan is known; so the flight does not depend on how long the plan takes.
+    A command is planned in a thread. The node announces the first step that the plan changes, and the flight waits at
+    that step until the plan is complete. The flight therefore does not depend on the computing time.
     """
 
     def __init__(self) -> None:
@@ -43,21 +43,21 @@ class NominalTrajectoryNode(BlockNode):
         self._failed = False
         self._planner = ThreadPoolExecutor(1)
         self._plan: Future[ReferenceTrajectory] | None = None
-        """The plan that is being computed."""
+        """The plan that is being computed, or None."""
         self._first, self._words = 0, ""
         """The first step that the plan changes, and the command in words."""
         self._references = self.create_publisher(Reference, REFERENCE, LATCHED)
         self.serve(SetCommand, SET_COMMAND, self._command)
 
     def start_run(self, run: Run) -> None:
-        """Start a new nominal trajectory."""
+        """Restart the nominal trajectory for a new run."""
         super().start_run(run)
         self._failed = False
         self._plan = None
         self._publish_reference(0)
 
     def stepped(self, signals: Signals) -> None:
-        """Report the status of the law; warn when a solver begins to fail."""
+        """Publish the status of the nominal law as diagnostics; warn when its solver begins to fail."""
         failed = bool(int(signals.nominal_status) & _SOLVER_FAILED)
         begins, self._failed = failed and not self._failed, failed
         status = NominalStatus(signals.nominal_status)
@@ -69,7 +69,7 @@ class NominalTrajectoryNode(BlockNode):
         return self._plan is not None and step >= self._first
 
     def poll(self) -> None:
-        """Fly a plan once it is known."""
+        """Switch to a new plan once it is complete."""
         super().poll()
         if self._plan is not None and self._plan.done():
             plan, self._plan = self._plan, None
@@ -77,7 +77,7 @@ class NominalTrajectoryNode(BlockNode):
             self.answer(self._trajectory.next_step)
 
     def wait_timeout(self) -> float:
-        """Look more often for a plan that is being computed."""
+        """Return the time (s) to the next poll, which is shorter while a plan is being computed."""
         return _PLAN_LOOK if self._plan is not None else super().wait_timeout()
 
     def _command(self, request: SetCommand.Request) -> tuple[int, str]:

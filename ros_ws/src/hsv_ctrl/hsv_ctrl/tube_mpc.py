@@ -23,10 +23,10 @@ from hsv_node.parameters import declare, declare_design, declare_vehicle, given
 
 
 class TubeNode(BlockNode):
-    """A controller node that publishes the position of the error in the tube.
+    """A controller node that reports the tube status: where the tube error lies in the invariant set.
 
     Raises:
-        ParameterError: The graph's parameter ``controller`` names another controller.
+        ParameterError: The parameter ``controller`` names another controller.
     """
 
     def __init__(self, role: NodeDescription) -> None:
@@ -39,13 +39,13 @@ class TubeNode(BlockNode):
         self._mode = EffectivenessMode.HEALTHY
 
     def start_run(self, run: Run) -> None:
-        """Reset the tube status: the flight starts inside the tube."""
+        """Reset the tube status for a new run, which starts inside the tube."""
         super().start_run(run)
         self._outside = False
         self._mode = EffectivenessMode.HEALTHY
 
     def stepped(self, signals: Signals) -> None:
-        """Report the tube status; warn when the error leaves the tube."""
+        """Publish the tube status as diagnostics; warn when the error leaves the tube or the elevator mode changes."""
         result = signals.diagnostics
         assert isinstance(result, TubeResult)
         outside = result.status is TubeStatusCode.OUTSIDE
@@ -66,7 +66,7 @@ class TubeNode(BlockNode):
 
 
 class TubeMpcNode(TubeNode):
-    """The node of the feedback about the nominal trajectory (paper eq. 36); refuses a design that fails preflight."""
+    """The Tube-MPC node: feedback about the nominal trajectory (paper eq. 36). A design must pass preflight."""
 
     def __init__(self) -> None:
         super().__init__(TUBE_MPC)
@@ -109,7 +109,7 @@ main = partial(run_node, TubeMpcNode, "tube_mpc")
 
 
 class RobustMpcNode(TubeNode):
-    """The node of robust MPC: one gain about the reference, which it takes from the nominal trajectory node."""
+    """The robust MPC node: one gain about the reference, which it receives from the nominal trajectory node."""
 
     def __init__(self) -> None:
         super().__init__(ROBUST_MPC)

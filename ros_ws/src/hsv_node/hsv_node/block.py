@@ -1,4 +1,4 @@
-"""A node that steps a block of the loop when all messages of a step have arrived, and publishes the result."""
+"""Base class of the nodes that step one block of the loop, such as the notch filter or a controller."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from hsv_node.lockstep import PeerNode
 
 
 class BlockNode(PeerNode):
-    """Steps its block with the messages of each step, and publishes the results on the topics of its role."""
+    """A node that steps its block of the loop when all messages of a step have arrived, and publishes the results."""
 
     component: Any
-    """The component that is stepped; set by the node."""
+    """The component that the block steps; set by the subclass."""
 
     def __init__(self, role: NodeDescription, task: str) -> None:
         super().__init__(role, task)
@@ -31,7 +31,7 @@ class BlockNode(PeerNode):
         self._step = role.block.step
         self.signals = Signals()
         self._received: dict[str, tuple[int, bytes]] = {}
-        """The latest message of each topic, with its step."""
+        """Step and bytes of the latest message of each topic."""
         # In the order of the role: other nodes wait for the first and work on it while the rest is published.
         self._answers = [(StepMessages(topic).pack, self.create_step_publisher(topic)) for topic in role.publishes]
         self._step_times = array("d")
@@ -42,22 +42,23 @@ class BlockNode(PeerNode):
             self.create_step_subscription(topic, partial(self.on_message, topic))
 
     def start_run(self, run: Run) -> None:
-        """Forget the previous run."""
+        """Reset the component for a new run and discard the messages of the previous one."""
         self._received.clear()
         self._step_times = array("d")
         self.component.reset()
 
     def stepped(self, signals: Signals) -> None:
-        """Publish the diagnostics; overridden by nodes that report more."""
+        """Publish the diagnostics after a step; overridden by nodes that report more."""
         self.diagnose(signals)
 
     def serve(self, kind: Any, name: str, change: Callable[[Any], tuple[int, str]]) -> None:
-        """Offer the service ``name`` that changes the flight.
+        """Offer the service ``name``, which changes the flight.
 
         Args:
             kind: Type of the service, whose responses have ``success``, ``message`` and ``step``.
             name: Name of the service.
-            change: Executes a request and returns the first changed step and the message; an error rejects it.
+            change: Function that executes a request and returns the first changed step and a message; if it raises an
+                HsvError, the request is rejected.
         """
 
         def respond(request: Any, response: Any) -> Any:
@@ -72,17 +73,17 @@ class BlockNode(PeerNode):
         self.create_service(kind, name, respond)
 
     def holds(self, step: int) -> bool:
-        """Return whether ``step`` has to wait although its messages are there; overridden by a node that plans."""
+        """Return whether ``step`` must wait although its messages have arrived; overridden by the trajectory node."""
         return False
 
     def on_message(self, topic: str, message: bytes) -> None:
-        """Step as soon as all messages of a step have arrived."""
+        """Store the bytes of a message, and execute the step that needs it if nothing else is missing."""
         step = self.messages[topic].step(message)
         self._received[topic] = step, message
         self.answer(step + self._delays[topic])
 
     def answer(self, step: int) -> None:
-        """Take ``step`` and publish its messages, if all that it needs has arrived and nothing holds it."""
+        """Execute ``step`` and publish its messages, if its inputs have arrived and :meth:`holds` returns False."""
         signals = self.signals
         due = self._due(step)
         if not due or self.holds(step):
@@ -104,14 +105,14 @@ class BlockNode(PeerNode):
         self.stepped(signals)
 
     def measured(self) -> dict[str, str]:
-        """Return the wall times of the steps of the component so far, in ms."""
+        """Return statistics of the wall times (ms) of the component's steps in this run, as texts by name."""
         return {f"step_time_{name}": f"{value:.3f}" for name, value in step_statistics(self._step_times).items()}
 
     def _due(self, step: int) -> Sequence[str]:
-        """Return the topics that ``step`` takes; none while one of their messages is missing."""
+        """Return the topics whose messages ``step`` needs; empty while one of these messages is missing."""
         due = []
         for name, delay in self._delays.items():
-            # The first step has no previous one.
+            # A delayed topic has the message of the previous step, which step 0 lacks.
             if step > 0 or not delay:
                 if name not in self._received or self._received[name][0] + delay != step:
                     return ()

@@ -27,10 +27,10 @@ from hsv_node.process import ProcessNode
 from hsv_node.roles import full_name, node_in_role, published_types
 
 FIRST_LOG_AFTER = 2.0
-"""Time (s) of waiting for peers before the first message about it."""
+"""Time (s) of waiting for peers before the first log message about it."""
 
 LOG_INTERVAL = 10.0
-"""Time (s) between repeated messages."""
+"""Time (s) between repeated log messages."""
 
 LINK_CHECK = 0.05
 """Time (s) between checks of the links until they are matched."""
@@ -43,12 +43,12 @@ class LockstepNode(ProcessNode):
     remapped.
 
     Raises:
-        RunError: Another node of this machine publishes its topics in the same domain and namespace.
-        ParameterError: A wrong parameter, such as an unknown ``controller``.
+        RunError: Another node of this machine has its name or publishes its topics in the same domain and namespace.
+        ParameterError: A parameter is wrong, such as an unknown ``controller``.
     """
 
     def __init__(self, role: NodeDescription, task: str = "") -> None:
-        """Join the graph in ``role``; ``task`` is its short name in the diagnostics."""
+        """Join the graph in ``role``; ``task`` follows the name of the node in the diagnostics."""
         super().__init__(role.name)
         self._task = task
         place = f"one {role.name} a domain and namespace (ROS_DOMAIN_ID, -r __ns:=)"
@@ -73,7 +73,7 @@ class LockstepNode(ProcessNode):
         """Description of the current parameter change, with the step at which it takes effect."""
         self._links: dict[str, list[NodeDescription]] = {}
         self.linked: dict[str, str] = {}
-        """Full names of the linked nodes by role, as of the last :meth:`missing_links`."""
+        """Full names of the linked nodes by role, updated by :meth:`missing_links`."""
         if role.known_by:
             for topic, peer in description.links(self.role, self.controller, self.recorded, self.estimator):
                 self._links.setdefault(topic, []).append(peer)
@@ -92,11 +92,14 @@ class LockstepNode(ProcessNode):
         self._inputs[topic] = self.create_subscription(kind, topic, take, STEP, raw=True)
 
     def refuse_message(self, topic: str, error: RunError) -> str:
-        """Shut down because of an invalid message; return the logged error."""
+        """Shut down because of an invalid message on ``topic``; return the logged error text."""
         return self.fail(f"{self.resolve_topic_name(topic)}: {error}")
 
     def fail(self, words: str, code: int = 1) -> str:
-        """Log and return an error that ends the process; an exception in a callback would be printed with traceback."""
+        """Log the error ``words``, end the process with exit code ``code``, and return ``words``.
+
+        Callbacks use this instead of an exception, which rclpy would print with its traceback.
+        """
         self.get_logger().fatal(words)
         self.finish(code)
         return words
@@ -128,7 +131,7 @@ class LockstepNode(ProcessNode):
                 # DDS matches nodes built from other message definitions, but their messages would be misread.
                 (there if endpoint.topic_type_hash in definitions else different).update(found)
             self.linked |= there
-            # A link needs the node, identified by its types, and a matched endpoint, which is counted without viewers.
+            # A link needs the node, identified by its types, and a matched endpoint; endpoints of viewers do not count.
             matched = self._matched(topic) - self._watching(seen, topic, there)
             name, kind = self.resolve_topic_name(topic), description.TOPICS[topic]
             for role in [role for role in roles if role.name not in there] or roles[max(matched, 0) :]:
@@ -144,7 +147,7 @@ class LockstepNode(ProcessNode):
         return full_name(*found) if found else None
 
     def log_waiting(self, missing: Sequence[str], decides: bool = False) -> None:
-        """Log from time to time the nodes that this node waits for; a warning if this node ``decides`` the start."""
+        """Log ``missing`` after 2 s, then every 10 s, in the end as a warning if this node ``decides`` the start."""
         now = time.monotonic()
         if now < self._next_log:
             return
@@ -160,7 +163,7 @@ class LockstepNode(ProcessNode):
         return sorted(full_name(e.node_name, e.node_namespace) for e in self.get_publishers_info_by_topic(topic))
 
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
-        """Set the parameters; the result states the step at which a change in flight takes effect."""
+        """Set the parameters; the reason in the result states the step at which a change in flight takes effect."""
         self._changed = ""
         result = super().set_parameters_atomically(parameter_list)
         if result.successful:
@@ -173,7 +176,7 @@ class LockstepNode(ProcessNode):
         self.get_logger().info(words)
 
     def diagnose(self, signals: Signals, summary: str = "running", warning: bool = False, **values: object) -> None:
-        """Publish the diagnostics of this node, once per simulated second and for a ``warning``."""
+        """Publish ``summary`` and ``values`` as diagnostics, once per simulated second and for every ``warning``."""
         if signals.stamp[0] == self._diagnosed_second and not warning:
             return
         self._diagnosed_second = signals.stamp[0]
@@ -190,11 +193,11 @@ class LockstepNode(ProcessNode):
         self._diagnostics.publish(message)
 
     def measured(self) -> dict[str, str]:
-        """Return further values for the diagnostics; for subclasses."""
+        """Return further values for the diagnostics, by name; empty unless overridden."""
         return {}
 
     def _watching(self, seen: Sequence[TopicEndpointInfo], topic: str, linked: Mapping[str, str]) -> int:
-        """Return the number of endpoints in ``seen`` that are matched although their nodes are not ``linked``."""
+        """Return the number of viewers: matched endpoints in ``seen`` whose nodes are not in ``linked``."""
         strangers = [e for e in seen if full_name(e.node_name, e.node_namespace) not in linked.values()]
         pairs = [(STEP, e.qos_profile) if topic in self._outputs else (e.qos_profile, STEP) for e in strangers]
         return sum(
@@ -216,7 +219,7 @@ class PeerNode(LockstepNode):
     """
 
     def __init__(self, role: NodeDescription, task: str) -> None:
-        """Join the graph; the subclass then calls :meth:`hear_runs`."""
+        """Join the graph; the subclass must then call :meth:`hear_runs`."""
         super().__init__(role, task)
         self._run: Run | None = None
         self._announced = False
@@ -227,12 +230,12 @@ class PeerNode(LockstepNode):
         self.create_subscription(VehicleState, description.LAST_STATE, self._on_last_state, LATCHED)
 
     def hear_runs(self, callback: Callable[[Any], None], raw: bool = False) -> None:
-        """Subscribe to the runs, after everything that must be received before; ``raw`` as in rclpy."""
+        """Subscribe to announced runs, after all topics that must be received first; with ``raw`` as message bytes."""
         links = SubscriptionEventCallbacks(matched=self._on_plant)
         self._runs = self.create_subscription(Run, description.RUN, callback, LATCHED, event_callbacks=links, raw=raw)
 
     def start_run(self, run: Run) -> None:
-        """Reset the node for a new run; overridden by every node."""
+        """Reset the node for a new run; overridden by subclasses."""
 
     def end_run(self, how: str) -> None:
         """Log how the run ended; subclasses may do more."""
@@ -282,7 +285,7 @@ class PeerNode(LockstepNode):
             self._end("broken off, the plant is gone")
 
     def _end(self, how: str) -> None:
-        """Handle the end of the run once, whether the plant announces it or disappears."""
+        """Handle the end of the run, once, when the plant announces it or disappears."""
         if self._run is not None and self._announced and not self.over:
             self.over = True
             self.end_run(f"run {short_id(self._run)} {how}")
@@ -294,10 +297,10 @@ def short_id(run: Run) -> str:
 
 
 def run_in_words(run: Run) -> str:
-    """Return short id and length of a run as text."""
+    """Return short id, number of steps and duration of a run as text."""
     return f"run {short_id(run)}: {run.last_step + 1} steps, {run.last_step * run.period:g} s"
 
 
 def step_in_words(step: int, period: float) -> str:
-    """Return time and step as text."""
+    """Return the simulated time and number of a step as text; ``period`` is the control period (s)."""
     return f"t = {step * period:.2f} s, step {step}"

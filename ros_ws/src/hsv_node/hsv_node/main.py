@@ -31,15 +31,15 @@ def run_node(
     own_arguments: bool = False,
     several: bool = False,
 ) -> int:
-    """Spin the node that ``build`` makes until it finishes or is interrupted; return the exit code of the process.
+    """Spin the node that ``build`` returns until it finishes or is interrupted; return the exit code of the process.
 
-    ``several`` nodes share one executor, until the first of them finishes. Bad parameters end the process before it
-    joins the graph, with one line on standard error and exit code 2. So do arguments that are not for ROS, unless the
-    process has ``own_arguments``, which it has checked itself.
+    With ``several``, all nodes share one executor until the first of them finishes. Wrong parameters end the process
+    before it joins the graph, with exit code 2 and one line on standard error that begins with ``name``. So do
+    arguments other than those of ROS, unless ``own_arguments`` says that the caller has checked them.
     """
     words = list(sys.argv if args is None else args)
     try:
-        # Looked through before they are used: then rcl logs nothing of its own about what is wrong.
+        # Check the arguments first, so that rcl does not log its own errors about them.
         others = remove_ros_args(words)[1:]
         if others and not own_arguments:
             raise ParameterError(f"argument {others[0]!r}: expected only those that follow --ros-args")
@@ -54,7 +54,7 @@ def run_node(
     if not several:
         given = (value.partition(":=")[0] for flag, value in pairwise(words) if flag in ("-p", "--param"))
         ProcessNode.own_only = frozenset(given)
-    # An orderly end must never wait for a message: the handler only asks, and the loop looks four times a second.
+    # The handler only requests the end; the loop checks it at least four times a second and never waits for a message.
     stop: list[int] = []
     take_signals(lambda received, _frame: stop.append(received))
     ignore_ctrl_c_at_end()
@@ -68,7 +68,7 @@ def run_node(
             nodes.append(node)
             node.process_nodes = nodes
             executor.add_node(node)
-        # What was imported and built stays: the collector need not look through it again in flight.
+        # Exclude what has been created so far from garbage collection, which then takes less time in flight.
         gc.collect()
         gc.freeze()
         while not stop:
@@ -79,7 +79,7 @@ def run_node(
             if codes:
                 code = max(codes)
                 break
-            # The executor runs nothing while it waits without a limit.
+            # Always with a timeout: EventsExecutor runs no callbacks while it waits without one.
             executor.spin_once(timeout_sec=min([node.wait_timeout() for node in nodes]))
         else:
             code = max([node.stopped(stop[0]) if node.exit_code is None else node.exit_code for node in nodes])
@@ -90,14 +90,14 @@ def run_node(
             try:
                 node.close()
             except HsvError as error:
-                # A full disk is found out by the write that fails, and then by this one: said once.
+                # An error such as a full disk may have been reported already by the write before: report it once.
                 code = code or _refuse(name, error)
-        # Output would be lost if the process is ended here. If its reader is gone, Python reports that at exit.
+        # Output would be lost if ends_with() ends the process. If the pipe is closed, Python reports that at exit.
         with suppress(OSError):
             sys.stdout.flush()
         with ends_with(code):
-            # The executor keeps its nodes, and a node whose constructor has failed keeps itself until it is collected:
-            # the participant of the middleware is destroyed with the last of them.
+            # The DDS participant is destroyed with the last node. The executor holds its nodes, and a node whose
+            # constructor has failed exists until it is collected.
             if executor is not None:
                 executor.shutdown()
             for node in nodes:
@@ -108,7 +108,7 @@ def run_node(
 
 
 def _refuse(name: str, error: BaseException) -> int:
-    # rcl adds where in its sources it was.
+    # rcl appends the place in its source code.
     text = " ".join(str(error).split()).partition(", at /")[0]
     print(f"{name}: error: {text}", file=sys.stderr, flush=True)
     return 2

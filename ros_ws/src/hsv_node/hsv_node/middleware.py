@@ -16,7 +16,7 @@ from rclpy.task import Future
 from hsv.base.errors import RecordingError
 
 STEP = QoSProfile(depth=256, reliability=ReliabilityPolicy.RELIABLE)
-"""Quality of service of the step topics; the queue is deeper than the lead of the plant over the recorder."""
+"""Quality of service of the step topics; the queue exceeds the steps by which the plant may lead the recorder."""
 
 LATCHED = QoSProfile(depth=32, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Quality of service of announcements, which late subscribers must receive."""
@@ -25,7 +25,7 @@ LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Quality of service of a viewer of the latest message: publishers do not wait for it, and it may miss messages."""
 
 PROFILES = Path(__file__).with_name("fastdds.xml")
-"""The settings: how often a node announces itself at first, and when its own threads are woken."""
+"""Settings file of Fast DDS: how often a new node announces itself, and how long repeats are suppressed."""
 
 _VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 
@@ -37,10 +37,10 @@ def message_class(name: str) -> Any:
 
 
 def installed_class(topic: str, kind: str) -> Any:
-    """Return the class of the messages of any ``topic``.
+    """Return the class of the message type ``kind`` of ``topic``.
 
     Raises:
-        RecordingError: The type is not installed.
+        RecordingError: The type is not installed; the message names ``topic``.
     """
     try:
         return message_class(kind)
@@ -49,20 +49,20 @@ def installed_class(topic: str, kind: str) -> Any:
 
 
 def fault_message(channel: str, type: str, parameters: Mapping[str, float]) -> Fault:
-    """Return the message of a fault."""
+    """Return a fault as a message; ``parameters`` are SI values by name."""
     return Fault(
         channel=channel, type=type, parameter_names=list(parameters), parameter_values=list(parameters.values())
     )
 
 
 def type_name(kind: type) -> str:
-    """Return the type of a class of messages or of a service, such as ``"hsv_msgs/srv/InjectFault"``."""
+    """Return the type name of a message or service class, such as ``"hsv_msgs/srv/InjectFault"``."""
     package, section, _ = kind.__module__.split(".")
     return f"{package}/{section}/{kind.__name__}"
 
 
 class ServiceCall:
-    """A request to a service, which is sent once the service is ready; the node continues meanwhile."""
+    """A request that is sent when the service is ready; the node goes on meanwhile and polls :meth:`response`."""
 
     def __init__(self, node: Node, kind: Any, name: str, request: Any) -> None:
         self.name = name
@@ -76,7 +76,7 @@ class ServiceCall:
         return self._future is not None
 
     def response(self) -> Any:
-        """Return the response, None until it has arrived; call it repeatedly."""
+        """Send the request if the service has become ready; return the response, or None if it has not arrived."""
         if self._future is not None:
             return self._future.result() if self._future.done() else None
         if self._client.service_is_ready():
@@ -84,7 +84,7 @@ class ServiceCall:
         return None
 
     def close(self) -> None:
-        """Release the client."""
+        """Destroy the client."""
         self._node.destroy_client(self._client)
 
 

@@ -1,4 +1,4 @@
-"""Declaring a component's parameter table on a node."""
+"""Declaration of the components' parameter tables as ROS parameters of a node."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ _LARGEST = 2**63 - 1
 def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Declare every parameter of ``table`` on ``node`` and return the checked values.
 
-    ``defaults`` (e.g. the shipped design) stand in for the table's own.
+    ``defaults``, by name (e.g. of the shipped design), replace those of the table.
 
     Raises:
-        ParameterError: A value of the wrong type or outside its range, named.
+        ParameterError: A value has the wrong type or is outside its range; the message names it.
     """
     values = {}
     for parameter in table:
@@ -63,7 +63,7 @@ def _declare(node: Node, parameter: Parameter, default: Any, empty: bool) -> Any
         node.set_parameters([RosParameter(parameter.name, kind, [])])
         node.set_descriptor(parameter.name, _descriptor(parameter, kind))
         return []
-    # A given value must have the type that an empty default cannot tell.
+    # An empty default does not determine the type of the elements: declare the type instead.
     declared = kind if default == [] else default
     return node.declare_parameter(parameter.name, declared, _descriptor(parameter)).value
 
@@ -74,15 +74,15 @@ def declare_vehicle(node: Node) -> None:
     A parameter that is not given has the value of the vehicle named by ``vehicle.name``.
     """
     overrides = {p.name: node._parameter_overrides[p.name].value for p in VEHICLE_PARAMETERS if given(node, p.name)}
-    # A vehicle that is given completely need not be looked up, which imports the units.
+    # Look up the vehicle only if parameters are missing, because that imports the units.
     declare(node, VEHICLE_PARAMETERS, named_parameters(overrides) if missing_parameters(overrides) else None)
 
 
 def declare_design(node: Node, extra: tuple[Parameter, ...] = ()) -> tuple[dict[str, Any], ControlDesign | None]:
     """Declare ``extra`` and the parameters of a design on ``node``; return all values and the design in them.
 
-    Without parameters of a design the shipped one is used; ``design.name`` none flies without one. A warning says that
-    a design was modified since it was designed.
+    Without parameters of a design, the shipped baseline design is used; if ``design.name`` is ``none``, the design is
+    None. A warning is logged if the parameters of the design do not have its hash.
     """
     from hsv.control.design import DESIGN_PARAMETERS, design_of, find_design, read_parameters
 
@@ -104,15 +104,15 @@ def given(node: Node, name: str) -> bool:
 
 
 def refuse_unknown(node: ProcessNode, role: str) -> None:
-    """Refuse parameters given to ``node`` that it does not have; a file may have those of other nodes of the graph.
+    """Raise a ParameterError if ``node`` was given an unknown parameter; a file may have those of other nodes.
 
     Args:
-        node: A new node, with no more than what ROS has declared.
-        role: Its role, whose parameters it will declare; empty for none.
+        node: A new node, which has not declared its parameters yet.
+        role: Name of its role, whose parameters it will declare; empty for a node without a role.
     """
     if not node._parameter_overrides:
         return
-    from hsv.graph.node_parameters import NODE_PARAMETERS, own_parameters  # all components, for who is given something
+    from hsv.graph.node_parameters import NODE_PARAMETERS, own_parameters  # slow: imports all components
 
     chosen = node._parameter_overrides.get("controller")
     controller = str(chosen.value) if chosen else ""
@@ -120,7 +120,7 @@ def refuse_unknown(node: ProcessNode, role: str) -> None:
     if role == CONTROLLER.name:
         # A custom controller may receive every parameter of the flight.
         tables[role] = {p.name for p in own_parameters(controller)}.union(*tables.values())
-    # The parameters of a custom controller are known to its class only.
+    # Only its class knows the parameters of a custom controller.
     known = controller in ("", *CONTROLLERS)
     own = {*node.get_parameters_by_prefix(""), *(p.name for p in LOCKSTEP_PARAMETERS if role), *tables.get(role, ())}
     for name in node._parameter_overrides:
@@ -142,7 +142,7 @@ def _descriptor(parameter: Parameter, kind: RosParameter.Type | None = None) -> 
     )
     if kind is not None:
         descriptor.type = kind.value
-    # ROS has ranges for single numbers only, with two ends; the constraint in words covers lists.
+    # ROS ranges are for single numbers and have two ends; for lists, the constraint in words applies.
     limits = parameter.minimum, parameter.maximum
     if any(map(math.isfinite, limits)):
         largest = sys.float_info.max if parameter.kind == "double" else _LARGEST

@@ -1,4 +1,4 @@
-"""A node with an exit code, and the end of its process."""
+"""Base class of all nodes, with an exit code, and a guard against a process that does not end."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ _NEW_THREAD = 2
 
 
 class ProcessNode(Node):
-    """A node with an exit code and a task between messages, see :meth:`poll`."""
+    """A node that can end its process with an exit code; :meth:`poll` is called between messages."""
 
     own_only: ClassVar[frozenset[str]] = frozenset()
-    """Parameters given with ``-p`` to a process of one node, which must be its own; a file has those of others too."""
+    """Names of the parameters given with ``-p`` to a process of one node, which must be parameters of that node."""
 
     def __init__(self, name: str, namespace: str | None = None, **options: Any) -> None:
         """Create the node with further ``options`` of rclpy."""
         super().__init__(name, namespace=namespace, **options)
         self.exit_code: int | None = None
-        """Exit code of the process, once the node is to end."""
+        """Exit code with which the process is to end; None while the node runs."""
         self.process_nodes: list[ProcessNode] = [self]
         """The nodes of this process."""
         self._claims: list[socket.socket] = []
@@ -39,7 +39,7 @@ class ProcessNode(Node):
         """Reserve a topic, or with None the full name of this node, before it publishes.
 
         Raises:
-            RunError: Another node of this machine has it; ``expected`` says what is due.
+            RunError: Another node of this machine has reserved it; the message ends with ``expected``.
         """
         name = self.resolve_topic_name(topic) if topic else self.get_fully_qualified_name()
         domain = self.context.get_domain_id()
@@ -51,7 +51,7 @@ class ProcessNode(Node):
         self._claims.append(held)
 
     def destroy_node(self) -> None:
-        """Release name and topics."""
+        """Destroy the node and release its reserved name and topics."""
         super().destroy_node()
         for held in self._claims:
             held.close()
@@ -61,14 +61,14 @@ class ProcessNode(Node):
         self.exit_code = code
 
     def poll(self) -> None:
-        """Run a task between messages, at least four times per second; for subclasses."""
+        """Run a task between messages, at least four times per second; does nothing unless overridden."""
 
     def stopped(self, signal_number: int) -> int:
-        """Return the exit code after a signal, 0 after Ctrl-C; nodes whose end interrupts the run override it."""
+        """Return the exit code after a signal: 0 after Ctrl-C, otherwise 128 + ``signal_number``."""
         return 0 if signal_number == signal.SIGINT else 128 + signal_number
 
     def close(self) -> None:
-        """Save data once before the process ends; for subclasses."""
+        """Save data before the process ends; does nothing unless overridden."""
 
     def wait_timeout(self) -> float:
         """Return how long (s) to wait for a message before :meth:`poll` is due."""
@@ -79,10 +79,10 @@ class ProcessNode(Node):
 def ends_with(code: int, within: float = 3.0) -> Iterator[None]:
     """End the process with exit code ``code`` if the body takes longer than ``within`` seconds.
 
-    For the destruction of nodes, when everything else is done and written. Fast DDS 2.14 can wait there for ever: a
-    thread that has just received word of another participant, and the one that removes the listener, wait for each
-    other. That happens below rclpy with the interpreter locked, so that no thread or signal handler of Python can end
-    it; a timer of the operating system can. Where the system refuses the timer, the body runs without it.
+    The body destroys the nodes, after all data has been written. Fast DDS 2.14 can deadlock there: the thread that has
+    just discovered another participant and the thread that removes the listener wait for each other. They do so below
+    rclpy, with Python's interpreter locked, so that only a timer of the operating system can end the process. If the
+    system refuses the timer, the body runs without it.
     """
     library = ctypes.CDLL(None)
     exit_now = ctypes.cast(library._exit, ctypes.c_void_p).value

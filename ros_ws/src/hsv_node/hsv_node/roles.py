@@ -12,9 +12,9 @@ from hsv_node.middleware import type_name
 
 
 def node_in_role(asking: Node, role: NodeDescription) -> tuple[str, str] | None:
-    """Return name and namespace of the node that plays ``role`` in the graph of ``asking``, None if there is none.
+    """Return name and namespace of the node that has ``role`` in the graph of node ``asking``, or None.
 
-    It is in the same namespace, or else it publishes under the names that the topics of the role have there.
+    The node is in the namespace of ``asking``, or publishes the topics of its role under their names in that namespace.
     """
     here = (node for node in asking.get_node_names_and_namespaces() if node[1] == asking.get_namespace())
     publishers = (
@@ -26,20 +26,20 @@ def node_in_role(asking: Node, role: NodeDescription) -> tuple[str, str] | None:
 
 
 def full_name(name: str, namespace: str) -> str:
-    """Return name and namespace of a node in one string; a placeholder for an endpoint whose node is not known yet."""
+    """Return the full name of a node, such as ``/veh1/plant``; a placeholder if its namespace is not known yet."""
     if not namespace.startswith("/"):
         return "a node that just joins"
     return f"{namespace.rstrip('/')}/{name}"
 
 
 def published_types(asking: Node, name: str, namespace: str) -> set[str]:
-    """Return the types of all messages that a node publishes."""
+    """Return the names of all message types that a node publishes, as far as node ``asking`` knows."""
     found = _known(asking.get_publisher_names_and_types_by_node, name, namespace)
     return {kind for kinds in found.values() for kind in kinds}
 
 
 def name_of(asking: Node, role: NodeDescription, kind: type) -> str | None:
-    """Return the full name of the topic or service of type ``kind`` of the node in ``role``, None if there is none."""
+    """Return the full name of the topic or service of type ``kind`` of the node in ``role``, or None."""
     node = node_in_role(asking, role)
     if node is None:
         return None
@@ -54,4 +54,4 @@ def _known(look: Callable[[str, str], list[tuple[str, list[str]]]], name: str, n
     try:
         return dict(look(name, namespace))
     except NodeNameNonExistentError:
-        return {}  # it is just leaving
+        return {}  # the node has just left

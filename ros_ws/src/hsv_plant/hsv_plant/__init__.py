@@ -1,1 +1,1 @@
-"""The vehicle plant and the fault injector."""
+"""Nodes of the simulated vehicle (plant) and of the fault injector."""

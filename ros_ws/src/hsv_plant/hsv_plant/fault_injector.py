@@ -1,4 +1,4 @@
-"""The fault injector node: applies link and faults to the command of the controller."""
+"""The fault injector node: applies the command link and the faults to the command of the controller."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hsv_node.parameters import declare, declare_vehicle
 
 
 class FaultInjectorNode(BlockNode):
-    """A node that publishes the input of the actuators and the active faults for each command."""
+    """A node that publishes, for each command, the input of the actuators and the active faults."""
 
     def __init__(self) -> None:
         super().__init__(FAULT_INJECTOR, "faults")
@@ -36,12 +36,12 @@ class FaultInjectorNode(BlockNode):
         self.serve(ClearFault, CLEAR_FAULT, self._clear)
 
     def start_run(self, run: Run) -> None:
-        """Reset to step 0 and the scheduled faults."""
+        """Restart with step 0 and the scheduled faults only."""
         super().start_run(run)
         self._due_step = 0
 
     def on_message(self, topic: str, message: bytes) -> None:
-        """Process a command; during a run an unexpected step or time ends the run."""
+        """Process a command; if it has an unexpected step or time, end the run."""
         if self.announced is not None:
             step, (seconds, nanoseconds) = self.messages[topic].step(message), stamp_of(self._due_step, self._period)
             if step != self._due_step or stamp_in(message) != seconds * 10**9 + nanoseconds:
@@ -70,7 +70,7 @@ class FaultInjectorNode(BlockNode):
         return two
 
     def stepped(self, signals: Signals) -> None:
-        """Publish whether a fault acts."""
+        """Publish the diagnostics, with whether a fault acts."""
         self.diagnose(signals, "faults act" if signals.active_faults else "no fault")
 
     def _inject(self, request: InjectFault.Request) -> tuple[int, str]:

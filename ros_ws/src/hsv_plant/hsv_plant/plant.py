@@ -1,4 +1,4 @@
-"""The plant node: owns simulated time, publishes the state of a step, and integrates when its input has arrived."""
+"""The plant node: defines simulated time, publishes the state of a step and integrates when the input has arrived."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ _IN_FLIGHT = tuple(parameter.name for parameter in PACE_PARAMETERS if not parame
 
 
 class PlantNode(LockstepNode):
-    """A node that publishes measurement, state, forces and clock, one step per message of the actuators."""
+    """A node that publishes measurement, state, forces and clock, and advances a step per actuator message."""
 
     def __init__(self) -> None:
         super().__init__(PLANT, "flight")
@@ -77,7 +77,7 @@ class PlantNode(LockstepNode):
         self._broken_off = ""
         """Reason why the run was aborted; empty otherwise."""
         self._messages = 0
-        """Number of answers of the nodes so far, which must increase."""
+        """Number of messages received from the other nodes; if it does not increase, the plant ends the run."""
         self._begin()
         self.add_on_set_parameters_callback(self._on_change)
         self._control = SimulationControl(self)
@@ -102,9 +102,9 @@ class PlantNode(LockstepNode):
         """Whether the input of the actuators for this step has arrived."""
         self._flown = False
         self._stepping_to = 0
-        """Step up to which the flight goes on although it is paused."""
+        """Step up to which a paused flight goes on, on request."""
         self._resets = False
-        """Whether the run is to be reset as soon as no message of it is on its way."""
+        """Whether the run is to be reset as soon as none of its messages is pending."""
         self._begun = time.monotonic()
         self._paced_from = self._begun, 0
         """Wall time (s) and step at the start of the current pace."""
@@ -118,23 +118,23 @@ class PlantNode(LockstepNode):
 
     @property
     def paused(self) -> bool:
-        """Whether the flight is paused; it is not while requested steps are flown."""
+        """Whether the flight is paused; False while requested steps are executed."""
         return bool(self.values["paused"]) and self.step >= self._stepping_to
 
     def fly_on(self, steps: int) -> None:
-        """Fly ``steps`` of a paused flight."""
+        """Execute ``steps`` steps of a paused flight."""
         self._paced_from = time.monotonic(), self.step
         self._stepping_to = self.step + steps
         self._continue()
 
     def reset(self) -> bool:
-        """Begin the flight anew, as soon as the current step is answered; return whether it is still in the air."""
+        """Restart the flight as soon as the current step is complete; return False if the flight is already over."""
         self._resets = self._signals.status is FlightStatus.RUNNING
         self._continue()
         return self._resets or self.step == 0
 
     def quit(self, reason: str) -> None:
-        """End the run, as Ctrl-C does."""
+        """End the run for ``reason``, as Ctrl-C does."""
         self._broken_off = reason
         self.finish(EXIT_INTERRUPTED)
 
@@ -146,7 +146,7 @@ class PlantNode(LockstepNode):
         self._planning = reference.status == Reference.PLANNING
 
     def _on_change(self, parameters: list[RosParameter]) -> SetParametersResult:
-        """Change the pace, or pause, after the current step."""
+        """Change pace or pause, from the next step on."""
         step = self._signals.step
         for parameter in parameters:
             if parameter.name in _IN_FLIGHT:
@@ -154,7 +154,7 @@ class PlantNode(LockstepNode):
                 if parameter.name == "paused":
                     self._stepping_to = 0
                 self._paced_from = time.monotonic(), step
-                said = str(parameter.value).lower()  # as it is written in files: true, not True
+                said = str(parameter.value).lower()  # as in files: true, not True
                 self.log_change(f"{parameter.name} = {said} from step {step + 1 if self._published else step} on")
         return SetParametersResult(successful=True)
 
@@ -194,7 +194,7 @@ class PlantNode(LockstepNode):
     def _continue(self) -> None:
         """Execute the next step, unless the plant must wait for its input, the recorder or the wall clock."""
         if self._resets and (self._answered or not self._published):
-            # The answer to a step is the last message of that step which a node waits for.
+            # Not earlier: the actuator message is the last message of a step that a node waits for.
             self.get_logger().info(f"run {short_id(self._run)} reset at {step_in_words(self.step, self.plant.period)}")
             self._begin()
         elif not self._published:
@@ -250,7 +250,7 @@ class PlantNode(LockstepNode):
         return min(max(self._delay(), 0.0), 0.25) if due else 0.25
 
     def stopped(self, signal_number: int) -> int:
-        """Report that the flight is incomplete, unless the user ended it by Ctrl-C."""
+        """Return the exit code after a signal, 0 after Ctrl-C; :meth:`close` logs the name of the signal."""
         self._broken_off = signal.Signals(signal_number).name
         return super().stopped(signal_number)
 
@@ -264,7 +264,7 @@ class PlantNode(LockstepNode):
         elif self._signals.status is FlightStatus.FINISHED:
             self.get_logger().info(f"{run} finished at {where}")
         self._last_state.publish(StepMessages(STATE).pack(self._signals))
-        # At most; usually the other nodes have received it much sooner.
+        # Wait at most 1 s; usually the other nodes receive it much sooner.
         self._last_state.wait_for_all_acked(Duration(seconds=1.0))
 
     def _try_start(self) -> None:
@@ -272,7 +272,7 @@ class PlantNode(LockstepNode):
         missing = [f"{name} ({self.resolve_topic_name(READY)})" for name in unready] or self.missing_links()
         if not missing:
             self._started = True
-            # Looked up now: a controller that has ended is found no more.
+            # Look it up now, because a controller that has ended cannot be found.
             self._controller_name = self.node_in_role(controller_node(self.controller)) or "the controller"
             self._paced_from = time.monotonic(), 0
             self._standstill = Standstill()
@@ -310,11 +310,11 @@ class PlantNode(LockstepNode):
 
 
 def unresponsive(node: LockstepNode, peers: Sequence[NodeDescription]) -> tuple[list[str], str | None]:
-    """Return the ``peers`` whose parameter service does not answer while no other does for 2 s, and the last to answer.
+    """Return the names of the ``peers`` that do not answer, and the name of the last one that answers, or None.
 
-    Every node has that service, and a node that computes answers late.
+    The function calls the parameter service of every peer and ends after 2 s without a new answer.
     """
-    # The remappings of the command line do not apply to the helper.
+    # The helper ignores remappings given on the command line.
     helper = rclpy.create_node(f"{node.get_name()}_liveness", context=node.context, use_global_arguments=False)
     try:
         calls: dict[str, ServiceCall] = {}

@@ -1,4 +1,4 @@
-"""Control of the flight by the services of the ROS 2 standard ``simulation_interfaces``."""
+"""Control of the flight through the services of the ROS 2 package ``simulation_interfaces``."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ _NAMES = {
 
 
 class SimulationControl:
-    """The services of the standard on a plant. Pause and play are its parameter ``paused``.
+    """The services of ``simulation_interfaces`` on a plant. Pausing and playing set its parameter ``paused``.
 
-    A flight that is paused before its first step counts as stopped. Reset and steps are answered when they are
-    accepted, because the plant cannot step within a service; the state is playing while steps are flown.
+    A flight that is paused before its first step counts as stopped. Requests to reset or to step are answered when they
+    are accepted, because the plant cannot step within a service. While requested steps run, the state is playing.
     """
 
     def __init__(self, plant: PlantNode) -> None:
