@@ -22,8 +22,8 @@ COMMANDS = {name: Command(__name__) for name in ("figures", "claims", "sensitivi
 CoarsenessOption = Annotated[float, typer.Option(help="1: as in the docs; 4: a quarter of the points.")]
 StudyOption = Annotated[Path, typer.Option("--out", help="Folder for a PDF, a PNG and a page on the study.")]
 
-_FIGURE, _CLAIMS = 4.0, 900.0
-"""Time (s) on one processor: per figure, and of all claims, which need the flights of 17 scenarios by 1025 vehicles."""
+_FIGURE, _CLAIMS = 4.0, 120.0
+"""Time (s) on one processor: of a figure, and of all claims, for which 1025 vehicles fly ten scenarios."""
 
 
 def main() -> None:
@@ -68,8 +68,7 @@ def claims(
 ) -> None:
     """Measure and judge every checkable claim of the paper, for the nominal vehicle and all corners of the parameters.
 
-    This takes several minutes: more than a dozen scenarios are flown with 1025 vehicles each. The page has quotes,
-    readings and reasons.
+    This takes a few minutes: ten scenarios are flown by 1025 vehicles each. The page has quotes, readings and reasons.
 
     Example: hsv-paper claims --out docs/claims.md
     """
