@@ -1,5 +1,5 @@
-# To compile one of these files is to compile its headers: compiled all at once, they take a third less. Sources of the
-# two kinds that are not named define the same names, or use what a later one defines.
+# Most of the compile time goes into the headers: compiled as one unit, these sources take a third less time. The two
+# kinds of sources that are not listed define the same names twice, or use names that a later source defines.
 foreach(kind generator_py typesupport_c typesupport_cpp typesupport_fastrtps_c typesupport_fastrtps_cpp
     typesupport_introspection_c)
   set(target ${PROJECT_NAME}__rosidl_${kind})
@@ -9,7 +9,7 @@ foreach(kind generator_py typesupport_c typesupport_cpp typesupport_fastrtps_c t
   endif()
 endforeach()
 
-# introspection_cpp cannot be compiled several files at a time; headers that all its files share are compiled once.
+# The sources of introspection_cpp cannot be combined; the headers that they share are precompiled once.
 if(TARGET ${PROJECT_NAME}__rosidl_typesupport_introspection_cpp)
   target_precompile_headers(${PROJECT_NAME}__rosidl_typesupport_introspection_cpp PRIVATE
     <algorithm> <array> <cstddef> <memory> <string> <vector>

@@ -1,4 +1,4 @@
-"""Shared code of the commands that act on a running graph: discovery, waiting, replies and exit."""
+"""Shared code of the commands on a running graph: discovery, waiting, service calls, output and exit codes."""
 
 from __future__ import annotations
 
@@ -24,29 +24,29 @@ from hsv_node.middleware import LATCHED, ServiceCall
 from hsv_node.process import ends_with
 
 ABSENT_AFTER = 3.0
-"""Time (s) without a change in the ROS domain after which a node without a sign of it on this machine is absent."""
+"""Time (s) without a change in the ROS domain after which a node that does not run on this machine counts as absent."""
 
 SILENT_AFTER = 30.0
-"""Time (s) without a change in the ROS domain after which waiting for an existing node ends."""
+"""Time (s) without a change in the ROS domain after which the wait for an existing node ends."""
 
 SETTLED_AFTER = 3.0
 """Time (s) without a change in the topics after which discovery is complete."""
 
 MESSAGE_AFTER = 5.0
-"""Time (s) of waiting before the first message about it, and between messages."""
+"""Time (s) of waiting before the first message about the wait, and between messages."""
 
 _POLL = 0.1
 """Time (s) between checks of a condition."""
 
 
 class GraphClient(Node):
-    """A temporary node outside the graph, which finds nodes of the graph and calls their services."""
+    """A temporary node that is not part of the graph, finds the nodes of the graph and calls their services."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"hsv_{name}", enable_rosout=False, start_parameter_services=False)
 
     def find_run(self) -> Run:
-        """Return the current run of the plant."""
+        """Return the current run; raise a RunError if there is none."""
         runs: list[Run] = []
         name = self._name_of(PLANT, Run)
         if name:
@@ -56,7 +56,7 @@ class GraphClient(Node):
         return runs[-1]
 
     def name_of(self, role: NodeDescription, kind: type) -> str:
-        """Return the full name of the topic or service of type ``kind`` of the node in ``role``."""
+        """Return the full name of the topic or service of type ``kind`` of the node in ``role``; else a RunError."""
         if name := self._name_of(role, kind):
             return name
         raise RunError(f"no {role.name} in {self.where}: expected a node that publishes {role.known_by}")
@@ -68,7 +68,7 @@ class GraphClient(Node):
         return f"ROS_DOMAIN_ID={self.context.get_domain_id()}{f', namespace {namespace}' if namespace != '/' else ''}"
 
     def call(self, role: NodeDescription, kind: Any, request: Any) -> Any:
-        """Call the service of type ``kind`` of the node in ``role`` and return the reply."""
+        """Call the service of type ``kind`` of the node in ``role``; return the response, or raise a RunError."""
         service = self.name_of(role, kind)
         call = ServiceCall(self, kind, service, request)
         if self.wait_for(call.response, service):
@@ -84,7 +84,7 @@ class GraphClient(Node):
         return self._others(self.get_subscriptions_info_by_topic(topic))
 
     def settle(self, enough: Callable[[], object]) -> None:
-        """Wait until the topics and endpoints do not change any more, or until ``enough`` are known."""
+        """Wait until topics and endpoints have not changed for a while, or until ``enough`` returns a true value."""
         standstill = Standstill()
         while not enough():
             names = (name for name, _ in self.get_topic_names_and_types())
@@ -96,13 +96,13 @@ class GraphClient(Node):
     def wait_for(
         self, done: Callable[[], object], what: str, published: Sequence[str] = (), for_ever: bool = False
     ) -> bool:
-        """Wait until ``done`` is true; return whether it is.
+        """Wait until ``done`` returns a true value; return False if the wait was given up.
 
         Args:
             done: Condition to wait for.
             what: Name of the condition in messages.
-            published: Topics of a required node. If no process on this machine publishes one of them, the wait is
-                short.
+            published: Topics of the required node. The wait is short if no process of this machine publishes any of
+                them.
             for_ever: Whether to wait without a limit.
         """
         standstill, message_pause = Standstill(), Standstill()
@@ -129,15 +129,15 @@ class GraphClient(Node):
         return names[-1] if self.wait_for(found, f"{role.name} in {self.where}", role.own_topics) else None
 
     def _others(self, endpoints: Sequence[Any]) -> list[str]:
-        # Discovery finds an endpoint before the name of its node.
+        # DDS discovers an endpoint before the name of its node.
         known = [e for e in endpoints if e.node_name not in ("_NODE_NAME_UNKNOWN_", self.get_name())]
         return sorted({roles.full_name(e.node_name, e.node_namespace) for e in known})
 
 
 def run_client(name: str, act: Callable[[GraphClient, Any], None], options: Any) -> int:
-    """Run the command ``name`` with its ``options``; return its exit code: 1 without a run, 2 for a rejected request.
+    """Run the command ``name``, which calls ``act`` with ``options``, and return the exit code.
 
-    An error is one line.
+    The code is 1 without a run, 2 for a rejected request and 130 after Ctrl-C. An error is printed on one line.
     """
     client: GraphClient | None = None
     code = 1
@@ -170,7 +170,7 @@ def answer(text: str, values: Mapping[str, Any], as_json: bool) -> None:
 
 
 def acting_from(run: Run, step: int) -> tuple[str, dict[str, Any]]:
-    """Return the time at which a change at ``step`` takes effect, as text and as numbers."""
+    """Return the time of ``step`` as text and as the values ``step`` and ``time_s``; a RunError after the last step."""
     if step > run.last_step:
         raise RunError(f"the run ends with step {run.last_step}: what begins at step {step} does not act any more")
     time = step * run.period

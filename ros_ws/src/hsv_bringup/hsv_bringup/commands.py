@@ -1,4 +1,4 @@
-"""Commands of ``hsv`` on a running graph: faults, another point of altitude and velocity, parameters, looking."""
+"""Commands of ``hsv`` on a running graph: faults, commands of altitude and velocity, parameters, topics, status."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _command(client: GraphClient, options: SimpleNamespace) -> None:
         return [log.msg.removeprefix(rejected) for log in logged if log.msg.startswith(rejected)]
 
     def ends() -> list[float]:
-        """Return the times of rest of the references that lead to this point, not those of an earlier command."""
+        """Return the end times (s) of the published references to this point, without those of earlier commands."""
         return [
             m.times[-1] + m.blends[-1]
             for m in published

@@ -1,6 +1,6 @@
 """All nodes of the graph in one process with one executor.
 
-Messages and bag are the same as of separate processes; the flight is faster.
+Messages and bag are identical to those of separate processes; the flight takes less time.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ CONTROLLER_NODES = {"tube_mpc": TubeMpcNode, "robust_mpc": RobustMpcNode}
 def nodes() -> Iterator[ProcessNode]:
     """Yield the nodes of the graph in the order of the data flow.
 
-    The plant's parameters say which controller flies and whether a recorder writes.
+    The parameters of the plant determine the controller and whether there is a recorder.
     """
     plant = PlantNode()
     yield plant

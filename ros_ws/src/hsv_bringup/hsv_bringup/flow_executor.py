@@ -1,4 +1,4 @@
-"""Executors for a graph in one process, whose messages flow around a loop."""
+"""Executors that take messages directly from the subscriptions: for all nodes in one process, and for the recorder."""
 
 from __future__ import annotations
 
@@ -11,36 +11,36 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
 
 SWEEPS = 128
-"""Number of sweeps over all subscriptions between checks of services, timers and shutdown."""
+"""Maximum number of sweeps over all subscriptions between checks of services, timers and shutdown."""
 
 BATCH = 0.005
-"""Duration (s) of a batch of messages: several steps at full speed, a quarter of a step in real time."""
+"""Time (s) between batches of messages: several steps at full speed, a quarter of a step in real time."""
 
 LOOKS = 8
-"""Number of batches between checks of everything else; after as many empty batches the executor waits."""
+"""Number of batches between checks of services and timers, and of empty batches before the executor waits."""
 
 _Subscription = tuple[Callable[..., Any], Any, bool, Callable[[Any], Any]]
-"""The function that takes a message, its two arguments, and the callback."""
+"""Function that takes a message from a subscription, its two arguments (type, raw), and the callback."""
 
 
 class FlowExecutor(SingleThreadedExecutor):
-    """An executor that takes messages by subscription, in the order of the nodes, and waits only if there are none.
+    """An executor that sweeps over the subscriptions in the order of the nodes and waits only if there are no messages.
 
-    Latched announcements, received once per run, are left to the wait set.
+    Latched announcements, received once per run, are left to the wait set of the base class.
 
-    With the nodes in the order of the data flow, one sweep is one step of the loop without waiting, because a message
+    If the nodes are in the order of the data flow, one sweep is one step of the loop without waiting: a message
     published in the same process has arrived when its subscription is swept. If it has not (with another middleware),
-    the wait set of the base class wakes on it.
+    the executor waits for it with the wait set.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self._subscriptions: list[_Subscription] = []
         self._flowing: list[_Subscription] = []
-        """The swept subscriptions."""
+        """The subscriptions that are swept."""
 
     def add_node(self, node: Node) -> bool:
-        """Add a node with the subscriptions that it has now; later ones are left to the base class."""
+        """Add a node with its present subscriptions; later ones are left to the base class."""
         for subscription in node.subscriptions:
             taken = (subscription.handle.take_message, subscription.msg_type, subscription.raw, subscription.callback)
             self._subscriptions.append(taken)
@@ -50,14 +50,14 @@ class FlowExecutor(SingleThreadedExecutor):
         return bool(super().add_node(node))
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Sweep while messages come, at most ``SWEEPS`` times; then run one other callback, waiting if none came."""
+        """Sweep while messages arrive, at most ``SWEEPS`` times; then run one other callback, waiting if none came."""
         sweeps = 0
         while sweeps < SWEEPS and self._take(self._flowing, 1):
             sweeps += 1
         super().spin_once(timeout_sec=0.0 if sweeps else timeout_sec)
 
     def drain(self) -> bool:
-        """Take all messages that have arrived, up to ``SWEEPS`` of each subscription; return whether there were any."""
+        """Take all messages that have arrived, at most ``SWEEPS`` per subscription; return whether there were any."""
         return self._take(self._subscriptions, SWEEPS)
 
     def _take(self, subscriptions: list[_Subscription], limit: int) -> bool:
@@ -75,8 +75,8 @@ class FlowExecutor(SingleThreadedExecutor):
 class BatchExecutor(FlowExecutor):
     """An executor that takes messages in batches, for a node outside the loop.
 
-    Waking for every message would take processor time from the nodes in the loop. After ``LOOKS`` empty batches, the
-    wait set of the base class wakes on the next message.
+    Waking up for every message would take processor time from the nodes in the loop. After ``LOOKS`` empty batches, it
+    waits for the next message with the wait set of the base class.
     """
 
     def __init__(self) -> None:
@@ -86,7 +86,7 @@ class BatchExecutor(FlowExecutor):
         """Number of consecutive empty batches."""
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Take all messages that have arrived and wait for the next batch; check everything else from time to time."""
+        """Take all messages that have arrived and sleep until the next batch; run other callbacks every few batches."""
         self._empty = 0 if self.drain() else self._empty + 1
         if self._empty > LOOKS:
             SingleThreadedExecutor.spin_once(self, timeout_sec)

@@ -51,17 +51,17 @@ from hsv_node.process import ProcessNode
 from hsv_node.roles import name_of
 
 RATE = 20.0
-"""Polls per second, Hz: rows of the page, and batches for Foxglove."""
+"""Polling rate (Hz): rows per second for the page, and batches per second for Foxglove."""
 
 WATCHING = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Quality of service of a viewer, for which no publisher waits. At full speed messages may be lost."""
+"""Quality of service of a viewer: publishers do not wait for it, and at full speed it may miss messages."""
 
 
 class LiveExecutor(FlowExecutor):
     """An executor that polls at a fixed rate, because many messages at once cost little more than one."""
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Sleep for the timeout (s), then take all messages that have arrived, and check for replies of services."""
+        """Sleep for ``timeout_sec``, then take all messages that have arrived, and check for responses of services."""
         time.sleep(timeout_sec or 0.0)
         self.drain()
         if any(True for node in self.get_nodes() for _ in node.clients):
@@ -78,13 +78,13 @@ class _Request:
     done: Callable[[Any], None]
     """Function called with the response."""
     refused: Callable[[str], None] = lambda reason: None
-    """Function called with the reason if there is no response."""
+    """Function called with the reason if no response arrives."""
     call: ServiceCall | None = None
     standstill: Standstill = field(default_factory=Standstill)
 
 
 class LiveNode(ProcessNode):
-    """A node that forwards the messages unchanged, samples them for the page, and executes the page's commands."""
+    """A node that forwards all messages to Foxglove, samples them for the page, and executes the page's commands."""
 
     def __init__(self) -> None:
         # Without rosout and parameter services, so that nothing of this node is recorded with the flight.
@@ -101,7 +101,7 @@ class LiveNode(ProcessNode):
         self.page = PageServer(values["live.page_port"], self.hub, layout)
         self._run: Run | None = None
         self._plant = ""
-        """Full name of the plant, once it is found."""
+        """Full name of the plant, or empty until it is found."""
         self._requests: list[_Request] = []
         self._next_poll = time.monotonic()
         # The executor takes subscriptions in this order: a run before its messages, its end after them.
@@ -117,7 +117,7 @@ class LiveNode(ProcessNode):
         print(f"live data: ws://127.0.0.1:{self.foxglove.port} ({viewers})", flush=True)
 
     def poll(self) -> None:
-        """Sample the messages that have arrived, and continue with the commands."""
+        """Sample the messages that have arrived, execute new commands, and continue with pending requests."""
         self._next_poll = max(self._next_poll + 1.0 / RATE, time.monotonic())
         self.hub.sample()
         while not self.page.commands.empty():
@@ -130,7 +130,7 @@ class LiveNode(ProcessNode):
         return max(self._next_poll - time.monotonic(), 0.0)
 
     def close(self) -> None:
-        """Show the last messages, and disconnect the viewers."""
+        """Forward the last messages and disconnect the viewers."""
         if isinstance(self.executor, LiveExecutor):
             self.executor.drain()
         self._check_plant()
@@ -188,7 +188,7 @@ class LiveNode(ProcessNode):
         self.hub.update(limits=dict(zip(INPUT_NAMES, zip(low, high, strict=False), strict=False)))
 
     def _check_plant(self) -> None:
-        """Record the end of a run if the plant, which had published, has disappeared without announcing it."""
+        """Report the run as broken off if the plant has disappeared without announcing its end."""
         if self._run is None or self.hub.status()["ending"] is not None or not self.hub.time:
             return
         if not self.count_publishers(STATE):
@@ -228,7 +228,7 @@ class LiveNode(ProcessNode):
         self._requests.append(_Request(command.node, kind, request, done, refuse))
 
     def _finished(self, request: _Request) -> bool:
-        """Continue with a request; return whether it is answered or abandoned."""
+        """Continue with a request; return whether it has been answered or given up."""
         if request.call and (response := request.call.response()):
             request.call.close()
             request.done(response)
@@ -246,7 +246,7 @@ class LiveNode(ProcessNode):
 
 
 def _service_request(command: Command) -> tuple[Any, Any]:
-    """Return the type of the service that executes a command, and the request."""
+    """Return service type and request message for a command."""
     if isinstance(command, Change):
         parameter = RosParameter(command.parameter.name, value=command.value).to_parameter_msg()
         return SetParameters, SetParameters.Request(parameters=[parameter])

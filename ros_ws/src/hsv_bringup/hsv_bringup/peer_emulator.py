@@ -1,4 +1,4 @@
-"""Emulator of all peers of one node: it feeds the node from a bag, step by step, and records the outputs."""
+"""Emulator of all peers of one node under test: feeds it from a bag, step by step, and records its outputs."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from hsv_node.parameters import declare
 
 
 class PeerEmulatorNode(LockstepNode):
-    """A node that stands in for all peers of the node ``peer_emulator.node``, with the messages of a bag.
+    """A node that replaces all peers of the node under test and publishes their messages from a bag.
 
-    It publishes what they publish, and so the node under test is linked to it alone.
+    The parameter ``peer_emulator.node`` names the node under test, which is linked to the emulator only.
     """
 
     def __init__(self) -> None:
@@ -52,7 +52,7 @@ class PeerEmulatorNode(LockstepNode):
                 if topic in me.subscribes:
                     self._feeds[topic] = publish
             for topic in set(me.publishes) & set(peer.subscribes):
-                # An endpoint for each peer, which is counted; the answers are read once.
+                # The node under test counts an endpoint per peer. Its outputs are read by the subscriptions below.
                 kind = message_class(description.TOPICS[topic])
                 self.create_subscription(kind, topic, lambda message: None, STEP, raw=True)
         for topic in me.publishes:
@@ -64,7 +64,7 @@ class PeerEmulatorNode(LockstepNode):
         self._standstill = Standstill()
 
     def _join(self) -> bool:
-        """Announce a run to the node under test, or all peers as ready to a plant; return whether to start at once."""
+        """Announce a run, or all peers as ready if a plant is under test; return True if feeding need not wait."""
         if self._is_plant:
             self._announcer = self.create_publisher(Ready, description.READY, LATCHED)
             self.create_subscription(Run, description.RUN, self._on_run, LATCHED)
@@ -92,7 +92,7 @@ class PeerEmulatorNode(LockstepNode):
         self._feed()
 
     def _feed(self) -> None:
-        """Send the next step to the node under test if it has answered the previous one."""
+        """Send the next step to the node under test if it has answered the previous one; finish after the last."""
         done = min(self._answered.values())
         # The plant publishes the first state without an input.
         if done >= self._steps and (not self._is_plant or self._fed >= self._steps):
@@ -109,7 +109,7 @@ class PeerEmulatorNode(LockstepNode):
                 self.finish(0)
 
     def poll(self) -> None:
-        """Start when the links are connected; end if the node under test does not answer in time."""
+        """Start when the links are matched; end the process if the node under test does not answer in time."""
         if not self._is_plant and self._ready and self._fed == 0 and self._connected():
             self._feed()
         answers = sum(self._answered.values())
@@ -126,11 +126,11 @@ class PeerEmulatorNode(LockstepNode):
         return fed and all(self.count_publishers(topic) for topic in self._answered)
 
     def stopped(self, signal_number: int) -> int:
-        """Return the exit code of an incomplete replay."""
+        """Return the exit code after a signal, 128 + ``signal_number``: the replay is incomplete."""
         return 128 + signal_number
 
     def close(self) -> None:
-        """Finish the bag with the outputs."""
+        """Finish the bag of recorded outputs."""
         self._output.close()
 
 

@@ -1,4 +1,4 @@
-"""Asking the other nodes of a graph for their parameters, by the services that every node has."""
+"""Requests for the parameters of other nodes, through the parameter services that every node has."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from hsv_node.middleware import ServiceCall
 
 
 class PeerParameters:
-    """The parameters of other nodes, collected while the asking node continues."""
+    """The parameters of other nodes, requested while the requesting node goes on."""
 
     def __init__(self, node: Node, names: Mapping[str, str]) -> None:
-        """Begin to ask for the names of the parameters of the nodes with these full ``names``, by role."""
+        """Request the lists of parameters of other nodes; ``names`` are their full names by role."""
         self._node, self._names = node, names
         self._calls = {
             role: ServiceCall(node, ListParameters, f"{name}/list_parameters", ListParameters.Request())
@@ -24,10 +24,10 @@ class PeerParameters:
         }
         self._listed: dict[str, list[str]] = {}
         self.values: dict[str, dict[str, Any]] = {}
-        """The flat parameters of the nodes that have answered, by role, without those that are not set."""
+        """Values of the set parameters by name, for each role whose node has answered."""
 
     def silent(self) -> dict[str, str]:
-        """Go on asking; return the service that has not answered yet, by role."""
+        """Continue the requests; return the name of the service that has not answered yet, by role."""
         for role, name in self._names.items():
             if role in self.values or not (response := self._calls[role].response()):
                 continue

@@ -1,4 +1,4 @@
-"""The player node: republishes a bag at its own pace, or faster, for a viewer or a node under test."""
+"""The player node: republishes a bag at the recorded pace or another one, for a viewer or a node under test."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ class PlayerNode(ProcessNode):
         Args:
             bag: Bag to play.
             topics: Topics to publish, by their names in the bag.
-            rate: Simulated over wall time.
+            rate: Ratio of simulated to wall time.
             delay: Wall time (s) before the first message, for subscribers to discover the player.
         """
-        # In the namespace of the bag, so that a remapping of the player's own moves its topics as well.
+        # Use the namespace of the bag, so that remapping the namespace of the player also moves the topics.
         super().__init__("player", bag.namespace)
         refuse_unknown(self, "")
         self._rate = rate
@@ -49,7 +49,7 @@ class PlayerNode(ProcessNode):
         for topic in topics:
             name = _relative(bag, topic)
             if topic in exclusive:
-                # A graph that flies would take the messages for its own.
+                # A running graph would take the messages for its own.
                 self.claim(name, "others to play, or a place of their own (ROS_DOMAIN_ID, --namespace)")
             kind = installed_class(topic, bag.topics[topic].type)
             self._outputs[topic] = self.create_publisher(kind, name, _profile(bag.topics[topic].qos))
@@ -78,7 +78,7 @@ class PlayerNode(ProcessNode):
         return self._begins + played - time.monotonic()
 
     def _end(self) -> None:
-        """End when all subscribers have received everything; DDS itself drops one that is gone or hangs."""
+        """Finish when all subscribers have received everything; DDS drops subscribers that are gone or hang."""
         slow = [t for t, p in self._outputs.items() if not p.wait_for_all_acked(Duration(seconds=0.25))]
         if not slow:
             self.finish(0)
@@ -88,7 +88,7 @@ class PlayerNode(ProcessNode):
 
 
 def _instants(bag: Bag, topics: Sequence[str]) -> list[tuple[int, list[tuple[str, bytes]]]]:
-    """Return the messages by simulated time (ns); at equal times they have the order of a recorded step."""
+    """Return simulated time (ns) and messages (topic, bytes) of each instant, in the order of a recorded step."""
     gathered: dict[int, list[tuple[str, bytes]]] = {}
     order = [bag.name_of(role) for role in TOPICS]
     for topic in sorted(topics, key=lambda name: order.index(name) if name in order else -1):

@@ -1,4 +1,4 @@
-"""The recorder node: writes every message of a run to an MCAP bag and confirms to the plant what is written."""
+"""The recorder node: writes every message of a run to an MCAP bag and confirms the written steps to the plant."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class RecorderNode(PeerNode):
         self._names = {topic: self.resolve_topic_name(topic) for topic in self._kinds}
         self._begin_bag()
         self._asks = not {"design.yaml", "scenario.yaml"} <= {path.name for path in self._attachments}
-        """Whether to request the parameters of the nodes, because they are not attached."""
+        """Whether to request the parameters from the nodes, because no files with them were given as attachments."""
         self._peers: PeerParameters | None = None
         self._order = tuple(self._names[topic] for topic in recorded)
         self._stale: set[str] = set()
@@ -78,7 +78,7 @@ class RecorderNode(PeerNode):
         self._held: list[tuple[str, bytes]] = []
         """Topics and bytes of announcements for a run that the plant has not announced to this node yet."""
         self._referenced = False
-        """Whether the first reference of the run has come."""
+        """Whether the first reference of the run has arrived."""
         self._state_messages, self._signals = StepMessages(STATE), Signals()
         for topic, name in zip(recorded, self._order, strict=True):
             self.create_step_subscription(topic, partial(self._on_step_message, name))
@@ -87,7 +87,7 @@ class RecorderNode(PeerNode):
                 profile = LATCHED if topic in LATCHED_TOPICS else STEP
                 callback = partial(self._on_other_message, topic)
                 self.create_subscription(message_class(kind), topic, callback, profile, raw=True)
-        # Last, so that the messages of a run that is reset are taken before the run that replaces it.
+        # Last, so that messages of a run that was reset are received before the run that replaces it is announced.
         self.hear_runs(self._on_raw_run, raw=True)
         self._progress = self.create_publisher(RecorderProgress, RECORDER_PROGRESS, STEP)
 
@@ -103,7 +103,7 @@ class RecorderNode(PeerNode):
         self.get_logger().info(f"recording to {self.bag.directory}")
 
     def _keep_reset_run(self) -> None:
-        """Close the bag of a run that was reset under another name, and begin that of the run which replaces it."""
+        """Close and rename the bag of a run that was reset, and begin a new bag."""
         self.close()
         numbered = (self._directory.with_name(f"{self._directory.name}_reset_{number}") for number in count(1))
         kept = next(path for path in numbered if not path.exists())
@@ -114,7 +114,7 @@ class RecorderNode(PeerNode):
         self._begin_bag()
 
     def start_run(self, run: Run) -> None:
-        """Store the number of steps to expect; a run that replaces one that was reset has a bag of its own."""
+        """Prepare to record a new run; if it replaces a run that was reset, in a new bag."""
         if self._run is not None and not self.over and len(self.publishers_of(RUN)) == 1:
             self._keep_reset_run()
         elif self._complete >= 0:
@@ -129,7 +129,7 @@ class RecorderNode(PeerNode):
         self._nanoseconds_per_step = round(run.period * 1e9)
 
     def end_run(self, how: str) -> None:
-        """Log how the run ended, and the next action of the user."""
+        """Log how the run ended and, if the graph was started by hand, that Ctrl-C closes the bag."""
         super().end_run(f"{how}{'; Ctrl-C closes the bag' if self._asks else ''}")
 
     def missing_links(self) -> list[str]:
@@ -138,7 +138,7 @@ class RecorderNode(PeerNode):
         if missing or self._run is None or not self._asks:
             return missing
         if self._peers is None:
-            # The recorder takes something of every node: all of them are linked to it.
+            # Every node publishes something that is recorded, so that all nodes are linked.
             asked = [node.name for node in graph(self.controller) if not node.foreign]
             self._peers = PeerParameters(self, {role: name for role, name in self.linked.items() if role in asked})
         silent = self._peers.silent()
@@ -150,7 +150,7 @@ class RecorderNode(PeerNode):
         return missing
 
     def _keep_parameters(self, run: Run, values: dict[str, dict[str, Any]]) -> None:
-        # Not at the top: the components' tables take their time, and a prepared run does without.
+        # Imported only here: the parameter tables load slowly, and a prepared run does not need them.
         from hsv.bags.parameter_sections import disagreements
         from hsv.control.design import digest
         from hsv.graph.preparation import provenance, recorded_files
@@ -174,7 +174,7 @@ class RecorderNode(PeerNode):
                 return
             self._stale.discard(topic)
         if stamp <= self._now and self._complete >= 0:
-            # Each topic keeps its order: whoever sends this is not of the graph.
+            # DDS keeps the order of a topic: the sender does not belong to this graph.
             self.get_logger().error(
                 f"{topic} at {stamp * 1e-9:.2f} s: is written already, ignored", throttle_duration_sec=LOG_INTERVAL
             )
@@ -191,12 +191,12 @@ class RecorderNode(PeerNode):
         self._state_messages.unpack(messages[self._names[STATE]], self._signals)
         final = self._complete >= self._last_step or self._signals.status != VehicleState.RUNNING
         if self._complete % CONFIRMATION_INTERVAL == 0 or final:
-            # What is confirmed is on its way to the disk, whatever happens to this process.
+            # Flush first, so that confirmed steps survive the end of this process.
             self.bag.flush()
             self._progress.publish(RecorderProgress(step=self._complete))
 
     def _on_raw_run(self, data: bytes) -> None:
-        """Begin the run, in a bag of its own if it replaces another, and write what was announced for it before."""
+        """Begin the announced run, and write the announcements for it that arrived earlier."""
         held, self._held, self._referenced = self._held, [], False
         self._on_run(deserialize_message(data, Run))
         self._on_other_message(RUN, data)
@@ -210,7 +210,7 @@ class RecorderNode(PeerNode):
             self._held.append((topic, data))
 
     def _is_of_this_run(self, topic: str, data: bytes) -> bool:
-        """Return whether a message is not an announcement for a run that the plant has not announced to this node."""
+        """Return whether a message belongs to the current run, and not to a run whose announcement is yet to arrive."""
         if topic == READY:
             return self._run is not None and deserialize_message(data, Ready).run_id == self._run.run_id
         if topic != REFERENCE:
@@ -223,7 +223,7 @@ class RecorderNode(PeerNode):
         return of_this_run
 
     def close(self) -> None:
-        """Write the messages of an unfinished step and what is held, and finish the bag."""
+        """Write the messages of incomplete steps and the announcements held back, and finish the bag."""
         for stamp in sorted(self._pending):
             for topic in sorted(self._pending[stamp], key=self._order.index):
                 self.bag.write(topic, stamp, self._pending[stamp][topic])

@@ -1,7 +1,7 @@
-"""The bare ring: processes that pass messages on as the graph does and compute nothing; ``hsv bench`` starts them.
+"""The bare ring, a benchmark: processes that exchange the messages of the graph and compute nothing.
 
-A process prints ``ready`` when its links stand. A line on standard input starts the plant, which prints in the end how
-many seconds the laps took. Then all processes wait until they are killed.
+``hsv bench`` starts them. A process prints ``ready`` when its links are matched. A line on standard input starts the
+plant, which finally prints the time (s) of all laps. Every process ends after another line on standard input.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ _FILLED = {
     description.FILTERED_STATE: {"filter_state": [0.0] * 2},
     description.TUBE_STATUS: {"error": [0.0] * 7, "tube_centre": [0.0] * 7, "tube_half_width": [0.0] * 7},
 }
-"""Arrays with as many elements as in a flight of Case 1."""
+"""Array fields with as many elements as in Case 1, by topic."""
 
 
 class RingNode:
-    """A node of the graph without its work: it publishes when all inputs of a step have arrived.
+    """A node of the graph that computes nothing and publishes when all inputs of a step have arrived.
 
     Args:
         role: The name of the node in the graph.
-        laps: The number of laps until the node has finished.
-        bag: A new directory; the recorder writes its inputs to it.
+        laps: The number of laps to run; in a lap, every message of one step is exchanged.
+        bag: A new directory, to which the recorder writes its inputs.
     """
 
     def __init__(self, role: str, laps: int, bag: Path) -> None:
@@ -61,14 +61,14 @@ class RingNode:
                 self._bag.add_topic(Topic(topic, kind, definition(kind), type_hash(kind), usual_qos(STEP.depth)))
 
     def matched(self) -> bool:
-        """Return whether all links of the graph description are connected."""
+        """Return whether all links of the graph description are matched."""
         links = [topic for topic, _ in description.links(self.role, description.TUBE_MPC.name, True)]
         counts = {topic: publisher.get_subscription_count() for topic, publisher, _ in self._outputs}
         counts |= {topic: subscription.get_publisher_count() for topic, subscription in self._inputs.items()}
         return all(count >= links.count(topic) for topic, count in counts.items())
 
     def publish(self) -> None:
-        """Publish the messages of this node for a step."""
+        """Publish the messages of this node for the current lap."""
         for topic, publisher, message in self._outputs:
             if topic != description.CLOCK:
                 message.step = self.lap

@@ -1,4 +1,4 @@
-"""Print the topics of a running graph, or the messages of one."""
+"""Print the topics of a running graph, or the messages of one topic."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from hsv_node.middleware import installed_class
 from hsv_node.roles import node_in_role
 
 DEPTH = 1000
-"""Depth of the queue of messages that arrive while this process prints."""
+"""Depth of the queue for messages that arrive while this process prints."""
 
 _PUBLISHED = tuple(node.publishes[0] for node in graph() if node.publishes)
-"""Topic that every node publishes."""
+"""The first topic that each node of the graph publishes."""
 
 
 def decoder(topic: str, kind: str) -> Callable[[bytes], dict[str, Any]]:
-    """Return a function that returns the fields of a message with names and units as in an export.
+    """Return a function that decodes the bytes of a message to values by name and unit, as in ``hsv export``.
 
-    It uses the installed definition of ``kind``.
+    It uses the installed definition of the message type ``kind``.
     """
     text = definition(kind)
     types = message_types([(kind, text)], topic)
@@ -44,7 +44,7 @@ def decoder(topic: str, kind: str) -> Callable[[bytes], dict[str, Any]]:
 
 
 def print_topic(client: GraphClient, options: SimpleNamespace) -> None:
-    """Print the messages of the topic ``options.name``, or the topics if it is empty."""
+    """Print the messages of the topic ``options.name``, or the list of topics if it is empty."""
     (_print_messages if options.name else _print_topics)(client, options)
 
 
@@ -61,7 +61,7 @@ def _print_topics(client: GraphClient, options: SimpleNamespace) -> None:
 
 
 def _topics(client: GraphClient, name: str = "") -> dict[str, list[str]]:
-    """Return the topics of the domain with their types, when all are known or ``name`` is published."""
+    """Return the types of all topics of the domain by topic; wait until all are known or ``name`` is published."""
 
     def enough() -> bool:
         return bool(name and client.count_publishers(name))
@@ -102,17 +102,17 @@ def _print_messages(client: GraphClient, options: SimpleNamespace) -> None:
 
 
 def _resolved(client: GraphClient, name: str) -> str:
-    """Return the full name that a topic has for this node."""
+    """Return the full name of the topic ``name`` in the namespace of ``client``."""
     try:
         return str(client.resolve_topic_name(name))
     except rclpy_implementation.RCLError as error:
-        # Between what failed and where in its sources rcl says why.
+        # The reason is in the middle of rcl's text, before the place in its source code.
         why = str(error).partition(": ")[2].partition(", at /")[0]
         raise ParameterError(f"name = {name!r}: expected the name of a topic, such as /hsv/state ({why})") from None
 
 
 def _messages(client: GraphClient, name: str, received: list[bytes]) -> Iterator[bytes]:
-    """Yield the messages of a topic as they arrive, as long as it has a publisher."""
+    """Yield the messages in ``received`` as they arrive, as long as the topic has a publisher."""
     came = False
 
     def known() -> bool:
@@ -126,7 +126,7 @@ def _messages(client: GraphClient, name: str, received: list[bytes]) -> Iterator
 
 
 def _lines(name: str, fields: dict[str, Any]) -> Iterator[str]:
-    """Yield the lines that show a message: quantity, value, unit."""
+    """Yield the lines to print for a message: the topic, then name, value and unit of each field."""
     yield name
     width = max(len(field.partition(" [")[0]) for field in fields)
     for field, value in fields.items():

@@ -22,7 +22,7 @@ _CLEARED = "\r\x1b[K"
 
 
 def watch_flight(client: GraphClient, options: SimpleNamespace) -> None:
-    """Print where the flight is, on a line that is updated, until it ends."""
+    """Print the state of the flight until it ends: on one updated line in a terminal, otherwise a line per update."""
     system = UnitSystem(options.units)
     latest: dict[str, Any] = {}
     for topic in (STATE, NOMINAL, TUBE_STATUS, ACTUATOR):
@@ -56,7 +56,7 @@ def watch_flight(client: GraphClient, options: SimpleNamespace) -> None:
 
 
 def _snapshot(state: Any, nominal: Any, status: Any | None, actuator: Any) -> dict[str, Any]:
-    """Return numbers (SI) of a step from its messages; no tube level for a controller or a design without a tube."""
+    """Return the displayed values (SI) of a step by name; the tube level is None without a tube."""
     return {
         "time": state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec,
         "altitude": state.altitude,
@@ -67,7 +67,7 @@ def _snapshot(state: Any, nominal: Any, status: Any | None, actuator: Any) -> di
 
 
 def _in_words(values: dict[str, Any], system: UnitSystem) -> str:
-    """Return a snapshot as text with a fixed number of characters."""
+    """Return the values of a snapshot as text with columns of fixed width; the active faults come last."""
     altitude, length = in_system(values["altitude"], "m", system)
     error, speed = in_system(values["velocity_error"], "m/s", system)
     level = "-" if values["tube_level"] is None else significant(values["tube_level"])

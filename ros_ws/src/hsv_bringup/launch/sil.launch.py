@@ -60,10 +60,10 @@ GRACE = 20
 
 
 class Flight:
-    """The processes of one run: when the first ends, the others are ended, and the flight is concluded."""
+    """The processes of one run: when a node of the flight ends, the others are stopped and the flight is concluded."""
 
     def __init__(self, hsv: str, run: dict[str, Any], options: dict[str, str]) -> None:
-        """Take the path of the command ``hsv``, the output of ``hsv prepare`` and the launch arguments by name."""
+        """Store the path of the command ``hsv``, the output of ``hsv prepare``, and the launch arguments by name."""
         self._hsv, self._run, self._options = hsv, run, options
         self._running: dict[Action, dict[str, Any]] = {}
         self._ending = False
