@@ -10,7 +10,7 @@ from hsv.control.design import find_design
 
 @pytest.fixture
 def campaign(hsv, tmp_path):
-    """Fly a small campaign with the command."""
+    """Return a function that flies a small campaign with the command."""
     short_scenario(tmp_path, duration=3, fault=2)
 
     def fly(*words):

@@ -58,7 +58,7 @@ def test_view_with_3d_opens_a_copy_with_pictures_that_is_made_once(hsv, bag, ask
     assert ran.code == 0 and arguments() == f"{scene}\n" and "foxglove.json" in ran.out
     made = scene.stat().st_mtime_ns
     assert hsv("view", str(bag.path.parent)).code == 0 and scene.stat().st_mtime_ns == made
-    # The folder of the copy is not a bag, and hsv info still works.
+    # The copy in the folder is not a bag, and hsv info still works.
     assert hsv("info", str(bag.path.parent)).code == 0
 
 

@@ -11,7 +11,7 @@ FAULTS = "elevator_loss,pitch_rate_drop_out"
 
 @pytest.fixture
 def resilience(hsv, tmp_path):
-    """Fly two controllers with two faults in short flights with the command."""
+    """Return a function that flies two controllers with two faults in short flights with the command."""
     short_scenario(tmp_path, duration=6, fault=2)
     (tmp_path / "rigid.toml").write_text('extends = "short.toml"\n[notch]\nenabled = false\n')
 

@@ -113,7 +113,7 @@ def flown(tmp_path_factory):
 
 @pytest.fixture
 def crafted(flown, tmp_path):
-    """Return a copy of a bag whose attachments name a controller's code in one section of the nodes."""
+    """Return a function that copies a bag whose attachments name a controller's code in one section of the nodes."""
 
     def make(section):
         parameters = yaml.safe_load(flown.text("scenario.yaml"))

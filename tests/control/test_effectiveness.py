@@ -83,7 +83,7 @@ def test_half_an_elevator_is_survived_by_the_active_law_alone():
 
 @pytest.mark.long
 def test_no_false_alarm_at_any_corner():
-    """The estimator never reports a fault, so that the flight has the bits of the one with the passive law."""
+    """Without an alarm, a flight with the active law has the same bits as one with the passive law."""
     passive, watched = (
         assemble_flight(load_scenario(name, {"fault[0].effectiveness": 1.0})) for name in ("case1", "case1_active")
     )

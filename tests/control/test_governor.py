@@ -56,7 +56,7 @@ def short_step():
 
 
 def problem(length, minimum=NARROW["minimum"], maximum=NARROW["maximum"], rate=(np.inf, np.inf), target=NEAR):
-    """Return what is wrong with a ramp of ``length`` periods to a point near the start, or None."""
+    """Return why a ramp of ``length`` periods to a point near the start does not fit; empty if it does."""
     corners = (SHORT_BLEND, *START), (SHORT_BLEND + length * PERIOD, *target)
     return governor(minimum, maximum, rate)._problem([Corner(*corner, SHORT_BLEND) for corner in corners], AT_REST)
 

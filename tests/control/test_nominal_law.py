@@ -59,7 +59,7 @@ STEP = START.state - REFERENCE.state
 
 @pytest.fixture(scope="module")
 def flight():
-    """Return the results of the nominal law over a flight in which the nominal state is the measured deviation."""
+    """Return the results of a nominal flight: every measurement is the nominal state."""
     trajectory = NominalTrajectory(DESIGN, TRAJECTORY, KothareLaw(DESIGN, DATA))
     results, measured = [], START.state
     for _ in range(2 * SOLVE_STEPS + 1):

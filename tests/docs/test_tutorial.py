@@ -16,7 +16,7 @@ PAGES = {
     "reading_a_bag": pytest.mark.long,
     "campaign": pytest.mark.long,
 }
-"""The pages; those that fly over DDS or many flights take longer than all others together."""
+"""The pages with their marks. Those that fly over DDS or many flights take longer than all others together."""
 
 READ = ("offline_design", "src")
 """Folders of the checkout that the pages read."""

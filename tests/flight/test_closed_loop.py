@@ -16,7 +16,7 @@ TWO_NOTCHES = {
     "notch__zero_damping": [0.02, 0.05],
     "notch__pole_frequency": [15.0, 19.5],
     "notch__pole_damping": [0.5, 0.2],
-    # The invariant set of the shipped design holds only for the design's own filter of one section.
+    # The invariant set of the shipped design holds only for a filter of one section.
     "tube__centre": [],
     "tube__shape": [],
     "tube__half_width": [],

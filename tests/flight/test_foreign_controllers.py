@@ -58,7 +58,7 @@ class Mine:
 
 
 class Late(Mine):
-    """A controller that fails after step 20."""
+    """A controller with a wrong answer from step 20 on."""
 
     answer = np.nan, 0.0
 

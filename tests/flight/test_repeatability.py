@@ -110,7 +110,7 @@ def scenario(controller):
 
 @pytest.fixture
 def found(monkeypatch):
-    """Return the differences by check, without starting processes for load."""
+    """Return a function that returns the differences by check; no processes are started for load."""
     monkeypatch.setattr(repeatability, "under_load", lambda *_: repeatability.Finding("under load", 0, ""))
 
     def differing(controller):

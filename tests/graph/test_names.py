@@ -108,7 +108,7 @@ def test_remapped_by_hand_with_duplicates_and_parameters_dumped(processes):
 
 
 def _ask(processes):
-    """Find the nodes by their roles. Every changed setting is restored."""
+    """Find the nodes by their roles; the changed settings get the values that they already have."""
     injected = processes.run("hsv", "fault", "inject", FUEL, "loss_of_effectiveness", "1")
     assert injected.returncode == 0 and f"1 of {FUEL} from step " in last_line(injected), injected.stdout
     changed = processes.run("hsv", "set", "tau", "1")

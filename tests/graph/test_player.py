@@ -42,7 +42,7 @@ def test_a_plant_that_waits_does_not_fly_on_what_is_played(processes, bag):
         words = ["--topic", "/hsv/actuator", "--no-clock", "--delay", "2"]
 
         def ignored():
-            # The plant ignores messages that are played before it has discovered the player, which takes time.
+            # Messages played before the plant has discovered the player do not arrive; discovery may take some time.
             done = processes.run("hsv", "play", bag, *words)
             assert done.returncode == 0, done.stdout
             return "ignored" in log.read_text()

@@ -1,4 +1,4 @@
-"""Detection of a standstill: a process is slow as long as anything changes or it uses processor time."""
+"""A standstill: nothing changes and no processor time is used; a slow process does not count as one."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""Turbulence by its autocorrelation, gusts by their mean, density, and speed of sound by a table."""
+"""Turbulence by its autocorrelation, gusts by their momentum, density, and speed of sound by a table."""
 
 import math
 

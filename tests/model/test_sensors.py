@@ -31,7 +31,7 @@ def measured(values, states=STATES, faults=(), seed=0):
 
 
 def of_pitch_rate(states=STATES, faults=(), seed=0, **fields):
-    """Return the pitch rate measured by a sensor with these fields; all other channels must be ideal."""
+    """Return the measured pitch rate of a sensor with these fields, and assert that the other channels are ideal."""
     values = {f"sensors.pitch_rate.{name}": [float(value)] for name, value in fields.items()}
     result = measured(values, states, faults, seed)
     others = [i for i in range(9) if i != Q]

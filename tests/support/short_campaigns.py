@@ -18,7 +18,7 @@ def short(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def planned(short):
-    """Return a planned campaign of short flights."""
+    """Return a function that plans a campaign of short flights."""
 
     def make(**settings):
         return plan(

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2].resolve()
 
 @pytest.fixture
 def here(tmp_path, monkeypatch):
-    """Return a checkout with one package of each kind, and the log of the set-up's actions."""
+    """Return a checkout with one package of each kind, which the set-up takes for its own."""
     monkeypatch.setattr(setup, "ROOT", tmp_path)
     monkeypatch.setattr(setup, "LOG", tmp_path / "log")
     for name in ("setup.py", "package.xml", "flyer/__init__.py", "flyer/table.toml", "flyer/core/core.h"):

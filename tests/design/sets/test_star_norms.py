@@ -15,7 +15,7 @@ from hsv.design.sets.star_norms import StarNorms
 
 @pytest.fixture(scope="module")
 def tight():
-    """Return the star norms of the shipped design ``tight``, whose half-widths they reduce."""
+    """Return the invariant set of the shipped design ``tight``, which star norms reduce."""
     return load_certified(find_design("tight")).invariant_set()
 
 

@@ -217,7 +217,7 @@ def test_a_stopped_worker_is_reported_and_waited_for(monkeypatch):
 
 
 def alive(pid):
-    """Return whether a process exists, be it only as a zombie."""
+    """Return whether a process runs; one that has ended but not been waited for does not."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except (FileNotFoundError, ProcessLookupError):
