@@ -56,7 +56,11 @@ class GraphClient(Node):
         return runs[-1]
 
     def name_of(self, role: NodeDescription, kind: type) -> str:
-        """Return the full name of the topic or service of type ``kind`` of the node in ``role``; else a RunError."""
+        """Return the full name of the topic or service of type ``kind`` of the node in ``role``.
+
+        Raises:
+            RunError: There is no such node or service.
+        """
         if name := self._name_of(role, kind):
             return name
         raise RunError(f"no {role.name} in {self.where}: expected a node that publishes {role.known_by}")
@@ -170,7 +174,11 @@ def answer(text: str, values: Mapping[str, Any], as_json: bool) -> None:
 
 
 def acting_from(run: Run, step: int) -> tuple[str, dict[str, Any]]:
-    """Return the time of ``step`` as text and as the values ``step`` and ``time_s``; a RunError after the last step."""
+    """Return the time of ``step`` as text, and ``step`` and ``time_s`` as values by name.
+
+    Raises:
+        RunError: The run ends before ``step``.
+    """
     if step > run.last_step:
         raise RunError(f"the run ends with step {run.last_step}: what begins at step {step} does not act any more")
     time = step * run.period

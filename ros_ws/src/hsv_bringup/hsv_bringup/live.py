@@ -58,7 +58,7 @@ WATCHING = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 class LiveExecutor(FlowExecutor):
-    """An executor that polls at a fixed rate, because many messages at once cost little more than one."""
+    """An executor that polls at a fixed rate, because taking many messages costs little more than taking one."""
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Sleep for ``timeout_sec``, then take all messages that have arrived, and check for responses of services."""

@@ -16,7 +16,7 @@ class PeerParameters:
     """The parameters of other nodes, requested while the requesting node goes on."""
 
     def __init__(self, node: Node, names: Mapping[str, str]) -> None:
-        """Request the lists of parameters of other nodes; ``names`` are their full names by role."""
+        """Request the parameter names of other nodes; ``names`` are the full names of these nodes by role."""
         self._node, self._names = node, names
         self._calls = {
             role: ServiceCall(node, ListParameters, f"{name}/list_parameters", ListParameters.Request())
@@ -24,10 +24,10 @@ class PeerParameters:
         }
         self._listed: dict[str, list[str]] = {}
         self.values: dict[str, dict[str, Any]] = {}
-        """Values of the set parameters by name, for each role whose node has answered."""
+        """Parameters that have a value, by role of the node and name of the parameter, for nodes that have answered."""
 
     def silent(self) -> dict[str, str]:
-        """Continue the requests; return the name of the service that has not answered yet, by role."""
+        """Continue the requests; return the services that have not answered yet, by role of their nodes."""
         for role, name in self._names.items():
             if role in self.values or not (response := self._calls[role].response()):
                 continue

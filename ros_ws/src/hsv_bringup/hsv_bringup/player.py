@@ -32,7 +32,7 @@ class PlayerNode(ProcessNode):
     """A node that publishes the recorded bytes of a bag; messages of equal simulated time are published together."""
 
     def __init__(self, bag: Bag, topics: Sequence[str], rate: float, delay: float) -> None:
-        """Prepare to play.
+        """Create the publishers and read the messages.
 
         Args:
             bag: Bag to play.
@@ -107,7 +107,7 @@ def _relative(bag: Bag, topic: str) -> str:
 def _profile(qos: Qos) -> QoSProfile:
     reliable, latched = qos.reliability is QosReliability.RELIABLE, qos.durability is QosDurability.TRANSIENT_LOCAL
     return QoSProfile(
-        depth=max(qos.depth, LATCHED.depth if latched else 1),  # rosbag2 records 0 where it was not known
+        depth=max(qos.depth, LATCHED.depth if latched else 1),  # rosbag2 records 0 if the depth was unknown
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )

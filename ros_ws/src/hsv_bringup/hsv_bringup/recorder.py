@@ -114,7 +114,7 @@ class RecorderNode(PeerNode):
         self._begin_bag()
 
     def start_run(self, run: Run) -> None:
-        """Prepare to record a new run; if it replaces a run that was reset, in a new bag."""
+        """Prepare to record a new run; a run that replaces one that was reset gets a new bag."""
         if self._run is not None and not self.over and len(self.publishers_of(RUN)) == 1:
             self._keep_reset_run()
         elif self._complete >= 0:
@@ -210,12 +210,12 @@ class RecorderNode(PeerNode):
             self._held.append((topic, data))
 
     def _is_of_this_run(self, topic: str, data: bytes) -> bool:
-        """Return whether a message belongs to the current run, and not to a run whose announcement is yet to arrive."""
+        """Return whether a message belongs to the current run, and not to one that is not announced here yet."""
         if topic == READY:
             return self._run is not None and deserialize_message(data, Ready).run_id == self._run.run_id
         if topic != REFERENCE:
             return True
-        # A reference does not name its run, but the first of every run is flown from step 0 on.
+        # A reference does not name its run, but the first reference of every run applies from step 0 on.
         reference = deserialize_message(data, Reference)
         first = reference.step == 0 and reference.status == Reference.FLOWN
         of_this_run = self._run is not None and not (first and self._referenced)

@@ -28,7 +28,7 @@ _PUBLISHED = tuple(node.publishes[0] for node in graph() if node.publishes)
 
 
 def decoder(topic: str, kind: str) -> Callable[[bytes], dict[str, Any]]:
-    """Return a function that decodes the bytes of a message to values by name and unit, as in ``hsv export``.
+    """Return a function that decodes a message (bytes) to values by name and unit, such as ``altitude [m]``.
 
     It uses the installed definition of the message type ``kind``.
     """
@@ -61,7 +61,7 @@ def _print_topics(client: GraphClient, options: SimpleNamespace) -> None:
 
 
 def _topics(client: GraphClient, name: str = "") -> dict[str, list[str]]:
-    """Return the types of all topics of the domain by topic; wait until all are known or ``name`` is published."""
+    """Wait until all topics are known or ``name`` is published; return the types of each topic of the domain."""
 
     def enough() -> bool:
         return bool(name and client.count_publishers(name))

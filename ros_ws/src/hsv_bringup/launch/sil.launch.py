@@ -71,7 +71,7 @@ class Flight:
         self._verdict = ""
 
     def actions(self) -> list[Action]:
-        """Return the actions that start the nodes."""
+        """Return the launch actions that start the nodes."""
         for node in self._run["nodes"]:
             action = Node(
                 package=node["package"],

@@ -23,7 +23,7 @@ from hsv_node.parameters import declare, declare_design, declare_vehicle, given
 
 
 class TubeNode(BlockNode):
-    """A controller node that reports the tube status: where the tube error lies in the invariant set.
+    """A controller node that reports the tube status, that is, where the error lies in the invariant set.
 
     Raises:
         ParameterError: The parameter ``controller`` names another controller.

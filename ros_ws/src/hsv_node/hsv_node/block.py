@@ -32,7 +32,7 @@ class BlockNode(PeerNode):
         self.signals = Signals()
         self._received: dict[str, tuple[int, bytes]] = {}
         """Step and bytes of the latest message of each topic."""
-        # In the order of the role: other nodes wait for the first and work on it while the rest is published.
+        # In the order of the role: other nodes wait for the first message and process it while the rest is published.
         self._answers = [(StepMessages(topic).pack, self.create_step_publisher(topic)) for topic in role.publishes]
         self._step_times = array("d")
         """Wall time (s) of each step of the component in this run."""
@@ -77,7 +77,7 @@ class BlockNode(PeerNode):
         return False
 
     def on_message(self, topic: str, message: bytes) -> None:
-        """Store the bytes of a message, and execute the step that needs it if nothing else is missing."""
+        """Store a message, and execute the step that needs it if no other message is missing."""
         step = self.messages[topic].step(message)
         self._received[topic] = step, message
         self.answer(step + self._delays[topic])

@@ -147,7 +147,7 @@ class LockstepNode(ProcessNode):
         return full_name(*found) if found else None
 
     def log_waiting(self, missing: Sequence[str], decides: bool = False) -> None:
-        """Log ``missing`` after 2 s, then every 10 s, in the end as a warning if this node ``decides`` the start."""
+        """Log ``missing`` after 2 s and then every 10 s, as a warning if this node ``decides`` the start."""
         now = time.monotonic()
         if now < self._next_log:
             return
@@ -159,7 +159,7 @@ class LockstepNode(ProcessNode):
             self.get_logger().info(words)
 
     def publishers_of(self, topic: str) -> list[str]:
-        """Return the full names of the publishers of ``topic``, one per endpoint."""
+        """Return the full names of the nodes that publish ``topic``, one per endpoint."""
         return sorted(full_name(e.node_name, e.node_namespace) for e in self.get_publishers_info_by_topic(topic))
 
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
@@ -230,7 +230,10 @@ class PeerNode(LockstepNode):
         self.create_subscription(VehicleState, description.LAST_STATE, self._on_last_state, LATCHED)
 
     def hear_runs(self, callback: Callable[[Any], None], raw: bool = False) -> None:
-        """Subscribe to announced runs, after all topics that must be received first; with ``raw`` as message bytes."""
+        """Subscribe to announced runs, after all topics that must be received first.
+
+        With ``raw``, ``callback`` is called with the bytes of the message.
+        """
         links = SubscriptionEventCallbacks(matched=self._on_plant)
         self._runs = self.create_subscription(Run, description.RUN, callback, LATCHED, event_callbacks=links, raw=raw)
 

@@ -54,7 +54,7 @@ def run_node(
     if not several:
         given = (value.partition(":=")[0] for flag, value in pairwise(words) if flag in ("-p", "--param"))
         ProcessNode.own_only = frozenset(given)
-    # The handler only requests the end; the loop checks it at least four times a second and never waits for a message.
+    # The handler only requests the end; the loop checks the request at least four times a second.
     stop: list[int] = []
     take_signals(lambda received, _frame: stop.append(received))
     ignore_ctrl_c_at_end()

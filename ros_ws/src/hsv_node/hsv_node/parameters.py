@@ -86,7 +86,7 @@ def declare_design(node: Node, extra: tuple[Parameter, ...] = ()) -> tuple[dict[
     """
     from hsv.control.design import DESIGN_PARAMETERS, design_of, find_design, read_parameters
 
-    # A complete design is known by its digest; the shipped one then need not be parsed.
+    # If a complete design is given (with name or hash), the shipped one need not be parsed.
     whole = given(node, "design.hash") or given(node, "design.name")
     shipped: dict[str, Any] = {}
     with suppress(DesignError):  # an installation without designs

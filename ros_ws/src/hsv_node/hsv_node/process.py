@@ -1,4 +1,4 @@
-"""Base class of all nodes, with an exit code, and a guard against a process that does not end."""
+"""Base class of all nodes, with an exit code, and a time limit for the end of their process."""
 
 from __future__ import annotations
 

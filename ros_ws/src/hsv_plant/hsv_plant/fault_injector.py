@@ -41,7 +41,7 @@ class FaultInjectorNode(BlockNode):
         self._due_step = 0
 
     def on_message(self, topic: str, message: bytes) -> None:
-        """Process a command; if it has an unexpected step or time, end the run."""
+        """Process a command; end the run if the step or time in it is not the expected one."""
         if self.announced is not None:
             step, (seconds, nanoseconds) = self.messages[topic].step(message), stamp_of(self._due_step, self._period)
             if step != self._due_step or stamp_in(message) != seconds * 10**9 + nanoseconds:

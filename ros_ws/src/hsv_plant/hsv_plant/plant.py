@@ -63,7 +63,7 @@ class PlantNode(LockstepNode):
         self.plant = Plant.from_parameters(self.values)
         self._peers = [node for node in peers(PLANT, self.controller, self.recorded) if not node.foreign]
         self._ready: set[str] = set()
-        # The measurement first: the other nodes work on it while the rest is published.
+        # The measurement first: the other nodes process it while the rest is published.
         self._answers = [(StepMessages(topic).pack, self.create_step_publisher(topic)) for topic in PLANT.publishes]
         self._actuator_messages = StepMessages(ACTUATOR)
         self.create_step_subscription(ACTUATOR, self._on_actuator)
@@ -96,7 +96,7 @@ class PlantNode(LockstepNode):
         self._advance()
         self._started = False
         self._published = False
-        """Whether step 0 is published, which a flight that starts paused does not do before it is resumed."""
+        """Whether step 0 has been published; a flight that starts paused publishes it when it is resumed."""
         self._recorded_step = -1
         self._answered = False
         """Whether the input of the actuators for this step has arrived."""

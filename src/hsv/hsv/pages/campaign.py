@@ -195,7 +195,7 @@ def histogram(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _repeated(results: Results, worst: int) -> dict[str, Flight]:
-    """Repeat the flight of the unchanged scenario and flight ``worst``; return those that can be flown, by name."""
+    """Repeat the flight of the unchanged scenario and flight number ``worst``; return them by name, if flyable."""
     flights = {}
     if results.flyable:
         runner = results.sample_runner
@@ -207,7 +207,7 @@ def _repeated(results: Results, worst: int) -> dict[str, Flight]:
 
 
 def _windows(results: Results) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return first step and time (s) of each envelope window, the indices of those with data, and the end time (s)."""
+    """Return first step and time (s) of each window, the indices of windows with data, and the end time (s)."""
     campaign = results.campaign
     plant = Plant.from_parameters({**campaign.design, **campaign.scenario.parameters()})
     reached = np.flatnonzero(np.isfinite(results.envelope.low).all(axis=1))

@@ -16,7 +16,7 @@ from hsv.model.signals import INPUT_NAMES
 from hsv.pages.text import quantity
 
 JOIN_WITHIN = 0.5
-"""Longest time (s) between two events of the same text that are shown as one."""
+"""Longest time (s) between two events with the same text that are merged into one."""
 
 DIAGNOSTICS_PERIOD = 1.0
 """Simulated time (s) between the diagnostics of a node."""
@@ -34,7 +34,7 @@ _DIAGNOSTIC_LEVELS = {1: "warning", 2: "error", 3: "error"}
 
 @dataclass(frozen=True)
 class Event:
-    """An event from ``start`` to ``end`` (s): equal for an instant, None if it lasts until the end of the flight."""
+    """An event; ``start`` and ``end`` (s) are equal for an instant, and ``end`` is None if the event never ends."""
 
     start: float
     end: float | None
@@ -72,7 +72,7 @@ def _instant(time: float, kind: str, text: str, subject: str) -> Event:
 
 
 def _messages(bag: Bag, topic: str) -> Iterator[tuple[float, Any]]:
-    """Yield the time (s) and the decoded message of each message of a topic; nothing if the bag lacks the topic."""
+    """Yield time (s) and decoded message for every message of a topic; nothing if the bag lacks the topic."""
     for time, message in bag.decode(topic) if topic in bag.roles else ():
         yield time * 1e-9, message
 

@@ -40,7 +40,7 @@ class FlightCurves:
     curves: dict[str, list[DrawnCurve]] = field(default_factory=dict)
 
     def add(self, panel: Panel, *curves: DrawnCurve) -> None:
-        """Add a panel with its curves, but not elastic states that are always zero, as those of a rigid vehicle."""
+        """Add a panel with its curves; a panel of elastic states that are always zero (rigid vehicle) is left out."""
         if panel.group == "elastic" and not any(curve.y.any() for curve in curves):
             return
         self.panels[panel.name] = panel
@@ -74,7 +74,7 @@ class ReportedRun:
     parameters: dict[str, dict[str, Any]]
     """Parameters in the bag by name, under the keys ``scenario`` and ``design``."""
     incomplete: str
-    """Numbers of complete and of all steps as text; empty if the bag is complete."""
+    """The number of complete steps and the number of all steps, as text; empty if the bag is complete."""
 
     @property
     def custom(self) -> dict[str, str]:

@@ -19,7 +19,7 @@ def foxglove_layout(name_of: Callable[[str], str]) -> str:
     """Return the layout as JSON.
 
     Args:
-        name_of: Function that returns the name of a topic in the displayed graph from its default name.
+        name_of: Function that maps the default name of a topic to its name in the displayed graph.
     """
     settings: dict[str, Any] = {}
 

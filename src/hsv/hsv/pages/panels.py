@@ -1,4 +1,4 @@
-"""The panels of report and live page, that is, their plots over time, and the curves in each."""
+"""The panels of report and live page: plots over time, with the curves that each shows."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ MEASUREMENT_ERRORS = {
     name: Panel(f"measurement_error_{name}", f"Measured less true {name.replace('_', ' ')}", unit, "sensors")
     for name, unit in zip(STATE_NAMES, STATE_UNITS, strict=True)
 }
-"""Panels of the measured minus the true state, by name of the state; the curves come from two topics."""
+"""Panels of measurement errors, by name of the state; an error is the difference of two topics."""
 
 AIR_PANELS = {
     "wind_forward": Panel("wind_forward", "Wind from behind", "m/s", "air"),

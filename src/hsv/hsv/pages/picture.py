@@ -24,7 +24,7 @@ Tick = tuple[str, float]
 
 
 class Drawing(NamedTuple):
-    """A plot of a picture as SVG."""
+    """One plot of a picture, drawn as SVG paths."""
 
     plot: Plot
     paths: list[tuple[str, str, int | None]]
@@ -80,7 +80,7 @@ def _drawing(plot: Plot, numbers: Numbers, end: float, kinds: Sequence[str]) -> 
 
 
 def _path(across: np.ndarray, down: np.ndarray) -> str:
-    """Return SVG path data through the finite points, without points that move the line by less than about 0.1."""
+    """Return SVG path data through the finite points, without those that move the line by less than 0.1 units."""
     drawn = Path(np.column_stack((across, down))).cleaned(remove_nans=True, simplify=True)
     pens, points = {Path.MOVETO: "M", Path.LINETO: "L"}, np.asarray(drawn.vertices)
     codes = np.asarray(drawn.codes).tolist()
@@ -88,7 +88,7 @@ def _path(across: np.ndarray, down: np.ndarray) -> str:
 
 
 def _ticks(low: float, high: float, scale: float, count: int) -> list[Tick]:
-    """Return about ``count`` ticks from ``low`` to ``high`` (SI), at values that ``scale`` turns into round numbers."""
+    """Return about ``count`` ticks from ``low`` to ``high`` (SI), where ``scale`` times the value is a round number."""
     places = MaxNLocator(nbins=count, steps=[1, 2, 2.5, 5, 10]).tick_values(low * scale, high * scale)
     inside = [float(place) for place in places if low <= place / scale <= high]
     return [(number(round(place, 12), 7), 100.0 * (place / scale - low) / (high - low)) for place in inside]

@@ -160,7 +160,7 @@ def _agreed(curve: DrawnCurve, panel: Panel, runs: Sequence[ReportedRun]) -> boo
 
 
 def _faults(run: ReportedRun) -> list[dict[str, Any]]:
-    """Return the faults of a run for the player, with ``from`` and ``to`` (s) but without their parameters."""
+    """Return the faults of a run for the page's player: ``channel``, ``text``, and ``from`` and ``to`` (s)."""
     return [
         {
             "channel": fault["channel"],
@@ -222,7 +222,7 @@ def _parameters(part: str, runs: Sequence[ReportedRun]) -> Iterator[tuple[str, s
 
 
 def _defaults(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the default of each parameter: declared, or that of the shipped vehicle or design named in ``values``."""
+    """Return the default of each parameter, taken from the shipped vehicle or design if ``values`` names one."""
     defaults: dict[str, Any] = {name: parameter.default for name, parameter in DECLARED.items()}
     if values.get("vehicle.name") in SHIPPED_VEHICLES:
         defaults |= named_parameters(values)

@@ -58,7 +58,7 @@ def flight_text(cell: Cell) -> str:
 
 
 def vehicle_words(vehicle: int) -> str:
-    """Return the name of vehicle number ``vehicle`` of a cell: 0 is the nominal vehicle, the others are corners."""
+    """Return the name of a vehicle by its number: 0 is the nominal vehicle, the others are corners."""
     return f"corner {vehicle}" if vehicle else "nominal vehicle"
 
 

@@ -19,7 +19,7 @@ class Viewer(NamedTuple):
     source: str
     options: tuple[str, ...] = ()
     scene: bool = False
-    """Whether it draws the vehicle in 3-D, from a copy of the bag, with the layout imported by hand."""
+    """Whether the program draws the vehicle in 3-D, from a copy of the bag and with a layout imported by hand."""
 
     def program(self) -> str | None:
         """Return the path of the installed executable, or None."""
