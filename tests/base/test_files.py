@@ -64,8 +64,9 @@ def test_deep_nesting_is_refused(parse, opening, closing):
 
 
 @pytest.mark.parametrize("text", ["a: &a [*a]", "&a {b: *a}", "a: &a {b: [1, {c: *a}]}"])
-def test_an_alias_inside_of_what_it_is_for_is_refused(text):
-    with pytest.raises(DocumentError, match=r"the alias '[ab]' stands inside of what it is for at line 1, column \d+$"):
+def test_an_alias_inside_its_own_value_is_refused(text):
+    message = r"the alias '[ab]' refers to a value that contains it at line 1, column \d+$"
+    with pytest.raises(DocumentError, match=message):
         parse_yaml(text)
 
 

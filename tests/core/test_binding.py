@@ -43,6 +43,14 @@ def test_arrays_of_other_shapes_are_refused_by_name(changes, message):
     assert "\n" not in str(refused.value)
 
 
+def test_a_complex_array_is_refused_where_the_core_has_real_numbers():
+    sensors = components("case1", duration=1.0).plant.data.sensors
+    for struct, name in ((sensors, "noise"), (NOTCH, "D")):
+        values = struct.values | {name: getattr(struct, name).astype(complex)}
+        with pytest.raises(ParameterError, match=rf"{struct.kind}\.{name}: array of complex128, expected float64"):
+            Struct(struct.kind, **values)
+
+
 def test_what_the_core_writes_to_is_never_a_copy():
     memory = components("case1", duration=1.0).plant.memory()
     for wrong in (memory.actuators.astype(np.float32), memory.actuators.tolist(), np.asfortranarray(memory.actuators)):

@@ -160,7 +160,7 @@ class _Loader(Composer, _Parser, SafeConstructor, Resolver):
         elif node in self._sizes:
             self._nodes += self._sizes[node]
         else:
-            raise _refused(f"the alias {event.anchor!r} stands inside of what it is for", event)
+            raise _refused(f"the alias {event.anchor!r} refers to a value that contains it", event)
         if self._nodes > MAX_NODES:
             raise _refused(f"more than {MAX_NODES} values", event)
         return node

@@ -185,13 +185,13 @@ def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int, ha
 
 
 def loop_memory(flights: int) -> np.ndarray:
-    """Return aligned memory (bytes) for the state of the loop of so many flights between calls of :func:`fly`."""
+    """Return aligned memory (bytes) for the state of the loop of so many ``flights`` between calls of :func:`fly`."""
     room = np.zeros(lib.hsv_memory_size(flights) + 64, np.uint8)
     return room[-room.ctypes.data % 64 :]
 
 
 class Struct:
-    """A struct of core.h; the values of its fields are attributes, so that arrays live as long as pointers to them."""
+    """A struct of core.h; the values of its fields are attributes, which keep alive the arrays that it points to."""
 
     def __init__(self, kind: str, **values: Any) -> None:
         """Fill the struct ``kind``.
@@ -262,10 +262,7 @@ class Struct:
         if not constant and not (fits and value.flags.writeable):
             raise TypeError("expected an array that the core can write to")
         if not fits:
-            given = np.asarray(value)
-            if given.size and not np.can_cast(given.dtype, required, "same_kind"):
-                raise TypeError(f"array of {given.dtype}, expected {required}")
-            value = np.ascontiguousarray(given, required)
+            value = _contiguous(np.asarray(value), required)
             setattr(self, name, value)
         if shape:
             _measure(value.shape, shape, counts)
@@ -280,8 +277,15 @@ def _copy_array(target: Any, declared: Any, value: np.ndarray) -> None:
     element, shape = _element(declared)
     if value.shape != shape:
         raise ValueError(f"array of shape {value.shape}, expected {shape}")
-    array = np.ascontiguousarray(value, _ELEMENTS[element])
+    array = _contiguous(value, _ELEMENTS[element])
     ffi.memmove(target, ffi.from_buffer(array), array.nbytes)
+
+
+def _contiguous(value: np.ndarray, required: np.dtype[Any]) -> np.ndarray:
+    """Return ``value`` as a contiguous array of the ``required`` type; raise a TypeError for another kind."""
+    if value.size and not np.can_cast(value.dtype, required, "same_kind"):
+        raise TypeError(f"array of {value.dtype}, expected {required}")
+    return np.ascontiguousarray(value, required)
 
 
 def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: dict[str, int]) -> None:
