@@ -74,6 +74,10 @@ def listed(page):
     return re.findall(r"<th scope=\"row\"><code>([^<]+)</code>", page)
 
 
+def test_a_fault_that_never_ends_says_so(quiet):
+    assert re.search(r"fault\.stops.*?<td>never</td>", report_page(reported_runs([quiet])), re.DOTALL)
+
+
 def test_only_parameters_that_differ_between_the_runs_are_listed(page):
     assert sorted(listed(page)) == ["input.maximum", "tube.half_width", "tube.shape"]
 

@@ -20,6 +20,7 @@ from hsv.flight.limits import criteria_not_judged, limits_kept, verdict_sentence
 from hsv.flight.metrics import CRITERIA, METRICS, Group, Metric, in_words
 from hsv.flight.scenario import scenario_names
 from hsv.graph.node_parameters import NODE_PARAMETERS
+from hsv.model.faults.injector import NEVER_TIME
 from hsv.model.vehicle import SHIPPED_VEHICLES, named_parameters
 from hsv.pages.engine import Numbers, Plot, render, write_page
 from hsv.pages.events import Event
@@ -241,6 +242,8 @@ def _value(name: str, value: Any) -> Markup:
             return Markup("–")
         case bool():
             return Markup("yes" if value else "no")
+        case float() if value == NEVER_TIME:
+            return Markup("never")
         case int() | float():
             # Frequencies have the same unit in all systems of units.
             return Markup(f"{number(value, 8)}&nbsp;{unit}") if "frequency" in name else quantity(value, unit, 8)
