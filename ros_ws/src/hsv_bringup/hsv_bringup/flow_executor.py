@@ -17,7 +17,7 @@ BATCH = 0.005
 """Time (s) between batches of messages: several steps at full speed, a quarter of a step in real time."""
 
 LOOKS = 8
-"""Number of batches between checks of services and timers, and of empty batches before the executor waits."""
+"""Number of batches between checks of services and timers; after more empty batches than that the executor waits."""
 
 _Subscription = tuple[Callable[..., Any], Any, bool, Callable[[Any], Any]]
 """Function that takes a message from a subscription, its two arguments (type, raw), and the callback."""
@@ -37,7 +37,7 @@ class FlowExecutor(SingleThreadedExecutor):
         super().__init__()
         self._subscriptions: list[_Subscription] = []
         self._flowing: list[_Subscription] = []
-        """The subscriptions that are swept."""
+        """The subscriptions that :meth:`spin_once` sweeps."""
 
     def add_node(self, node: Node) -> bool:
         """Add a node with its present subscriptions; later ones are left to the base class."""

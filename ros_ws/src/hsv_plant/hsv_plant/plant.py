@@ -102,7 +102,7 @@ class PlantNode(LockstepNode):
         """Whether the input of the actuators for this step has arrived."""
         self._flown = False
         self._stepping_to = 0
-        """Step up to which a paused flight goes on, on request."""
+        """Step at which a paused flight stops again after a request for steps."""
         self._resets = False
         """Whether the run is to be reset as soon as none of its messages is pending."""
         self._begun = time.monotonic()

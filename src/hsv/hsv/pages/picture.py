@@ -50,7 +50,7 @@ def picture(
     axis: str = "time [s]",
     kinds: Sequence[str] = DRAWN,
 ) -> Picture:
-    """Return the picture of ``plots`` over the axis from 0 to ``end``; ``shades`` are shaded intervals of the axis."""
+    """Return the picture of ``plots`` over the axis from 0 to ``end``; ``shades`` are (start, end) of shaded parts."""
     marked = [(100.0 * start / end, 100.0 * (stop - start) / end) for start, stop in shades]
     drawings = [_drawing(plot, numbers, end, kinds) for plot in plots]
     return Picture(drawings, axis, _ticks(0.0, end, 1.0, 8), marked)
