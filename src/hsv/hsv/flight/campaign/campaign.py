@@ -125,7 +125,7 @@ class Campaign:
         return flown
 
     def draw(self, flights: range) -> tuple[np.ndarray, np.ndarray]:
-        """Return the samples (flights, factors) of the given flights, in the factors' units, and their seeds (flights).
+        """Return the samples, shape (flights, factors), in the factors' units, and their seeds, shape (flights,).
 
         Every uniform sample has its own seed, so that it can be drawn alone. With the other methods, all samples are
         drawn from the campaign's seed.
@@ -152,14 +152,14 @@ class Campaign:
 
     @cached_property
     def _hypercube(self) -> np.ndarray:
-        """The Latin hypercube (flights, factors), 0 to 1; the strata of each factor are shuffled over all flights."""
+        """The Latin hypercube, 0 to 1, shape (flights, factors); each factor's strata are shuffled over all flights."""
         from scipy.stats import qmc
 
         return np.asarray(qmc.LatinHypercube(len(self.factors), seed=self.seed).random(self.samples))
 
     @property
     def batch(self) -> int:
-        """Number of flights in each batch but the last; a batch is flown and stored at once."""
+        """Number of flights in each batch but the last; the flights of a batch are flown and stored together."""
         low, high = _BATCH_LIMITS
         return max(low, min(high, self.samples // _BATCHES // low * low))
 
@@ -234,7 +234,7 @@ def plan(
         seed: Seed from which all samples are drawn.
         scale: Factor on the bounds of the uncertain parameters (section 5.1 of the paper); with 0 they do not vary.
         commit: Git commit of the program.
-        factors: Least and largest value of further fields, by field, written as in a scenario file.
+        factors: Least and largest value of other fields or of uncertain parameters, by name, as in a scenario file.
 
     Raises:
         CampaignError, ScenarioError, DesignError: A setting is wrong; the message names it.
@@ -271,7 +271,7 @@ def _factors(scenario: Scenario, drawn: Mapping[str, Distribution], scale: float
     """Return a factor for each uncertain parameter of the vehicle and for each distribution of the scenario.
 
     ``drawn`` has the scenario's distributions by field. The distribution of an uncertain parameter replaces its bounds;
-    the other parameters have the vehicle's bounds times ``scale``.
+    the other parameters have the vehicle's bounds times ``scale``, and are left out if ``scale`` is 0.
     """
     if not 0.0 <= scale <= 10.0:
         raise CampaignError(f"scale = {scale}: expected 0 to 10")
@@ -289,7 +289,7 @@ def _factors(scenario: Scenario, drawn: Mapping[str, Distribution], scale: float
 def _check_ends(campaign: Campaign) -> None:
     """Raise an error if the scenario does not admit the least or largest values of the factors.
 
-    They are tried all at once, and one by one with the other factors at their middle values.
+    All least values, then all largest values are tried together, and each alone with the others at middle values.
     """
     low, high, mean = ([getattr(f, end) for f in campaign.factors] for end in ("low", "high", "middle"))
     for ends in (low, high):
@@ -299,9 +299,9 @@ def _check_ends(campaign: Campaign) -> None:
 
 
 def _commands_to_same_goals(table: dict[str, Any], name: str, starts: Mapping[str, float]) -> list[dict[str, Any]]:
-    """Return the scenario's commands, with the step at t = 0 changed so that the targets are reached from ``starts``.
+    """Return the scenario's commands, with the change at t = 0 replaced so that ``starts`` lead to the same targets.
 
-    ``starts`` has the initial altitude (m) or velocity (m/s) by axis, where it differs from the scenario's.
+    ``starts`` has the varied initial values by name: ``altitude`` (m), ``velocity`` (m/s), or one of them.
     """
     scenario, _ = scenario_at_means(table, name)
     steps = [command for command in scenario.command if command.end == 0.0]

@@ -35,7 +35,7 @@ SIGNALS = (
 
 
 def signals(flight: FlightData) -> np.ndarray:
-    """Return the time histories (signals, steps) of :data:`SIGNALS` in a flight."""
+    """Return the time histories of :data:`SIGNALS` in a flight, shape (signals, steps)."""
     return flight.curves[: len(SIGNALS)]
 
 
@@ -43,8 +43,8 @@ def signals(flight: FlightData) -> np.ndarray:
 class Envelope:
     """Minimum, maximum and mean of every signal over several flights, in each time window.
 
-    ``low`` and ``high`` (windows, signals) are minimum and maximum. ``total`` (windows, signals) is the sum over the
-    flights of their mean in the window, and ``count`` (windows) the number of flights in this sum.
+    ``low`` and ``high``, shape (windows, signals), are minimum and maximum. ``total``, shape (windows, signals), is
+    the sum of the flights' means in the window, and ``count``, shape (windows,), the number of flights in this sum.
     """
 
     low: np.ndarray
@@ -82,7 +82,7 @@ class Envelope:
 
     @property
     def mean(self) -> np.ndarray:
-        """Mean (windows, signals) over the flights that reached a window; NaN if none did."""
+        """Mean over the ``count`` flights of a window, shape (windows, signals); NaN if there are none."""
         with np.errstate(invalid="ignore"):
             return np.where(self.count[:, None] > 0.0, self.total / np.maximum(self.count, 1.0)[:, None], np.nan)
 

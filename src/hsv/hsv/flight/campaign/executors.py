@@ -69,7 +69,7 @@ class Executor:
         """Fly batches; yield the number and the result of each, in any order. ``label`` names a batch in messages.
 
         Raises:
-            RunError: A batch crashes the process that flies it, or the connection to the scheduler is lost.
+            RunError: A batch crashes a worker, a worker cannot start or has another program, or the scheduler is lost.
         """
         for batch in batches:
             yield batch, job(text, batch)
@@ -142,7 +142,7 @@ class _PoolExecutor(Executor, ABC):
 
     @abstractmethod
     def _obstacle(self) -> str:
-        """Return why no result can come, as the end of a message; empty if the batches may just take long."""
+        """Return the reason why no result can come, which ends a message; empty if the batches may just take long."""
 
 
 class ProcessExecutor(_PoolExecutor):
@@ -280,7 +280,7 @@ def make_executor(workers: int, scheduler: str = "", notice: Notice = lambda wor
 
     Raises:
         CampaignError: The number or the address is not admissible, no scheduler answers at the address, it has no
-            workers, or one of them has another version of the library.
+            workers, or one of them does not answer, lacks the library or has another version of it.
     """
     if not 0 <= workers <= 4096:
         raise CampaignError(f"workers = {workers}: expected 0 to 4096")
@@ -340,9 +340,10 @@ def _connected(address: str, notice: Notice) -> Iterator[Any]:
 
 
 async def _answers(address: str, waiting: Callable[[], None]) -> bool:
-    """Return whether a Dask scheduler answers within :data:`ANSWER` seconds; after :data:`NOTICE`, call ``waiting``.
+    """Return whether a Dask scheduler answers within :data:`ANSWER` seconds.
 
-    Dask's own client is not used here, because Ctrl-C does not interrupt it while it waits.
+    After :data:`NOTICE` seconds without an answer, ``waiting`` is called once. Dask's own client is not used here,
+    because Ctrl-C does not interrupt it while it waits.
     """
     from distributed.core import rpc
     from distributed.security import Security

@@ -46,7 +46,7 @@ class Store(ABC):
 
     @contextmanager
     def opened(self, *, restart: bool = False) -> Iterator[set[int]]:
-        """Lock the store and yield the numbers of the finished batches; ``restart`` first discards existing results.
+        """Lock the store and yield the numbers of the finished batches; with ``restart``, old results count as missing.
 
         Raises:
             CampaignError: The store belongs to another campaign, cannot be created, or is in use.
@@ -94,7 +94,7 @@ def run_campaign(
 
     Raises:
         CampaignError: The store holds another campaign, is in use, or cannot be written.
-        RunError: A batch crashes its worker process, or the connection to the scheduler is lost.
+        RunError: A batch crashes a worker, a worker cannot start or has another program, or the scheduler is lost.
     """
     with store.opened(restart=restart) as finished:
         batches = plan.batches

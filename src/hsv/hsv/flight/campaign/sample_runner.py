@@ -80,7 +80,7 @@ class SampleRunner:
         return fly(self._components(flight, sample))
 
     def fly_all(self, flights: Sequence[int], samples: np.ndarray) -> Iterator[FlownSample]:
-        """Fly ``flights`` with their ``samples`` (flights, factors) and yield the results, in the same order.
+        """Fly ``flights`` with their ``samples``, shape (flights, factors), and yield the results in the same order.
 
         The flights are simulated side by side if possible. A result must be used before the next one is requested,
         because flights share memory.
@@ -104,14 +104,14 @@ class SampleRunner:
         return self._levels.worst(flight)
 
     def outcome(self, flown: FlownSample) -> Outcome:
-        """Return the outcome of a flight: end, tube level, metrics (SI) and fingerprint, or the controller's error."""
+        """Return the results of a flight by column: how it ended and, unless the controller crashed, numbers (SI)."""
         if isinstance(flown, ControllerError):
             return {"diverged": False, "crashed": str(flown)}
         flight, level = flown
         return self.measured(flight, level, flight.fingerprint)
 
     def measured(self, flight: FlightData, level: float | None, fingerprint: str | None) -> Outcome:
-        """Return the outcome of a flight with its largest tube level and its fingerprint."""
+        """Return the results of a flight that did not crash, by column; ``level`` is its largest tube level."""
         vehicle = self._variants.unchanged.plant.vehicle
         return {
             "diverged": not in_model_range(flight.history.state[-1], vehicle.angle_limit),
@@ -153,7 +153,7 @@ class SampleRunner:
 
 
 def schema(campaign: Campaign) -> pa.Schema:
-    """Return the columns of the table of results: flight, seed, sample, end, metrics (SI), fingerprint."""
+    """Return the columns of the results: flight number, seed, sample, how and when it ended, metrics, fingerprint."""
     samples = [_number(f"sample_{factor.name}", factor.unit) for factor in campaign.factors]
     outcomes = [_number(name, unit) for name, unit in OUTCOMES.items()]
     fixed = [pa.field("flight", pa.int64(), False), pa.field("seed", pa.uint64(), False)]

@@ -1,4 +1,4 @@
-"""Storage of results: finished batches next to the result file during the run, one Parquet file at the end."""
+"""Storage of results: one file per batch while the campaign flies, then a single Parquet file, the result file."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class ResultStore(Store):
         return {batch for batch in batches if self._is_whole(batch)}
 
     def finish(self) -> None:
-        """Join the files of all batches into the result file and delete them, unless the result file exists."""
+        """Join the files of all batches into the result file, then delete them; if it exists already, do nothing."""
         if self.out.exists():
             return
         temporary = self.out.with_name(self.out.name + ".unfinished")
@@ -90,7 +90,7 @@ class ResultStore(Store):
             raise CampaignError(f"{path}: damaged, removed; the same command flies these flights again") from error
 
     def path(self, batch: int) -> Path:
-        """Return the path of the result file of a batch."""
+        """Return the path of the Parquet file for a batch."""
         return self.folder / f"{batch:08}.parquet"
 
     def _check(self, found: Campaign, where: Path) -> None:

@@ -34,7 +34,7 @@ TUBE_LIMIT = 1.0
 
 @dataclass(frozen=True)
 class Share:
-    """Number of flights within a limit (SI; None for reaching the end), and its 95 % confidence interval as a share."""
+    """Share of flights that finish within a limit (SI): ``within`` of ``flights``; for limit None, that finish."""
 
     name: str
     limit: float | None
@@ -51,9 +51,10 @@ class Share:
 
 @dataclass(frozen=True)
 class WorstFlight:
-    """One of the worst flights, with the name of the limit for which the ratio of value to limit is largest.
+    """One of the worst flights: ``ratio`` is the largest ratio of a metric to its limit, ``limit`` names this metric.
 
-    ``ratio`` is this ratio, infinite for a flight that did not reach its end. ``sample`` is in SI units, by factor.
+    If the flight did not finish, ``ratio`` is infinite and ``limit`` is ``crashed`` or ``diverged``. ``sample`` is in
+    SI units, by factor.
     """
 
     flight: int
@@ -66,7 +67,7 @@ class Results:
     """The results of a campaign, read from its file; only :attr:`sample_runner` loads a controller."""
 
     def __init__(self, path: Path, *, trust: bool = False) -> None:
-        """Read the result file ``path``; ``trust`` permits code that it names to run. Errors as :func:`read_result`."""
+        """Read a result file; with ``trust``, code that the file names may run. Errors as for :func:`read_result`."""
         self.path = path
         self.trust = trust
         self.campaign: Campaign
@@ -90,7 +91,7 @@ class Results:
         return SampleRunner(self.campaign)
 
     def column(self, name: str) -> np.ndarray:
-        """Return a column of the results (flights), in SI units; undefined numbers are NaN."""
+        """Return a column of the results, shape (flights,), in SI units; undefined numbers are NaN."""
         return np.asarray(self._column(name).to_numpy())
 
     def frame(self) -> DataFrame:
@@ -102,12 +103,12 @@ class Results:
 
     @property
     def crashed(self) -> np.ndarray:
-        """Mask (flights) of the flights that ended because the controller failed."""
+        """Whether each flight ended because the controller failed, shape (flights,)."""
         return np.asarray(self._column("crashed").is_valid())
 
     @property
     def samples(self) -> np.ndarray:
-        """Samples (flights, factors), in SI units."""
+        """Samples in SI units, shape (flights, factors)."""
         return np.column_stack([self.column(f"sample_{factor.name}") for factor in self.campaign.factors])
 
     def row(self, flight: int) -> dict[str, Any]:
@@ -157,9 +158,9 @@ def limits(results: Results) -> dict[str, float]:
 
 
 def _within(results: Results) -> dict[str, tuple[float | None, np.ndarray]]:
-    """Return by metric the limit (SI) and the mask (flights) of the flights that finish within this limit.
+    """Return by metric its limit (SI) and whether each flight finishes within this limit, shape (flights,).
 
-    The first entry, ``flown_to_the_end``, has no limit (None), and the mask of all flights that finish.
+    The first entry, ``flown_to_the_end``, has no limit (None) and tells whether each flight finishes.
     """
     finished = ~(results.column("diverged") | results.crashed)
     # A comparison with NaN is false: an undefined metric is not within its limit.
@@ -192,7 +193,7 @@ def clopper_pearson(count: int, n: int, confidence: float = CONFIDENCE) -> tuple
 
 
 def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
-    """Return the ``number`` worst flights: crashed ones, diverged ones by time, others by ratio of value to limit."""
+    """Return the ``number`` worst flights: crashed, then diverged ones by time, then others by ratio to a limit."""
     stated = {name: limit for name, limit in limits(results).items() if limit > 0.0}
     diverged, crashed, end = results.column("diverged"), results.crashed, results.column("end_time")
     ratios = np.zeros((len(diverged), len(stated) or 1))
@@ -214,7 +215,7 @@ def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
 
 @dataclass(frozen=True)
 class Distribution:
-    """Statistics of one of :data:`OUTCOMES` in its SI ``unit``, over the number of ``flights`` that define it."""
+    """Statistics of one of :data:`OUTCOMES`, in its SI ``unit``, over the ``flights`` flights that define it."""
 
     name: str
     unit: str
