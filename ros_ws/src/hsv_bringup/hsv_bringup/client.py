@@ -56,7 +56,7 @@ class GraphClient(Node):
         return runs[-1]
 
     def name_of(self, role: NodeDescription, kind: type) -> str:
-        """Return the full name of the topic or service of type ``kind`` of the node in ``role``.
+        """Return the full name of the topic or service that has type ``kind`` and belongs to the node in ``role``.
 
         Raises:
             RunError: There is no such node or service.
@@ -80,11 +80,11 @@ class GraphClient(Node):
         raise RunError(f"no answer from {service} for {SILENT_AFTER:g} s")
 
     def publishers_of(self, topic: str) -> list[str]:
-        """Return the full names of the known nodes that publish ``topic``, except this one."""
+        """Return the full names of the other nodes that publish ``topic``, as far as their names are known yet."""
         return self._others(self.get_publishers_info_by_topic(topic))
 
     def subscribers_of(self, topic: str) -> list[str]:
-        """Return the full names of the known nodes that subscribe to ``topic``, except this one."""
+        """Return the full names of the other nodes that subscribe to ``topic``, as far as their names are known yet."""
         return self._others(self.get_subscriptions_info_by_topic(topic))
 
     def settle(self, enough: Callable[[], object]) -> None:
@@ -100,12 +100,12 @@ class GraphClient(Node):
     def wait_for(
         self, done: Callable[[], object], what: str, published: Sequence[str] = (), for_ever: bool = False
     ) -> bool:
-        """Wait until ``done`` returns a true value; return False if the wait was given up.
+        """Wait until ``done`` returns a true value; return False if no node joins or leaves the domain for too long.
 
         Args:
             done: Condition to wait for.
-            what: Name of the condition in messages.
-            published: Topics of the required node. The wait is short if no process of this machine publishes any of
+            what: Object of the wait, for the message "waiting for ...".
+            published: Topics of the awaited node. The wait is short if no process of this machine publishes any of
                 them.
             for_ever: Whether to wait without a limit.
         """
@@ -141,7 +141,8 @@ class GraphClient(Node):
 def run_client(name: str, act: Callable[[GraphClient, Any], None], options: Any) -> int:
     """Run the command ``name``, which calls ``act`` with ``options``, and return the exit code.
 
-    The code is 1 without a run, 2 for a rejected request and 130 after Ctrl-C. An error is printed on one line.
+    The code is 1 after a RunError, such as no run, 2 after a rejected request, and 130 after Ctrl-C. An error is
+    printed on one line.
     """
     client: GraphClient | None = None
     code = 1

@@ -75,7 +75,7 @@ def _command(client: GraphClient, options: SimpleNamespace) -> None:
         return [log.msg.removeprefix(rejected) for log in logged if log.msg.startswith(rejected)]
 
     def ends() -> list[float]:
-        """Return the end times (s) of the published references that lead from this command to its point."""
+        """Return the end times (s) of the published references that execute this command."""
         return [
             m.times[-1] + m.blends[-1]
             for m in published
@@ -123,6 +123,6 @@ ACTIONS = {
 
 
 def main() -> int:
-    """Run the command of the first argument with the options in the second, as :mod:`hsv.cli.in_flight` writes them."""
+    """Run the command that argument 1 names; argument 2 has its options as JSON, see :mod:`hsv.cli.in_flight`."""
     name, options = sys.argv[1:3]
     return run_client(name, ACTIONS[name], SimpleNamespace(**json.loads(options)))

@@ -23,7 +23,7 @@ CONTROLLER_NODES = {"tube_mpc": TubeMpcNode, "robust_mpc": RobustMpcNode}
 
 
 def nodes() -> Iterator[ProcessNode]:
-    """Yield the nodes of the graph in the order of the data flow.
+    """Yield the nodes of the graph, except an external controller, in the order of the data flow.
 
     The parameters of the plant determine the controller and whether there is a recorder.
     """

@@ -26,7 +26,7 @@ _Subscription = tuple[Callable[..., Any], Any, bool, Callable[[Any], Any]]
 class FlowExecutor(SingleThreadedExecutor):
     """An executor that sweeps over the subscriptions in the order of the nodes and waits only if there are no messages.
 
-    Latched announcements, received once per run, are left to the wait set of the base class.
+    Latched announcements, except recorded ones, are left to the wait set of the base class; they are rare.
 
     If the nodes are in the order of the data flow, one sweep is one step of the loop without waiting: a message
     published in the same process has arrived when its subscription is swept. If it has not (with another middleware),
@@ -50,14 +50,14 @@ class FlowExecutor(SingleThreadedExecutor):
         return bool(super().add_node(node))
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Sweep while messages arrive, at most ``SWEEPS`` times; then run one other callback, waiting if none came."""
+        """Sweep while messages arrive, at most ``SWEEPS`` times; then run another callback. Wait only if none arrived."""
         sweeps = 0
         while sweeps < SWEEPS and self._take(self._flowing, 1):
             sweeps += 1
         super().spin_once(timeout_sec=0.0 if sweeps else timeout_sec)
 
     def drain(self) -> bool:
-        """Take all messages that have arrived, at most ``SWEEPS`` per subscription; return whether there were any."""
+        """Take the messages that have arrived, at most ``SWEEPS`` per subscription; return whether there were any."""
         return self._take(self._subscriptions, SWEEPS)
 
     def _take(self, subscriptions: list[_Subscription], limit: int) -> bool:

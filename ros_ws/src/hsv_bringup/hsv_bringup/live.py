@@ -84,7 +84,7 @@ class _Request:
 
 
 class LiveNode(ProcessNode):
-    """A node that forwards all messages to Foxglove, samples them for the page, and executes the page's commands."""
+    """A node that forwards messages to Foxglove, samples them for the page, and executes the page's commands."""
 
     def __init__(self) -> None:
         # Without rosout and parameter services, so that nothing of this node is recorded with the flight.
@@ -117,7 +117,7 @@ class LiveNode(ProcessNode):
         print(f"live data: ws://127.0.0.1:{self.foxglove.port} ({viewers})", flush=True)
 
     def poll(self) -> None:
-        """Sample the messages that have arrived, execute new commands, and continue with pending requests."""
+        """Sample the messages that have arrived, execute new commands, and handle responses to earlier requests."""
         self._next_poll = max(self._next_poll + 1.0 / RATE, time.monotonic())
         self.hub.sample()
         while not self.page.commands.empty():
@@ -228,7 +228,7 @@ class LiveNode(ProcessNode):
         self._requests.append(_Request(command.node, kind, request, done, refuse))
 
     def _finished(self, request: _Request) -> bool:
-        """Continue with a request; return whether it has been answered or given up."""
+        """Send a request, or handle its response; return whether it is answered or given up."""
         if request.call and (response := request.call.response()):
             request.call.close()
             request.done(response)

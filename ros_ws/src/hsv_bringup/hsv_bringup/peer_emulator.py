@@ -64,7 +64,7 @@ class PeerEmulatorNode(LockstepNode):
         self._standstill = Standstill()
 
     def _join(self) -> bool:
-        """Announce a run, or to a plant all peers as ready; return True for a plant, because it is fed at once."""
+        """Announce a run; to a plant, which announces its own, announce all peers as ready. Return True for a plant."""
         if self._is_plant:
             self._announcer = self.create_publisher(Ready, description.READY, LATCHED)
             self.create_subscription(Run, description.RUN, self._on_run, LATCHED)

@@ -13,7 +13,7 @@ from hsv_node.middleware import ServiceCall
 
 
 class PeerParameters:
-    """The parameters of other nodes, requested while the requesting node goes on."""
+    """The parameters of other nodes, requested without blocking the requesting node."""
 
     def __init__(self, node: Node, names: Mapping[str, str]) -> None:
         """Request the parameter names of other nodes; ``names`` are the full names of these nodes by role."""
@@ -27,7 +27,7 @@ class PeerParameters:
         """Parameters that have a value, by role of the node and name of the parameter, for nodes that have answered."""
 
     def silent(self) -> dict[str, str]:
-        """Continue the requests; return the services that have not answered yet, by role of their nodes."""
+        """Handle new answers and send the next requests; return the names of unanswered services, by role of node."""
         for role, name in self._names.items():
             if role in self.values or not (response := self._calls[role].response()):
                 continue

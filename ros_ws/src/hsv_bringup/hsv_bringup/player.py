@@ -67,7 +67,7 @@ class PlayerNode(ProcessNode):
             self._end()
 
     def wait_timeout(self) -> float:
-        """Return the time (s) to the next message."""
+        """Return the wall time (s) to the next poll, at most 0.25 s."""
         return min(max(self._delay(), 0.0), 0.25)
 
     def _delay(self) -> float:
@@ -88,7 +88,7 @@ class PlayerNode(ProcessNode):
 
 
 def _instants(bag: Bag, topics: Sequence[str]) -> list[tuple[int, list[tuple[str, bytes]]]]:
-    """Return simulated time (ns) and messages (topic, bytes) of each instant, in the order of a recorded step."""
+    """Return each instant (ns) and its messages (topic, bytes), in the order in which a step is recorded."""
     gathered: dict[int, list[tuple[str, bytes]]] = {}
     order = [bag.name_of(role) for role in TOPICS]
     for topic in sorted(topics, key=lambda name: order.index(name) if name in order else -1):

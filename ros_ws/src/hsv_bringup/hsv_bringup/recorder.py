@@ -48,7 +48,7 @@ CONFIRMATION_INTERVAL = 50
 
 
 class RecorderNode(PeerNode):
-    """A node that writes the messages of a step in a fixed order once all have arrived: equal runs give equal bags."""
+    """A node that writes the messages of a step once all have arrived, in a fixed order, whichever arrived first."""
 
     def __init__(self) -> None:
         super().__init__(RECORDER, "bag")

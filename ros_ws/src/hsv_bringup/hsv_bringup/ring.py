@@ -1,7 +1,7 @@
 """The bare ring, a benchmark: processes that exchange the messages of the graph and compute nothing.
 
 ``hsv bench`` starts them. A process prints ``ready`` when its links are matched. A line on standard input starts the
-plant, which finally prints the time (s) of all laps. Every process ends after another line on standard input.
+plant, which prints the total time (s) of the laps. Every process ends after another line on standard input.
 """
 
 from __future__ import annotations

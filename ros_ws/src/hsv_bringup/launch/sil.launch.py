@@ -115,7 +115,7 @@ class Flight:
             self._verdict = f"{self._run['bag']}: {self._failure or 'the flight was lost'}"
 
     def on_shutdown(self, _: Shutdown, __: LaunchContext) -> None:
-        """Raise the verdict on a lost flight, so that launch prints it and ends with exit code 1."""
+        """Raise a RuntimeError if ``hsv conclude`` failed, as for a lost flight; launch then ends with exit code 1."""
         verdict, self._verdict = self._verdict, ""
         if verdict:
             raise RuntimeError(verdict)

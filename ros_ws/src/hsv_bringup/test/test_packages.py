@@ -1,6 +1,7 @@
-"""Smoke test for colcon test: the package's modules and executables load, and all packages of nodes are documented.
+"""Smoke test for colcon test: the package's modules and executables load; all node packages pass ament_pep257.
 
-ament_pep257 belongs to a full ROS 2 installation. Style, types and imports are checked by make lint.
+ament_pep257 belongs to a full ROS 2 installation; without it, that test is skipped. Style, types and imports
+are checked by make lint.
 """
 
 from importlib import import_module

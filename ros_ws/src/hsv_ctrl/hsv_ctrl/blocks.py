@@ -1,4 +1,4 @@
-"""Nodes of the notch filter and of controllers without a node of their own, such as custom ones."""
+"""Node of the notch filter, and node of every controller that has no node class of its own, such as a custom one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The nominal trajectory node: reference equilibrium and nominal state of every step."""
+"""The nominal trajectory node: publishes the reference and the nominal state of every step."""
 
 from __future__ import annotations
 

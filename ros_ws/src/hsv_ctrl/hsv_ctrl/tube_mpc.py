@@ -23,7 +23,7 @@ from hsv_node.parameters import declare, declare_design, declare_vehicle, given
 
 
 class TubeNode(BlockNode):
-    """A controller node that reports the tube status, that is, where the error lies in the invariant set.
+    """A controller node that reports the tube status: where the error lies, inside or outside the invariant set.
 
     Raises:
         ParameterError: The parameter ``controller`` names another controller.
@@ -45,7 +45,7 @@ class TubeNode(BlockNode):
         self._mode = EffectivenessMode.HEALTHY
 
     def stepped(self, signals: Signals) -> None:
-        """Publish the tube status as diagnostics; warn when the error leaves the tube or the elevator mode changes."""
+        """Publish the tube status as diagnostics; warn on leaving the tube or on a new diagnosis of the elevator."""
         result = signals.diagnostics
         assert isinstance(result, TubeResult)
         outside = result.status is TubeStatusCode.OUTSIDE
@@ -66,7 +66,7 @@ class TubeNode(BlockNode):
 
 
 class TubeMpcNode(TubeNode):
-    """The Tube-MPC node: feedback about the nominal trajectory (paper eq. 36). A design must pass preflight."""
+    """The Tube-MPC node: feedback about the nominal trajectory (paper eq. 36); a design must pass :func:`preflight`."""
 
     def __init__(self) -> None:
         super().__init__(TUBE_MPC)
@@ -109,7 +109,7 @@ main = partial(run_node, TubeMpcNode, "tube_mpc")
 
 
 class RobustMpcNode(TubeNode):
-    """The robust MPC node: one gain about the reference, which it receives from the nominal trajectory node."""
+    """The robust MPC node: feedback with one gain about the reference that the nominal trajectory node publishes."""
 
     def __init__(self) -> None:
         super().__init__(ROBUST_MPC)

@@ -1,4 +1,4 @@
-"""Base classes of all nodes: parameters, links of the graph description, ready barrier and diagnostics."""
+"""Base classes of the nodes of the graph: parameters, links, diagnostics, and the start once all nodes are ready."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ LINK_CHECK = 0.05
 
 
 class LockstepNode(ProcessNode):
-    """A node of the graph description that reacts to the messages of a step and never to timers.
+    """A node of the graph description: it handles a step only when the messages that the step needs have arrived.
 
     It identifies its peers by the types of the messages that they publish, because names of nodes and topics may be
     remapped.
@@ -147,7 +147,7 @@ class LockstepNode(ProcessNode):
         return full_name(*found) if found else None
 
     def log_waiting(self, missing: Sequence[str], decides: bool = False) -> None:
-        """Log ``missing`` after 2 s and then every 10 s, as a warning if this node ``decides`` the start."""
+        """Log ``missing`` after 2 s, then every 10 s; after 10 s as a warning if this node ``decides`` the start."""
         now = time.monotonic()
         if now < self._next_log:
             return
@@ -171,7 +171,7 @@ class LockstepNode(ProcessNode):
         return result
 
     def log_change(self, words: str) -> None:
-        """Log a change in flight with the step at which it takes effect; the reply to the change has the same text."""
+        """Log ``words`` (a parameter change and its first step) and keep them for the reply to the request."""
         self._changed = words
         self.get_logger().info(words)
 
@@ -197,7 +197,7 @@ class LockstepNode(ProcessNode):
         return {}
 
     def _watching(self, seen: Sequence[TopicEndpointInfo], topic: str, linked: Mapping[str, str]) -> int:
-        """Return the number of viewers: matched endpoints in ``seen`` whose nodes are not in ``linked``."""
+        """Return how many endpoints in ``seen`` belong to viewers: matched, but of nodes that are not in ``linked``."""
         strangers = [e for e in seen if full_name(e.node_name, e.node_namespace) not in linked.values()]
         pairs = [(STEP, e.qos_profile) if topic in self._outputs else (e.qos_profile, STEP) for e in strangers]
         return sum(
@@ -230,7 +230,7 @@ class PeerNode(LockstepNode):
         self.create_subscription(VehicleState, description.LAST_STATE, self._on_last_state, LATCHED)
 
     def hear_runs(self, callback: Callable[[Any], None], raw: bool = False) -> None:
-        """Subscribe to announced runs, after all topics that must be received first.
+        """Subscribe to the plant's announcements of runs. Call it after subscribing to everything to be received first.
 
         With ``raw``, ``callback`` is called with the bytes of the message.
         """

@@ -81,8 +81,8 @@ def declare_vehicle(node: Node) -> None:
 def declare_design(node: Node, extra: tuple[Parameter, ...] = ()) -> tuple[dict[str, Any], ControlDesign | None]:
     """Declare ``extra`` and the parameters of a design on ``node``; return all values and the design in them.
 
-    Without parameters of a design, the shipped baseline design is used; if ``design.name`` is ``none``, the design is
-    None. A warning is logged if the parameters of the design do not have its hash.
+    Unless ``design.name`` or ``design.hash`` is given, the defaults are those of the shipped baseline design. The
+    design is None if its name is ``none``. A warning is logged if its parameters do not have its hash.
     """
     from hsv.control.design import DESIGN_PARAMETERS, design_of, find_design, read_parameters
 
@@ -104,7 +104,7 @@ def given(node: Node, name: str) -> bool:
 
 
 def refuse_unknown(node: ProcessNode, role: str) -> None:
-    """Raise a ParameterError if ``node`` was given an unknown parameter; a file may have those of other nodes.
+    """Raise a ParameterError if ``node`` was given an unknown parameter; files may contain those of other nodes.
 
     Args:
         node: A new node, which has not declared its parameters yet.

@@ -1,4 +1,4 @@
-"""Base class of all nodes, with an exit code, and a time limit for the end of their process."""
+"""Base class of the nodes, which can end their process with an exit code; and a time limit for that end."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ class ProcessNode(Node):
         self._claims: list[socket.socket] = []
 
     def claim(self, topic: str | None, expected: str) -> None:
-        """Reserve a topic, or with None the full name of this node, before it publishes.
+        """Reserve ``topic`` or, if it is None, the full name of this node; called before the node publishes.
 
         Raises:
-            RunError: Another node of this machine has reserved it; the message ends with ``expected``.
+            RunError: Another node of this machine has reserved the name; the message ends with ``expected``.
         """
         name = self.resolve_topic_name(topic) if topic else self.get_fully_qualified_name()
         domain = self.context.get_domain_id()

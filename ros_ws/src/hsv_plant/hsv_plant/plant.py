@@ -134,7 +134,7 @@ class PlantNode(LockstepNode):
         return self._resets or self.step == 0
 
     def quit(self, reason: str) -> None:
-        """End the run for ``reason``, as Ctrl-C does."""
+        """Break the run off for ``reason``, with exit code 130."""
         self._broken_off = reason
         self.finish(EXIT_INTERRUPTED)
 
@@ -230,7 +230,7 @@ class PlantNode(LockstepNode):
         self.diagnose(signals, status=status.name)
 
     def poll(self) -> None:
-        """Start when all nodes are ready, keep the pace, and name a node that is silent for too long."""
+        """Start when all nodes are ready, keep the pace, and end the run if other nodes are silent for too long."""
         if not self._started:
             self._try_start()
         else:

@@ -123,7 +123,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
 
 
 def sentence(results: Results) -> str:
-    """Return the verdict: the number of flights within all limits, and the limit that most flights exceed."""
+    """Return the verdict: the number of flights within all limits, and the limit that the fewest flights keep."""
     ended, *limited = judged = shares(results)
     lost = ended.flights - ended.within
     ending = f"{lost} of {ended.flights} flights did not come to their end" if lost else "All flights came to their end"
@@ -137,13 +137,13 @@ def sentence(results: Results) -> str:
 
 
 def most_failed(judged: Sequence[Share]) -> Share | None:
-    """Return the limit that most flights exceed, or None if no flight exceeds one."""
+    """Return the limit that the fewest flights keep, or None if all flights keep all limits."""
     over = min((share for share in judged if share.limit is not None), key=lambda share: share.within, default=None)
     return over if over is not None and over.within < over.flights else None
 
 
 def _sorted(results: Results, failed: Share, numbers: Numbers) -> Picture:
-    """Return the picture of the most often exceeded limit: the limit, and the sorted magnitudes of all flights."""
+    """Return the picture of the ``failed`` limit: the limit, and the sorted magnitudes of its metric in all flights."""
     values = np.sort(np.abs(results.column(failed.name)))  # flights that do not define the metric come last, as NaN
     across = 100.0 * (np.arange(len(values)) + 0.5) / len(values)
     limit = "bound", None, np.array([0.0, 100.0]), np.full(2, failed.limit)
@@ -181,7 +181,7 @@ def relative(factor: Factor) -> bool:
 
 
 def histogram(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return counts (b) and edges (b + 1) of at most :data:`BINS` bars for the finite ``values``."""
+    """Return counts, shape (b,), and edges, shape (b + 1,), of b <= :data:`BINS` bars for the finite ``values``."""
     values = values[np.isfinite(values)]
     distinct = np.unique(values.round(9))
     bins: int | np.ndarray = min(BINS, max(10, 2 * round(np.sqrt(len(values)))))
@@ -195,7 +195,7 @@ def histogram(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _repeated(results: Results, worst: int) -> dict[str, Flight]:
-    """Repeat the flight of the unchanged scenario and flight number ``worst``; return them by name, if flyable."""
+    """Repeat two flights, the unchanged scenario and number ``worst``; return by name those that could be flown."""
     flights = {}
     if results.flyable:
         runner = results.sample_runner
@@ -207,7 +207,7 @@ def _repeated(results: Results, worst: int) -> dict[str, Flight]:
 
 
 def _windows(results: Results) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return first step and time (s) of each window, the indices of windows with data, and the end time (s)."""
+    """Return first step and time (s) of each time window, the indices of windows with data, and the end time (s)."""
     campaign = results.campaign
     plant = Plant.from_parameters({**campaign.design, **campaign.scenario.parameters()})
     reached = np.flatnonzero(np.isfinite(results.envelope.low).all(axis=1))

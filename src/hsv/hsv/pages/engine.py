@@ -1,6 +1,6 @@
 """The page engine: renders templates with style and scripts inline, and packs all curves into one compressed block.
 
-All pages share ``template/base.html.j2``, one stylesheet and the script that draws each :class:`Plot` with Plotly.
+All HTML pages share ``template/base.html.j2``, one stylesheet and the script that draws each :class:`Plot` with Plotly.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def compressed(data: bytes) -> Markup:
 
 
 def render(template: str, *, plots: Sequence[Plot] = (), numbers: Numbers | None = None, **values: Any) -> str:
-    """Return the page that ``template`` makes of the other arguments; its script gets ``plots`` and ``described``."""
+    """Return the page that ``template`` makes; its script gets ``plots`` and ``values["described"]`` as JSON."""
     environment = Environment(
         loader=PackageLoader("hsv.pages", "template"),
         autoescape=template.endswith(".html.j2"),

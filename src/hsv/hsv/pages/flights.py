@@ -24,7 +24,7 @@ from hsv.pages.panels import AIR_PANELS, MEASUREMENT_ERRORS, PANELS, Kind, Panel
 
 @dataclass(frozen=True)
 class DrawnCurve:
-    """A curve of one flight in SI units: y (n) at all n steps, or y (2) at the first and the last step."""
+    """A curve of one flight in SI: y at all n steps, shape (n,); a constant bound only at first and last, shape (2,)."""
 
     kind: Kind
     label: str
@@ -33,7 +33,7 @@ class DrawnCurve:
 
 @dataclass(frozen=True)
 class FlightCurves:
-    """The curves of a flight: time (n; s), panels by name in the order of the page, and curves by panel name."""
+    """The curves of a flight: time (s), shape (n,); panels by name, in the order of the page; curves by panel name."""
 
     time: np.ndarray
     panels: dict[str, Panel] = field(default_factory=dict)

@@ -122,7 +122,7 @@ def _several(runs: Sequence[ReportedRun], system: UnitSystem) -> str:
 
 
 def _one(run: ReportedRun, limits: str) -> str:
-    """Return ``limits``, a run's verdict in words, with remarks on a lost flight and an incomplete recording."""
+    """Return a run's verdict ``limits`` (its remark if it has no scenario), with notes on a loss and missing steps."""
     parts = [f"lost: {run.failure}"] if run.failure else []
     parts.append(limits if run.scenario else run.remark)
     if run.incomplete:
@@ -161,7 +161,7 @@ def _agreed(curve: DrawnCurve, panel: Panel, runs: Sequence[ReportedRun]) -> boo
 
 
 def _faults(run: ReportedRun) -> list[dict[str, Any]]:
-    """Return the faults of a run for the page's player: ``channel``, ``text``, and ``from`` and ``to`` (s)."""
+    """Return the faults of a run for playback on the page: ``channel``, ``text``, and ``from`` and ``to`` (s)."""
     return [
         {
             "channel": fault["channel"],
@@ -210,7 +210,7 @@ def _grouped(runs: Sequence[ReportedRun]) -> dict[Group, dict[str, Metric]]:
 
 
 def _parameters(part: str, runs: Sequence[ReportedRun]) -> Iterator[tuple[str, str, list[Markup]]]:
-    """Yield name, description and the value in each run of every parameter that differs between the runs.
+    """Yield each parameter that differs between the runs: its name, its description, and its values, one per run.
 
     For a single run, these are the parameters that differ from their defaults.
     """

@@ -23,7 +23,7 @@ SECTIONS = {"map": "Map of survival", "controllers": "Controllers", "cells": "Nu
 
 
 def write_results(results: ResilienceResults, out: Path, command: str) -> list[Path]:
-    """Write both pages and the scenario of each cell's worst flight to the folder ``out``; return the pages' paths.
+    """Write index.html, result.md and, in flights/, each cell's worst flight as a scenario; return the pages' paths.
 
     The pages quote the ``command`` that produces the results. A CampaignError names a file that cannot be written.
     """

@@ -34,7 +34,7 @@ def in_brackets(unit: str, *, share: bool = False) -> Markup:
 
 
 def units_of(unit: str, *, share: bool = False) -> dict[str, dict[str, float | str]]:
-    """Return, by system of units, name and factor (times SI) of the displayed unit, for the page's script."""
+    """Return, by system of units, the displayed unit and the factor from SI to it, for the page's script."""
     found = {system: in_system(1.0, unit, system, share=share) for system in SYSTEMS}
     return {str(system): {"unit": unit_html(name), "factor": scale} for system, (scale, name) in found.items()}
 

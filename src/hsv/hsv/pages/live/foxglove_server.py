@@ -14,10 +14,10 @@ from hsv.graph.exclusive import HOST
 
 
 class FoxgloveServer(ServerListener):
-    """A read-only server of topics for Foxglove and Lichtblick; a slow client misses messages and delays no others."""
+    """A read-only server of topics for Foxglove and Lichtblick; a slow client misses messages but delays no others."""
 
     def __init__(self, port: int, topics: Mapping[str, str], latched: Iterable[str] = ()) -> None:
-        """Serve ``topics`` (message types by full name) on ``port`` of this machine; 0 is any free port.
+        """Serve ``topics``, message types by full topic name, on ``port`` of this machine; 0 is any free port.
 
         Late subscribers of ``latched`` topics also receive the earlier messages. A ParameterError names a port in use.
         """

@@ -27,7 +27,7 @@ _EVENTS = 200
 
 
 class Hub:
-    """Collection of the data of the page, written by one thread and read by the server threads."""
+    """Collection of the data of the page, written by the live node and read by the thread of the page server."""
 
     def __init__(self, decode: Callable[[str, bytes], Any], about: Mapping[str, str]) -> None:
         """Start without data; ``decode`` deserializes a message of a topic, ``about`` has ``title`` and ``bag``."""
@@ -110,8 +110,8 @@ class Hub:
     def history(self, generation: int, first: int) -> tuple[int, int, np.ndarray]:
         """Return generation, first index and rows: from ``first`` on if the history still has ``generation``, else all.
 
-        The generation changes when the history restarts or is decimated. Rows (n, 1 + curves; single precision) are
-        time (s) and the values (SI) of :data:`hsv.pages.panels.LIVE_CURVES`.
+        The generation changes when the history restarts or is decimated. A row has the time (s) and the values (SI) of
+        the curves in :data:`hsv.pages.panels.LIVE_CURVES`; the rows are a float32 array, shape (n, 1 + curves).
         """
         with self._lock:
             first = first if generation == self._generation else 0
@@ -133,7 +133,7 @@ class Hub:
         self.update(ending={"how": how.get(FlightStatus(status), "broken off"), "time": round(step * self._period, 9)})
 
     def _status_of(self, messages: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the entries of the status from the messages of a step."""
+        """Return the status entries from the messages of a step, and add events for faults that begin or end."""
         actuator = messages[ACTUATOR]
         faults = [
             {"words": str(fault_in(fault)), "channel": fault.channel, "type": fault.type, "since": int(since)}

@@ -123,7 +123,7 @@ class PageServer:
         )
 
     def _respond(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer requests for the page and the layout, and refuse pages of other origins."""
+        """Answer requests for the page and the layout, and refuse requests from pages of other origins."""
         origin, allowed = request.headers.get("Origin"), origins(self.port)
         socket = request.path == SOCKET and "Upgrade" in request.headers
         if origin not in allowed and (origin is not None or socket):
