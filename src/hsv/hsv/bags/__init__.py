@@ -1,1 +1,1 @@
-"""The topics and messages of the graph; bags: writing, reading, repair, comparison, and replay in one process."""
+"""The graph's topics and messages; and functions that write, read, repair, compare and replay bags in one process."""

@@ -1,8 +1,9 @@
 """The messages of a topic, and their fields as columns: arrays with one row per message.
 
-A column is named by the path of its field, such as ``header.stamp``. For n messages, times and durations become int64
-nanoseconds (n,), numbers arrays (n,), and arrays or sequences of numbers arrays (n, length). Texts, sequences of
-different lengths, and lists of messages (as lists of dictionaries) become arrays of objects (n,).
+A column is named by the path of its field, such as ``header.stamp``. For n messages, a number becomes an array of shape
+(n,), a time or duration one of int64 nanoseconds, shape (n,), and an array or sequence of numbers one of shape
+(n, length). Texts, sequences of different lengths, and lists of messages (as lists of dictionaries) become arrays of
+objects, shape (n,).
 """
 
 from __future__ import annotations
@@ -47,10 +48,10 @@ class Columns(dict[str, NDArray[Any]]):
 
 
 def read_at_once(types: Typesdict, message_type: str, messages: Sequence[bytes]) -> Read | None:
-    """Return a function that reads a field of all ``messages`` (at least one, CDR) at once, if they have one layout.
+    """Return a function that reads a field of all ``messages`` (at least one, CDR) together, if they share a layout.
 
-    Return None if the messages differ in layout, are big-endian, or have texts or messages in a sequence. Such messages
-    must be read with :func:`read_one_by_one`.
+    Return None if the messages differ in layout, are big-endian, are not valid, or have texts or messages in a list.
+    Such messages must be read with :func:`read_one_by_one`.
     """
     try:
         structure = Structure(types, message_type, messages[0])
@@ -149,14 +150,14 @@ class Track:
         return replace(self, times=[self.times[row] for row in rows], data=[self.data[row] for row in rows])
 
     def columns(self) -> Columns:
-        """Return all fields of all messages, one array per field; raise a RecordingError if a message does not fit."""
+        """Return all fields of all messages, one array per field; raise a RecordingError if a message is invalid."""
         types = self.types.fielddefs
         read = read_at_once(types, self.type, self.data) if self.data else None
         read = read or read_one_by_one([message for _, message in self.decode()])
         return columns_of(types, self.type, read, f"{self.source}: topic {self.topic}")
 
     def decode(self) -> Iterator[tuple[int, Any]]:
-        """Yield each message as (time in ns, deserialized message); raise a RecordingError if its bytes do not fit."""
+        """Yield each message as (time in ns, deserialized message); raise a RecordingError if one is invalid."""
         for time, message in zip(self.times, self.data, strict=True):
             try:
                 yield time, deserialized(self.types, message, self.type)

@@ -68,7 +68,7 @@ def fields_of(types: Typesdict, message_type: str) -> list[Field]:
 
 
 def as_dict(types: Typesdict, message_type: str, message: object) -> dict[str, Any]:
-    """Return a deserialized message as dictionaries, lists and numbers, with times in nanoseconds."""
+    """Return a deserialized message as a dictionary of plain data, see :func:`plain`; times are in nanoseconds."""
     return {field.name: plain(types, field, getattr(message, field.name)) for field in fields_of(types, message_type)}
 
 
@@ -209,7 +209,7 @@ def definition(message_type: str) -> str:
 
 
 def type_hash(message_type: str) -> str:
-    """Return the hash of a message type (``RIHS01_`` and 64 digits) from its installed description."""
+    """Return the hash of a message type (``RIHS01_`` and 64 hexadecimal digits) from its installed description."""
     description = json.loads(_share_file(message_type, ".json").read_text(encoding="utf-8"))
     return next(str(row["hash_string"]) for row in description["type_hashes"] if row["type_name"] == message_type)
 

@@ -1,4 +1,4 @@
-"""Data of a flight from a bag: for metrics and fingerprint, and deviations of hardware and air from the ideal."""
+"""Flight data from a bag, for metrics and fingerprint; deviations of sensors, links, effectors and air from ideal."""
 
 from __future__ import annotations
 
@@ -41,17 +41,17 @@ def labels(bags: Sequence[Bag]) -> list[str]:
 
 
 def state_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:
-    """Return the states x (n, 9), SI, from the columns of n messages with the fields of LongitudinalState."""
+    """Return the states x, shape (n, 9), SI, from the columns of n messages with the fields of LongitudinalState."""
     return np.column_stack([columns[f"{prefix}{name}"] for name in STATE_NAMES])
 
 
 def input_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:
-    """Return the inputs u (n, 2), fuel equivalence ratio and elevator (rad), from n messages with an InputVector."""
+    """Return the inputs u, shape (n, 2), of n messages with an InputVector: fuel equivalence ratio, elevator (rad)."""
     return np.column_stack((columns[f"{prefix}fuel_equivalence_ratio"], columns[f"{prefix}elevator_deflection"]))
 
 
 def flight_data(bag: Bag) -> FlightData:
-    """Return the flight in ``bag`` at the steps that all its topics have; raise a RecordingError if there are none."""
+    """Return the flight in ``bag`` at the steps that state, nominal and command share, or raise a RecordingError."""
     rows = joined(bag, (STATE, NOMINAL, COMMAND))
     state, nominal, command = rows[STATE], rows[NOMINAL], rows[COMMAND]
     status = bag.columns(ACTUATOR)
@@ -72,7 +72,7 @@ def flight_data(bag: Bag) -> FlightData:
 
 
 def flight_fingerprint(bag: Bag) -> str | None:
-    """Return the fingerprint of the flight in ``bag``, or ``None`` if the recording is not complete."""
+    """Return the flight's fingerprint; None if steps are missing. Raise a RecordingError if no step is complete."""
     topics = (STATE, FILTERED_STATE, NOMINAL, COMMAND, ACTUATOR)
     state, filtered, nominal, command, actuator = joined(bag, topics).values()
     every = np.arange(len(state["step"]))
@@ -97,7 +97,7 @@ def equipment_topics(bag: Bag) -> list[str]:
 
 
 def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the measurement error (n), SI, of each state with an error; all ``topics`` have the same n steps."""
+    """Return {state: measurement error, SI, shape (n,)} of states with errors; all ``topics`` have the same n steps."""
     if MEASUREMENT not in topics:
         return {}
     errors = state_columns(topics[MEASUREMENT], "state.") - state_columns(topics[STATE])
@@ -105,7 +105,7 @@ def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def held(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return, for each link (measurement, command) that held an old payload, the mask (n) of these steps."""
+    """Return the steps in which a link (measurement, command) held old data, as {link: mask of shape (n,)}, if any."""
     ends = {}
     if MEASUREMENT in topics:
         ends["measurement"] = state_columns(topics[STATE]), state_columns(topics[MEASUREMENT], "state.")
@@ -116,14 +116,14 @@ def held(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def _repeats(rows: np.ndarray) -> np.ndarray:
-    """Return the mask (n) of the ``rows`` (n, m) that equal the previous row."""
+    """Return which ``rows``, shape (n, m), equal the previous row: a mask, shape (n,)."""
     return np.append(False, (rows[1:] == rows[:-1]).all(axis=1))[: len(rows)]
 
 
 def effectors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return, by name, the positions (n), SI, of effectors that deviate from their command, in the period of each step.
+    """Return, by name, the positions (SI, shape (n,)) of the effectors that ever deviate from the actuator command.
 
-    The period of a step begins with it. The last position is NaN, because the period of the last step is not flown.
+    Element k belongs to the period that begins with step k; it is NaN if not recorded, and for the last step.
     """
     if ACTUATOR not in topics:
         return {}
@@ -133,13 +133,13 @@ def effectors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def moving_air(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the fields (n) of :data:`CALM_AIR` that differ from calm air, in the period that begins with each step."""
+    """Return the fields of :data:`CALM_AIR` that ever differ from it, by name, shape (n,), as in :func:`effectors`."""
     air = {name: _over_the_period(topics, name) for name in CALM_AIR}
     return {name: y for name, y in air.items() if (np.isfinite(y) & (y != CALM_AIR[name])).any()}
 
 
 def _over_the_period(topics: Mapping[str, Columns], field: str) -> np.ndarray:
-    """Return a field (n) of the forces in the period that begins with each step; NaN if lost, empty if absent."""
+    """Return a field of the forces by period, shape (n,), as in :func:`effectors`; empty if there is no such field."""
     if FORCES not in topics or field not in topics[FORCES]:
         return np.empty(0)
     forces = topics[FORCES]

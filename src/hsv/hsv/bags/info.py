@@ -56,8 +56,8 @@ def describe(bag: Bag) -> dict[str, Any]:
         entry per interval), ``equipment`` (deviations of sensors, links, effectors and air from the ideal, SI),
         ``step_times`` (wall times of the steps of the control law in ms, by node, and the control period),
         ``saturation``, ``tube`` and ``not_covered`` (texts: properties of the flight outside the certificate of its
-        design). The last seven are None if their topic is missing, ``not_covered`` also if parameters are. Other times
-        are simulated times in seconds; ``end_s`` is None for an interval that lasts until the end of the bag.
+        design). From ``ending`` on, an entry is None if its topics or other data for it are missing. Other times are
+        simulated times in seconds; ``end_s`` is None for an interval that lasts until the end of the bag.
     """
     start, end = bag.span
     fingerprint, warnings = None, bag_warnings(bag)
@@ -158,7 +158,7 @@ def parameters_in_words(fault: dict[str, Any], written: Callable[[float, str], s
 
 
 def _equipment(bag: Bag) -> dict[str, Any] | None:
-    """Return deviations from the ideal, SI: measurement errors, held payloads, effector errors, moving air; or None."""
+    """Return deviations from the ideal, SI: of measurements, links, effectors, air; None if no step is complete."""
     try:
         topics = joined(bag, equipment_topics(bag))
     except RecordingError:
@@ -186,7 +186,7 @@ def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | N
 
 
 def _step_times(bag: Bag) -> dict[str, Any] | None:
-    """Return the step times (ms) that the control nodes reported last, and the control period (ms), or None."""
+    """Return the step times last reported by the control nodes, and the control period, ms; None if not recorded."""
     statistics = ("median_ms", "p99_ms", "max_ms")
     nodes: dict[str, dict[str, float]] = {}
     try:
@@ -227,7 +227,7 @@ def _tube(bag: Bag) -> dict[str, Any]:
 
 
 def intervals(stamps: NDArray[np.int64], holds: NDArray[np.bool_]) -> list[dict[str, Any]]:
-    """Return the intervals (s) in which a condition ``holds`` (n), given the ``stamps`` (n, ns) of the steps.
+    """Return the intervals (s) in which a condition is met; ``holds`` (bool) and ``stamps`` (ns) have a value per step.
 
     ``start_s`` is the time of the first step in an interval, ``end_s`` that of the first step after it, or None.
     """

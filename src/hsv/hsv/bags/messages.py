@@ -65,7 +65,7 @@ class Structure:
             ``header.stamp.sec`` or ``state.altitude``. A text includes its closing zero.
         lengths: Offset and value of the length of every text and sequence, by path.
         size: Size of :attr:`dtype`, bytes.
-        complete: Whether the type covers the whole message; if not, it ends before a list of messages or texts.
+        complete: Whether dtype covers the whole message, or ends before a list of messages or texts, or before a wide text.
     """
 
     def __init__(self, store: Typesdict, message_type: str, message: bytes) -> None:
@@ -99,7 +99,7 @@ class Structure:
         return all(message[at : at + 4] == value for at, value in self._checked)
 
     def rows(self, messages: Sequence[bytes]) -> NDArray[Any] | None:
-        """Return the messages as an array of :attr:`dtype`, shape (n,); None if their layouts differ."""
+        """Return the messages as an array of :attr:`dtype`, shape (n,); None if one has another layout or length."""
         size = len(messages[0])
         if any(len(message) != size for message in messages) or not all(map(self.fits, messages)):
             return None
@@ -108,10 +108,10 @@ class Structure:
         return body.view(self.dtype)[:, 0]
 
     def select(self, chosen: Mapping[str, tuple[str, int]]) -> np.dtype[Any]:
-        """Return a structured type of the same size with only the ``chosen`` fields: (path, size) by new name.
+        """Return a structured type of the same size with only the ``chosen`` fields: {new name: (path, size)}.
 
-        The path is that of a number (size 1), of a sequence of numbers (size :data:`VARYING`), or of a nested message
-        or the first of several numbers (size: how many). A MessageError names a field that the definition lacks.
+        The size is 1 for a number, :data:`VARYING` for a sequence of numbers, and n for n consecutive numbers (path: of
+        the first, or of the nested message). A MessageError names a field that the definition lacks.
         """
         names, formats, offsets = list(self._places), [], []
         for path, size in chosen.values():
@@ -227,7 +227,7 @@ class StepMessages:
         return int(self._numbers(message)[2])
 
     def unpack(self, message: bytes, signals: Signals) -> None:
-        """Set stamp, step and needed signals from a message; raise a MessageError or SignalError before setting any."""
+        """Set the ``signals`` that blocks need from a message; raise a MessageError or SignalError before setting any."""
         seconds, nanoseconds, step, *values = self._numbers(message)
         found = dict(zip(self._needed, values, strict=True))
         if self._has_faults:
@@ -312,7 +312,7 @@ def fault_in(message: Any) -> Fault:
 
 
 def active_faults(message: Any) -> tuple[ActiveFault, ...]:
-    """Return the active faults in an ``Actuator`` message, with first steps; a SignalError names an invalid fault."""
+    """Return the active faults in an ``Actuator`` message, each with its first step; raise a SignalError if invalid."""
     from hsv.model.faults.schedule import ActiveFault
 
     active, since = message.active, message.since

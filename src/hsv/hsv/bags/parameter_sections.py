@@ -24,7 +24,7 @@ class ParameterSections:
 
     @classmethod
     def gathered(cls, values: Mapping[str, Mapping[str, Any]]) -> Self:
-        """Return the parameters in ``values`` (by node, then name); those without :func:`differences` become shared."""
+        """Return the parameters of ``values``, {node: {name: value}}; those equal wherever they occur become shared."""
         differing = differences(values)
         shared = {name: value for flat in values.values() for name, value in flat.items() if name not in differing}
         own = {node: {name: flat[name] for name in differing if name in flat} for node, flat in values.items()}
@@ -38,7 +38,7 @@ class ParameterSections:
         return cls(shared, {name.removeprefix("/"): flat for name, flat in sections.items()})
 
     def of(self, node: str) -> dict[str, Any]:
-        """Return the parameters of a node by name, including shared ones that only other nodes have."""
+        """Return a node's parameters by name: all shared ones, also those that the node does not have, and its own."""
         return self.shared | self.own.get(node, {})
 
     def only(self, names: Iterable[str]) -> Self:
@@ -59,7 +59,7 @@ class ParameterSections:
         return type(self)(self.shared | dict(values), own)
 
     def overlaid(self, other: ParameterSections) -> Self:
-        """Return the parameters overridden by those of ``other``, as for two parameter files in this order."""
+        """Return both sets of parameters merged; ``other`` overrides, like the later one of two parameter files."""
         below = self.updated(other.shared)
         nodes = below.own.keys() | other.own.keys()
         return type(self)(below.shared, {n: below.own.get(n, {}) | other.own.get(n, {}) for n in nodes})
@@ -73,7 +73,7 @@ class ParameterSections:
 
 
 def differences(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return the values by node of each parameter that differs between nodes, given ``values`` by node, then name."""
+    """Return the parameters that differ between nodes as {name: {node: value}}; ``values`` is {node: {name: value}}."""
     by_name: dict[str, dict[str, Any]] = {}
     for node, flat in values.items():
         for name, value in flat.items():
@@ -88,8 +88,8 @@ def differences(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, 
 def disagreements(values: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Return a message for each parameter that must be equal in all nodes of a graph and is not.
 
-    ``feedback.tau`` may differ, because only the controller uses it. If the designs differ, only their digests and
-    periods are listed.
+    ``feedback.tau`` may differ, because only the controller uses it. If the designs differ, only ``design.hash`` and
+    ``period`` of their parameters are compared.
     """
     differing = differences(values)
     differing.pop(TAU.name, None)

@@ -58,7 +58,7 @@ class Bag:
     """A recorded run: its topics, messages, attachments and custom data.
 
     All times are simulated times in nanoseconds. The time of a message of a step topic is its stamp; the time of
-    another message is the stamp of the last step received before it. Damages are skipped and listed in :attr:`loss`.
+    another message is the stamp of the last step received before it. Damaged parts are skipped; see :attr:`loss`.
 
     Methods accept the name of a topic in the bag, such as ``/veh1/hsv/state``, or its role, such as ``hsv/state``. They
     raise a RecordingError if the topic is not in the bag, or a message does not fit its definition.
@@ -108,12 +108,12 @@ class Bag:
 
     @cached_property
     def span(self) -> tuple[int, int]:
-        """First and last time in the bag, ns; zeros without messages."""
+        """First and last time in the bag, ns; (0, 0) without messages."""
         times = [(int(times.min()), int(times.max())) for times in map(self.times, self.topics) if len(times)]
         return (min(first for first, _ in times), max(last for _, last in times)) if times else (0, 0)
 
     def times(self, topic: str) -> NDArray[np.int64]:
-        """Return the simulated times (n,) of the messages of a topic, ns."""
+        """Return the simulated times of the messages of a topic, ns, shape (n,)."""
         name = self._topic(topic).name
         if name in self._step_topics:
             return self._stamps(name, self._data(name))
@@ -171,7 +171,7 @@ class Bag:
         return {name: value for name, _, value in self.types.fielddefs[self._topic(topic).type][0]}
 
     def constant(self, topic: str, name: str) -> ConstValue:
-        """Return a constant in the recorded definition of a topic's type, or raise a RecordingError without it."""
+        """Return a constant in the recorded definition of a topic's type, or raise a RecordingError if missing."""
         found = self.constants(topic)
         if name not in found:
             raise RecordingError(f"{self.path}: definition of {self._topic(topic).type}: no constant {name}")
@@ -212,7 +212,7 @@ class Bag:
 
     @cached_property
     def _clock(self) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:
-        """Log times (n,) of the messages on step topics, ascending, and the latest stamp (n,) up to each, in ns."""
+        """Log times of the messages on step topics, ascending, and the latest stamp up to each; ns, shapes (n,)."""
         steps = sorted(self._step_topics)
         received = np.concatenate([np.array([], np.uint64), *map(self._log_times, steps)])
         stamps = np.concatenate([np.array([], np.int64), *(self.times(topic) for topic in steps)])
@@ -254,7 +254,7 @@ class Bag:
         """Add the contents of a file.
 
         Returns:
-            Numbers of messages, of messages of unknown topics, and of attachments; and the metadata of rosbag2.
+            Numbers of messages read, of messages of unknown topics, and of attachments; and the metadata of rosbag2.
         """
         schemas: dict[int, Schema] = {}
         channels: dict[int, Channel] = {}

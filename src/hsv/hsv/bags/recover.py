@@ -21,7 +21,7 @@ RECOVERED = {"recovered": "true"}
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """Result of a recovery; ``path`` is the directory of the new bag, or that of ``bag`` if it needed no change."""
+    """Result of a recovery; ``path`` is the new bag's directory, or the original's if it needed no recovery."""
 
     bag: Bag
     path: Path
@@ -111,7 +111,7 @@ def _exclusively(files: list[Path]) -> Iterator[None]:
 
 
 def _copy(bag: Bag, target: Path) -> Path:
-    """Write the intact data of ``bag`` to a new bag; return its file."""
+    """Write the intact data of ``bag`` to a new bag that is marked as recovered; return the new file."""
     topics = (*bag.topics.values(), *bag.undecodable.values())
     writer = BagWriter(target, topics, bag.custom_data | RECOVERED, bag.distro)
     for name, data in bag.attachments.items():

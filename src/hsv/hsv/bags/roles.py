@@ -19,7 +19,7 @@ _OURS = [role for role in TYPES if role.startswith("hsv/")]
 
 
 def naming(names: Mapping[str, str], namespace: str) -> dict[str, str]:
-    """Return the custom data that record the topic ``names``, by role, of a graph; empty if all are default names."""
+    """Return custom data with a graph's namespace and remapped ``names`` ({role: topic}); empty if all are defaults."""
     remapped = {role: name for role, name in names.items() if name != resolved(role, namespace)}
     data = {NAMESPACE_KEY: namespace} if namespace != ROOT or remapped else {}
     return data | ({REMAPPED_KEY: json.dumps(remapped)} if remapped else {})

@@ -1,4 +1,4 @@
-"""Scan of an MCAP file that goes on after damages, where the readers of the ``mcap`` package stop."""
+"""Scan of an MCAP file that goes on after damaged data, where the readers of the ``mcap`` package stop."""
 
 from __future__ import annotations
 
@@ -41,9 +41,10 @@ class Scan:
         self._data = memoryview(file.data)
 
     def records(self) -> Iterator[kinds.McapRecord]:
-        """Yield every intact record, and for a chunk the records inside; list damaged data in ``damages`` and go on.
+        """Yield the intact records, for a chunk those inside; list damaged data in ``damages`` and go on.
 
-        A record cut off at the end, as left by a killed writer, is skipped and not listed.
+        Indexes of messages, statistics and the ends of data and file are evaluated, not yielded. A chunk that repeats
+        another, and a record cut off at the end, as left by a killed writer, are skipped and not listed.
         """
         data, position, chunks = self._data, len(MCAP0_MAGIC), set[int]()
         if not MCAP0_MAGIC.startswith(bytes(data[:position])):
@@ -89,7 +90,7 @@ class Scan:
     def _unpacked(self, chunk: kinds.Chunk) -> tuple[list[kinds.McapRecord], str]:
         """Return the records of a chunk, and a description of its damage, empty if it is intact.
 
-        A damaged chunk has no records, or those before the damage if it has no checksum.
+        A chunk that cannot be decompressed or has a wrong checksum has no records, another those before the damage.
         """
         if chunk.compression not in ("", *COMPRESSIONS.values()):
             return [], f"a chunk (unsupported compression type {chunk.compression}, expected zstd, lz4 or none)"
@@ -104,7 +105,7 @@ class Scan:
 
 
 def _record(data: memoryview, position: int) -> tuple[kinds.McapRecord | None, int]:
-    """Return the record at ``position``, None if it is private or damaged, and the offset of its end, 0 if damaged."""
+    """Return the record at ``position`` (None: private or damaged) and the offset of its end (0: damaged)."""
     start = position + _FRAME.size
     opcode, length = _FRAME.unpack_from(data, position) if start <= len(data) else (0, 0)
     end = start + length

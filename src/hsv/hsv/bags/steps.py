@@ -47,7 +47,7 @@ def expected_stamps(bag: Bag) -> NDArray[np.int64]:
     announcement they end with the last recorded step.
 
     Raises:
-        RecordingError: A message does not fit its definition, or the announced steps or period exceed the limits.
+        RecordingError: A message does not fit its definition, or the number of steps or the period is out of range.
     """
     found = np.unique(np.concatenate([np.array([], np.int64), *_stamps(bag).values()]))
     announced = _announced(bag) or _numbered(bag)
@@ -74,7 +74,7 @@ def _announced(bag: Bag) -> tuple[float, int] | None:
 
 
 def _numbered(bag: Bag) -> tuple[float, int] | None:
-    """Return period (s) and last step from the numbers of the recorded steps, or None without recorded steps."""
+    """Return period (s) and last step from the numbers of the recorded steps, or None without a step after step 0."""
     last: tuple[float, int] | None = None
     for topic, stamps in _stamps(bag).items():
         steps = bag.columns(topic).get("step", np.array([], np.uint64))
@@ -105,7 +105,7 @@ def lost_seconds(bag: Bag) -> float:
 def irregularities(bag: Bag) -> list[str]:
     """Return messages about steps that are missing on all or some topics, repeated, or out of order.
 
-    In a truncated bag only the steps that all topics have reached are examined.
+    In a bag that may lack its end, missing steps are sought only up to the last step that all topics have reached.
     """
     stamps = _stamps(bag)
     every = expected_stamps(bag)
@@ -138,7 +138,7 @@ _NAMED = 3
 
 
 def bag_warnings(bag: Bag) -> list[str]:
-    """Return the warnings about a bag: damage, a missing end, missing topics, and topics with missing steps."""
+    """Return warnings about a bag: contradictory metadata, damage, a missing end, missing topics, irregular steps."""
     words = [*bag.contradictions[:_NAMED], *loss_in_words(bag.loss)]
     if any(map(being_recorded, bag.files)):
         words.append(f"is still being recorded, {bag.span[1] * 1e-9:.2f} s so far: the end of its recorder closes it")

@@ -120,7 +120,7 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
 
 
 def _attached(bag: Bag, name: str) -> ParameterSections:
-    """Return attached parameters of a flight; a vehicle from a file is represented by its name."""
+    """Return attached parameters without those of the execution; a vehicle file's path becomes the vehicle's name."""
     sections = ParameterSections.parse(bag.text(name), f"{bag.path}: {name}")
     for flat in (sections.shared, *sections.own.values()):
         if "vehicle.name" in flat:
@@ -150,7 +150,7 @@ def complete_steps(bag: Bag, topics: Iterable[str] = ()) -> int:
 
 
 def broken_off(bag: Bag) -> bool:
-    """Return whether the run ended before its planned end: killed, interrupted, or recovered from a killed recorder."""
+    """Return whether the flight's end may be unrecorded: run interrupted or killed, bag cut off or recovered."""
     status = bag.columns(STATE)["status"]
     return not len(status) or int(status[-1]) == 0 or cut_off(bag)
 
@@ -171,7 +171,7 @@ def refuse_vacuous(bag: Bag) -> None:
 
 
 def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
-    """Return the fault parameters that give the recorded active faults; empty if the attached ``values`` do so."""
+    """Return fault parameters that reproduce the recorded active faults; empty if the attached ``values`` do so."""
     injector = FaultInjector.from_parameters(values)
     command = np.zeros(2)
     changed = False
@@ -201,7 +201,7 @@ def _commands_as_flown(bag: Bag) -> dict[str, Any]:
 
 
 def _tau_as_flown(bag: Bag, sections: ParameterSections) -> dict[str, Any]:
-    """Return the parameters that give the recorded tube factors tau; empty if the attached ``sections`` do so."""
+    """Return parameters that reproduce the recorded tube factors; empty if ``sections`` do so, or without tube MPC."""
     if controller_of(sections) != TUBE_MPC.name:
         return {}
     recorded_status = [status for _, status in bag.decode(TUBE_STATUS)]

@@ -141,7 +141,7 @@ def replay(bag: Bag, process: Process, values: ParameterSections, progress: Prog
 
 
 def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progress) -> list[ProcessComparison]:
-    """Repeat the whole loop with the named ``controller`` and compare every step topic; it raises as :func:`replay`."""
+    """Repeat the loop and compare the outputs of all nodes but an external ``controller``; raise as :func:`replay`."""
     require(bag, step_topics(controller))
     processes = processes_of(controller, estimated(values))
     known = any(COMMAND in process.node.publishes for process in processes.values())
@@ -160,7 +160,7 @@ def fly(
     recorded: Mapping[str, Track] = NOTHING,
     limit: int | None = None,
 ) -> dict[str, Track]:
-    """Fly the loop in this process and return the messages of every step topic; see :func:`rerun`.
+    """Fly the loop in this process and return its messages by step topic, without the ``recorded`` commands.
 
     Args:
         types: Definitions of the messages.
