@@ -1,7 +1,8 @@
 """Locks on this machine for nodes, topics and namespaces of a ROS domain; and the ports of the live view.
 
-A lock is an abstract socket with the name of what it locks. Only one process can bind it, before it sends anything, and
-the kernel releases it when the process ends for whatever reason. Other machines of the domain do not see the lock.
+A lock is an abstract Unix socket with the name of what it locks. Only one process can bind it, and the kernel releases
+it when the process ends for whatever reason. A process takes its locks before it sends anything. Other machines of
+the domain do not see the lock.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def claim(kind: str, domain: int, name: str) -> socket.socket | None:
     """Reserve a name for one process of this machine; return the open claim, or None if another process has it.
 
     Args:
-        kind: ``node``, ``topic``, or ``domain`` for a namespace, which belongs to one run.
+        kind: What is named: ``node``, ``topic``, or ``domain`` for the namespace of a run.
         domain: The ROS domain.
         name: Full name of the node, topic or namespace.
     """

@@ -44,7 +44,7 @@ def fly_graph(
 
 
 def close_bag(bag: Path, failures: Sequence[str] = ()) -> None:
-    """Finish the bag of a graph whose processes have ended; remove it if no recorder has written anything.
+    """Complete the bag of a graph whose processes have ended; remove its folder if no recorder has written anything.
 
     Raises:
         RunError: There are ``failures`` of processes, or the bag cannot be repaired. The message names the bag, if any.

@@ -121,8 +121,8 @@ class Launcher:
             nodes: Nodes to start; the run ends with the last one.
             arguments: ROS arguments of every node.
             on_step: Called with the number of every step that the plant reports.
-            on_line: Called with the name of a node and every other line of its output, or a warning about the node.
-            wait_timeout: Time (s) for which a process may be idle if no other node would end the run.
+            on_line: Called with a node's name, and each line of its output other than steps, or a warning about the node.
+            wait_timeout: Time (s, at least HUNG_AFTER) for which a process may idle if no other node would end the run.
             namespace: Namespace of all nodes.
         """
         self._nodes = list(nodes)
@@ -156,12 +156,12 @@ class Launcher:
     def wait(self) -> int:
         """Wait for the last node to finish and return its exit code: 0, or that of a flight that diverged.
 
-        A process that hangs is reported, and again if it continues. In flight the plant itself detects a node that
-        does not answer, and ends.
+        A warning is given when a process hangs, and another when it goes on. In flight the plant itself detects a
+        node that does not answer, and ends.
 
         Raises:
             RunError: The last node failed or hung, or another node ended too early or hung before the flight began. A
-                plant may end first after its flight, and losing the live view only gives a warning.
+                plant that has completed its flight may end first; losing the live view only gives a warning.
         """
         *others, last = self._processes
         while True:

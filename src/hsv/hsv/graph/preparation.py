@@ -90,7 +90,7 @@ def prepare(
         scenario_name: Name or path of the scenario.
         options: Options of the execution.
         text: The scenario, as :func:`hsv.flight.scenario.scenario_text` returns it; empty: read by its name.
-        bags: Folder of the bag if ``bag`` is not given; it is named by scenario and time.
+        bags: Folder for a new bag, named by scenario and time, if ``bag`` is not given.
         bag: Bag to record to, a new directory.
         folder: Directory for the parameter files; if not given, a temporary one that is removed with the result.
 
@@ -184,9 +184,9 @@ def provenance(controller: str, name: str, design_hash: str, seed: int) -> dict[
 
 
 def recorded_files(values: Mapping[str, Mapping[str, Any]], designed: Mapping[str, Any]) -> dict[str, str]:
-    """Return the attachments of a bag of a run started by hand, by name: parameters and certificate.
+    """Return parameters and certificate to attach to the bag of a run started by hand, as {file name: text}.
 
-    ``values`` are the flat parameters of every node by its role, ``designed`` those of the node that has the design.
+    ``values`` is {node: {parameter: value}}, ``designed`` has the parameters of the node that loaded the design.
     """
     sections = ParameterSections.gathered(values)
     design = {parameter.name for parameter in DESIGN_PARAMETERS}

@@ -47,7 +47,7 @@ def replay_all(
 
 
 def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progress) -> Iterator[ProcessComparison]:
-    """Repeat the run of the whole graph; yield for each node a comparison of its step topics with those in ``bag``."""
+    """Repeat the run of the whole graph; compare every node of the loop, but no external controller, with ``bag``."""
     require(bag, step_topics(controller))
     with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
         repeated = Path(folder, "rerun")
