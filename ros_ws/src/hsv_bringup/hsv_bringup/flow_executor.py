@@ -50,7 +50,7 @@ class FlowExecutor(SingleThreadedExecutor):
         return bool(super().add_node(node))
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Sweep while messages arrive, at most ``SWEEPS`` times; then run another callback. Wait only if none arrived."""
+        """Sweep while messages arrive, up to ``SWEEPS`` times; then run another callback. Wait only if none arrived."""
         sweeps = 0
         while sweeps < SWEEPS and self._take(self._flowing, 1):
             sweeps += 1
