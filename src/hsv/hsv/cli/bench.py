@@ -1,4 +1,4 @@
-"""The measurements of ``hsv bench``: ratios of two run times, and their change since a recorded run."""
+"""The measurements of ``hsv bench``: ratios of two run times, and their change since an earlier ``hsv bench``."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ RESOLUTION = 0.05
 
 
 class Recorded(NamedTuple):
-    """A ratio of a recorded run: its group, median, and 10th and 90th percentile."""
+    """A ratio measured by an earlier ``hsv bench``: its group, median, and 10th and 90th percentile."""
 
     group: str
     ratio: float
@@ -59,7 +59,7 @@ class Recorded(NamedTuple):
 
 @dataclass(frozen=True)
 class Figure:
-    """A measured ratio of two run times."""
+    """A measured ratio of two run times: ``ours`` divided by ``theirs``."""
 
     name: str
     what: str
@@ -97,9 +97,9 @@ class Figure:
         return {**asdict(self), "group": group, **judged}
 
     def slower(self, before: Recorded) -> float:
-        """Return the relative change of the ratio since a recorded run, positive if it became slower.
+        """Return the relative change of the ratio since an earlier ``hsv bench``, positive if it became slower.
 
-        A change counts as zero if it is at most :data:`RESOLUTION`, or if the ranges of the percentiles overlap.
+        A change counts as zero if it is at most :data:`RESOLUTION`, or if the old and new percentile ranges overlap.
         """
         low, high = self.spread
         change = self.ratio / before.ratio - 1.0
@@ -135,7 +135,7 @@ def readable(seconds: float) -> str:
 
 
 def read_run(path: Path) -> tuple[str, Mapping[str, Recorded]]:
-    """Return the commit and the figures by name of a run, from a file with the output of ``hsv bench --json``.
+    """Return the commit, and the ratios by name, from a file with the output of an earlier ``hsv bench --json``.
 
     Raises:
         QuantityError: The file cannot be read, or has other contents.
@@ -268,7 +268,7 @@ def _fly_c(text: str, batch: int) -> bytes:
 
 
 def against_ring(repeats: int, duration: float = 60.0) -> list[Figure]:
-    """Measure a step of the ROS 2 graph against one of bare processes that pass the same messages in a ring."""
+    """Measure a lap of the ROS 2 graph against a lap of bare processes that pass the same messages in a ring."""
     pairs = [(graph_lap(duration), ring_lap(round(duration / _PERIOD))) for _ in range(repeats)]
     ours, theirs = zip(*pairs, strict=True)
     what, against = "lap of the graph, separate processes, recorded", "bare ring, EventsExecutor, same recorder"
@@ -276,7 +276,7 @@ def against_ring(repeats: int, duration: float = 60.0) -> list[Figure]:
 
 
 def graph_lap(duration: float) -> float:
-    """Fly the first ``duration`` (s) of Case 1 over DDS, with recording; return the mean wall time (s) of a step.
+    """Fly the first ``duration`` (s) of Case 1 over DDS, with recording; return the mean wall time (s) of a lap.
 
     Raises:
         RunError: A process ended before its time, or the workspace is not built.
@@ -298,7 +298,7 @@ def graph_lap(duration: float) -> float:
 
 
 def ring_lap(laps: int) -> float:
-    """Pass the graph's messages ``laps`` times around a ring of bare processes, recorded; return the mean time (s).
+    """Pass the graph's messages ``laps`` times around a ring of bare processes, recorded; return the time (s) of a lap.
 
     Raises:
         RunError: A process ended before its time, or the workspace is not built.

@@ -256,7 +256,7 @@ def design(
 
 
 def _half_widths(half_width: np.ndarray | None, feedback: np.ndarray | None, *size: float | None) -> list[float] | None:
-    """Return the half-widths of the five rigid states and the two inputs, and the size if given; None without a set."""
+    """Return the half-widths of a set in the rigid states and inputs, then its size if given; None without a set."""
     if half_width is None or feedback is None or None in size:
         return None
     return [*half_width[:5], *feedback, *(value for value in size if value is not None)]

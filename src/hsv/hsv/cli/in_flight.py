@@ -139,7 +139,7 @@ def topic(
 
 
 def _become(command: str, namespace: str, **options: Any) -> NoReturn:
-    """Replace this process by the client node with a command of ``hsv_bringup.commands``."""
+    """Replace this process by the client node, which executes ``command`` (see ``hsv_bringup.commands``)."""
     from hsv.bags.description import CLIENT
     from hsv.graph.launcher import become
 

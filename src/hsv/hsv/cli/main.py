@@ -129,7 +129,7 @@ def options(
         bool, Option("--traceback", envvar="HSV_TRACEBACK", help="Print the traceback of errors, too.")
     ] = False,
 ) -> None:
-    """Declare the options that precede a command; :func:`run` gets the description of the command line."""
+    """Declare the options that precede a command."""
 
 
 def run(prog: str, commands: Mapping[str, Command], description: str, moved: Mapping[str, str] | None = None) -> None:

@@ -61,7 +61,7 @@ class Interrupted(Exception):  # noqa: N818 - an interruption by the user is no 
 def resumable(folder: Path) -> Iterator[Callable[[Path], None]]:
     """Turn Ctrl-C into a message of one line that finished results are in ``folder``, if it exists.
 
-    Yields a function to call with the path of the results once all flights are finished; a message then names it.
+    Yields a function to call with the path of the results once all flights are finished; the message then names it.
     """
     complete: list[Path] = []
     try:
@@ -83,7 +83,7 @@ def unit_key(unit: str) -> str:
 
 
 def to_json(quantities: Mapping[str, Quantity], units: UnitSystem) -> dict[str, float]:
-    """Return the numbers with the unit appended to every key, e.g. ``altitude_ft``; units as in :func:`json_system`."""
+    """Return the numbers, with their units appended to keys, e.g. ``altitude_ft``; units as in :func:`json_system`."""
     values = {}
     for name, quantity in quantities.items():
         value, unit = in_system(*quantity, json_system(units))
@@ -108,7 +108,7 @@ def say(*lines: object) -> None:
 
 
 def print_bag_warnings(*bags: Bag) -> None:
-    """Print one line per incomplete bag: damage, missing files, topics and steps, or that the bag is truncated."""
+    """Print one line for each bag that has warnings: damage, a missing end, or missing files, topics or steps."""
     from hsv.bags.steps import bag_warnings
 
     for bag in {bag.path: bag for bag in bags}.values():
@@ -210,7 +210,7 @@ def print_rows(rows: Sequence[Mapping[str, str | float | None]]) -> None:
 def print_matrix(
     title: str, rows: Sequence[str], columns: Sequence[str], cells: Sequence[Sequence[RenderableType]]
 ) -> None:
-    """Print a matrix of ``cells`` (rows, columns), as many columns side by side as fit; names break at underscores."""
+    """Print ``cells``, a list of rows, as one table or several narrow ones; column names break at underscores."""
     count = max(1, (console.width - max(map(len, rows))) // _COLUMN)
     for first in range(0, len(columns), count):
         headings = [column.replace("_", "\n") for column in columns[first : first + count]]

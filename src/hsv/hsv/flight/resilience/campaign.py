@@ -52,9 +52,9 @@ class Subject:
         return rounded(moment.share * self.scenario.duration)
 
     def file(self, moment: Moment, vehicle: int, fault: TriedFault | None = None, value: float = 0.0) -> str:
-        """Return the text of the scenario file of a flight with one fault.
+        """Return the text of the scenario file of a flight with one fault, or without a fault.
 
-        The flight ends at the share :data:`OBSERVED` of the scenario's duration after the start of the fault.
+        After the start of the fault, the flight lasts for the share :data:`OBSERVED` of the scenario's duration.
 
         Args:
             moment: Time of occurrence of the fault.
@@ -76,7 +76,7 @@ class Subject:
 
 @dataclass(frozen=True)
 class Case:
-    """One controller with one fault at one time. Its batch has all severities on all vehicles, and the bisection."""
+    """One controller with one fault at one time. Its batch has all severities on all vehicles, and a bisection."""
 
     subject: Subject
     fault: str

@@ -65,7 +65,7 @@ class TriedFault:
 
     @property
     def resolution(self) -> float:
-        """Resolution of the bisection in severity: :data:`RESOLUTION`, or one step of an integer if that is larger."""
+        """Resolution of the bisection in severity: :data:`RESOLUTION`, or a change by 1 of an integer, if larger."""
         return max(RESOLUTION, 1.0 / abs(self.worst - self.harmless) if self.whole else 0.0)
 
     def value(self, severity: float) -> float:

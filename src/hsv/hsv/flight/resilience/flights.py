@@ -58,8 +58,8 @@ class FlownFault:
 class Boundary:
     """The largest survived and the smallest lost severity (0 to 1) of a fault on the nominal vehicle.
 
-    ``survived`` is None if even severity 0 is lost, and ``lost`` is None if severity 1 is survived. If a fault is lost
-    that is milder than a survived one, the mildest lost severity counts, and the survived one is below it.
+    ``survived`` is None if even severity 0 is lost, and ``lost`` is None if all flown severities are survived. If a
+    severity is lost but a larger one survived, the larger one does not count: ``survived`` is always below ``lost``.
     """
 
     survived: float | None
@@ -128,12 +128,12 @@ def distances(flight: FlightData, without: FlightData, start: float) -> tuple[fl
 def boundary(
     survives: Callable[[float], bool], known: dict[float, bool], resolution: float, at: Callable[[float], float]
 ) -> Boundary:
-    """Return by bisection a survived and a lost severity that are at most ``resolution`` apart.
+    """Return a survived and a lost severity by bisection, 1 and None if all are survived, None and 0 if even 0 is lost.
 
     Args:
         survives: Flies with a severity, and returns whether the flight survives.
         known: Results of flights so far, by severity.
-        resolution: Largest difference between the two severities.
+        resolution: Largest permitted difference between the two severities.
         at: Returns the nearest severity that can be flown, because some parameters are integers.
     """
     known = dict(known)

@@ -1,4 +1,4 @@
-"""Results of a resilience campaign: one file per case, read into cells and squares of the map of results."""
+"""Results of a resilience campaign: one file per case, one square of the map per pair of fault and controller."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class CaseStore(Store):
         drop_older(self.path(batch))
 
     def read(self, number: int) -> Outcome | None:
-        """Return the results of a case; None if the case was not flown or the file is damaged."""
+        """Return the results of the case with this number; None if it was not flown or its file is damaged."""
         try:
             values = parse_json(read_text(self.path(number)))
             return tuple(FlownFault(**row) for row in values["flights"]), Boundary(**values["boundary"])
@@ -72,40 +72,40 @@ class Cell:
 
     @property
     def worst(self) -> FlownFault:
-        """The flight that was lost first or, if none was lost, with the largest deviation of attitude."""
+        """The worst flight: one that crashed, else the first one lost, else that of the largest attitude deviation."""
         return min(self.flights, key=_rank)
 
     @property
     def attitude(self) -> float | None:
-        """Largest deviation of attitude in all flights, rad; None if the controller always crashed."""
+        """Largest deviation of attitude in the flights without a crash, rad; None if all crashed."""
         return max((f.attitude for f in self.flights if f.attitude is not None), default=None)
 
     @property
     def altitude(self) -> float | None:
-        """Largest deviation of altitude in all flights, m; None if the controller always crashed."""
+        """Largest deviation of altitude in the flights without a crash, m; None if all crashed."""
         return max((f.altitude for f in self.flights if f.altitude is not None), default=None)
 
     @property
     def recovery_time(self) -> float | None:
-        """Longest recovery time, s; None if any flight does not recover."""
+        """Longest recovery time, s; None if any flight is lost or does not recover."""
         times = [flight.recovery_time if flight.survived else None for flight in self.flights]
         known = [time for time in times if time is not None]
         return max(known) if len(known) == len(times) else None
 
     @property
     def time_to_loss(self) -> float | None:
-        """Shortest time to the loss of a flight, s; None if no flight was lost."""
+        """Shortest time from fault to loss, s, of flights without a crash of the controller; None if none is lost."""
         return min((f.time_to_loss for f in self.flights if f.time_to_loss is not None), default=None)
 
 
 def _rank(flight: FlownFault) -> tuple[float, float]:
-    """Return a sort key that puts the worst flight first: crashed, then lost by time, then by attitude deviation."""
+    """Return a sort key, worst flights first: crashed, then lost by time, then survived by attitude deviation."""
     return (1.0, -(flight.attitude or 0.0)) if flight.survived else (0.0, flight.time_to_loss or 0.0)
 
 
 @dataclass(frozen=True)
 class Square:
-    """The results of one controller with one fault: cells by time, ordered by severity, and the boundaries by time."""
+    """The results of one controller with one fault, by time of occurrence: cells, ordered by severity, and boundary."""
 
     fault: str
     subject: Subject
@@ -135,7 +135,7 @@ class ResilienceResults:
 
     @classmethod
     def read(cls, campaign: ResilienceCampaign, store: CaseStore) -> ResilienceResults:
-        """Return the results in ``store``; a ``CampaignError`` if a case is missing."""
+        """Return the results in ``store``; a ``CampaignError`` if a case is missing or its file is damaged."""
         squares = {
             (fault, subject.name): Square(fault, subject, {}, {})
             for fault in campaign.faults
@@ -153,7 +153,7 @@ class ResilienceResults:
 
     @property
     def cells(self) -> list[Cell]:
-        """All cells, in a fixed order."""
+        """All cells, ordered by fault, controller, time of occurrence and severity."""
         return [cell for square in self.squares.values() for row in square.cells.values() for cell in row]
 
     @property
@@ -163,7 +163,7 @@ class ResilienceResults:
 
 
 def boundaries_in_words(fault: TriedFault, boundaries: Mapping[Moment, Boundary]) -> list[str]:
-    """Return texts on the severities that the nominal vehicle survives, one per :class:`Moment`, equal texts once."""
+    """Return texts on the severities that the nominal vehicle survives: one per moment, or one if they are equal."""
 
     def in_words(boundary: Boundary) -> str:
         if boundary.survived is None:
