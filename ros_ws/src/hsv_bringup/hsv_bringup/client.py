@@ -56,7 +56,7 @@ class GraphClient(Node):
         return runs[-1]
 
     def name_of(self, role: NodeDescription, kind: type) -> str:
-        """Return the full name of the topic or service that has type ``kind`` and belongs to the node in ``role``.
+        """Return the full name of the topic or service of type ``kind`` that the node in ``role`` offers.
 
         Raises:
             RunError: There is no such node or service.

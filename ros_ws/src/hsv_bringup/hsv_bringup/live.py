@@ -228,7 +228,7 @@ class LiveNode(ProcessNode):
         self._requests.append(_Request(command.node, kind, request, done, refuse))
 
     def _finished(self, request: _Request) -> bool:
-        """Send a request, or handle its response; return whether it is answered or given up."""
+        """Send a request, or handle its response if there is one; return whether it is answered or given up."""
         if request.call and (response := request.call.response()):
             request.call.close()
             request.done(response)

@@ -39,7 +39,7 @@ def published_types(asking: Node, name: str, namespace: str) -> set[str]:
 
 
 def name_of(asking: Node, role: NodeDescription, kind: type) -> str | None:
-    """Return the full name of the topic or service that has type ``kind`` and is of the node in ``role``, or None."""
+    """Return the full name of the topic or service of type ``kind`` that the node in ``role`` offers, or None."""
     node = node_in_role(asking, role)
     if node is None:
         return None

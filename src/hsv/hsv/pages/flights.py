@@ -24,7 +24,7 @@ from hsv.pages.panels import AIR_PANELS, MEASUREMENT_ERRORS, PANELS, Kind, Panel
 
 @dataclass(frozen=True)
 class DrawnCurve:
-    """A curve of one flight in SI: y at all n steps, shape (n,); a constant bound only at both ends, shape (2,)."""
+    """A curve of one flight in SI: y at all n steps, shape (n,), or a constant bound at first and last, shape (2,)."""
 
     kind: Kind
     label: str
