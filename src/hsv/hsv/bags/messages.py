@@ -65,7 +65,7 @@ class Structure:
             ``header.stamp.sec`` or ``state.altitude``. A text includes its closing zero.
         lengths: Offset and value of the length of every text and sequence, by path.
         size: Size of :attr:`dtype`, bytes.
-        complete: Whether dtype covers the whole message, or ends before a list of messages or texts, or before a wide text.
+        complete: Whether dtype covers the message; if not, it ends before a list of messages or texts, or wide text.
     """
 
     def __init__(self, store: Typesdict, message_type: str, message: bytes) -> None:
@@ -227,7 +227,7 @@ class StepMessages:
         return int(self._numbers(message)[2])
 
     def unpack(self, message: bytes, signals: Signals) -> None:
-        """Set the ``signals`` that blocks need from a message; raise a MessageError or SignalError before setting any."""
+        """Set the ``signals`` needed by blocks from a message, or raise a MessageError or SignalError and set none."""
         seconds, nanoseconds, step, *values = self._numbers(message)
         found = dict(zip(self._needed, values, strict=True))
         if self._has_faults:

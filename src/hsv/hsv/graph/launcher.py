@@ -121,7 +121,7 @@ class Launcher:
             nodes: Nodes to start; the run ends with the last one.
             arguments: ROS arguments of every node.
             on_step: Called with the number of every step that the plant reports.
-            on_line: Called with a node's name, and each line of its output other than steps, or a warning about the node.
+            on_line: Called with a node's name and a text: an output line that reports no step, or a warning.
             wait_timeout: Time (s, at least HUNG_AFTER) for which a process may idle if no other node would end the run.
             namespace: Namespace of all nodes.
         """
