@@ -48,7 +48,7 @@ def fly(scenario: Scenario | str) -> Flight:
 def sweep(
     name: str, field: str, values: Iterable[object], changes: Mapping[str, object] | None = None
 ) -> dict[object, Flight]:
-    """Simulate a scenario with one field set to each of ``values``, and return the flights by value.
+    """Simulate a scenario with one field set to each of ``values``; return a dict from value to flight.
 
     Args:
         name: Name of a shipped scenario, or path.
@@ -57,7 +57,7 @@ def sweep(
         changes: Values of further fields, the same in every flight.
 
     Raises:
-        ScenarioError, RunError: As :func:`fly`.
+        ScenarioError: A field or the design is wrong. RunError: A custom controller failed.
     """
     return {value: fly(load(name, {**(changes or {}), field: value})) for value in values}
 
@@ -82,7 +82,7 @@ def montecarlo(
     factors: Mapping[str, tuple[object, object]] | None = None,
     workers: int = 1,
 ) -> DataFrame:
-    """Fly a campaign; return a table with one row per flight: sample, end, metrics and fingerprint.
+    """Fly a campaign; return a table with one row per flight: varied values, outcome, metrics and fingerprint.
 
     The SI units of the columns are in ``attrs["units"]``. A script that uses several workers must call this function
     under ``if __name__ == "__main__"``.
@@ -127,8 +127,8 @@ def trim(
     result are in its ``quantities``, by name, with their SI units.
 
     Args:
-        altitude: Altitude (m); empty: a published one, or the middle of the vehicle's envelope.
-        velocity: Velocity (m/s); empty: likewise.
+        altitude: Altitude (m); empty: as in the published trim, or the middle of the envelope if that trim is outside.
+        velocity: Velocity (m/s); empty: likewise from the published trim or the middle of the envelope.
         climb_rate: Climb rate (m/s).
         acceleration: Acceleration (m/s^2).
         vehicle: Name of a shipped vehicle, or path; empty: the paper's vehicle.
@@ -136,14 +136,14 @@ def trim(
 
     Raises:
         QuantityError, VehicleError: An argument is wrong; the message names it.
-        TrimError: There is no equilibrium.
+        TrimError: There is no equilibrium, or only one outside the input limits.
     """
     described = load_vehicle(vehicle or DEFAULT_VEHICLE)
     return trim_at(described.coupled(coupling), *described.condition(altitude, velocity), climb_rate, acceleration)
 
 
 def plot(flights: Flight | Mapping[str, Flight], *, units: str = UnitSystem.metric) -> Figure:
-    """Return a figure with the paper's eight plots over time, six for rigid vehicles, of one flight or of several.
+    """Return a figure of one or several flights: the paper's eight plots over time, or six for rigid vehicles.
 
     The dotted reference and the shaded time from the first fault on are those of the first flight.
 

@@ -1,11 +1,11 @@
 """Gymnasium environments; importing this module registers ``hsv/Track-v0`` as a single and as a vector environment.
 
-An agent replaces the controller of a scenario, and an episode is one flight. The observation of step k (18, SI) is
+An agent replaces the controller of a scenario, and an episode is one flight. The observation of step k, in SI units, is
 
     [x^(k); x^_f(k) - x_r(k)],
 
-the measured or estimated state (9), then its deviation from the reference (9), in which the filtered pitch rate q_f
-replaces q. The action a (2) gives the input u(k) = u_r(k) + u_n(k) + diag(:data:`SCALE`) a, which is limited to U;
+the 9 measured or estimated states, then their 9 deviations from the reference, in which the filtered pitch rate q_f
+replaces q. The 2 actions a give the input u(k) = u_r(k) + u_n(k) + diag(:data:`SCALE`) a, which is limited to U;
 values of a outside [-1, 1] are admitted. The reward of a step is, with the true state x after the step,
 
     T / (1 + ((h - h_r) / 100 m)^2 + ((V - V_r) / 20 m/s)^2 + |a|^2),
@@ -105,7 +105,7 @@ class _Group:
     """Whether the episodes are over and begin anew in the next step"""
 
     def fly(self, half: int) -> None:
-        """Simulate one half of the current step, ``lib.SENSE`` or ``lib.ACT``."""
+        """Simulate a half of the current step: ``lib.SENSE`` up to the nominal input, or ``lib.ACT`` after it."""
         core.fly(self.flights, self.memory, self.step, self.step + 1, half)
 
 
@@ -130,22 +130,22 @@ class _Episodes:
 
     @property
     def nominal_input(self) -> np.ndarray:
-        """u_r + u_n (n, 2), the inputs for actions of zero."""
+        """u_r + u_n, the inputs for actions of zero, shape (n, 2)."""
         return self._u_r + self.history.nominal_input
 
     @property
     def observation(self) -> np.ndarray:
-        """Observations (n, 18), see :mod:`hsv.gym`."""
+        """Observations, shape (n, 18), see :mod:`hsv.gym`."""
         error = self.history.estimate - self._x_r
         error[:, PITCH_RATE] = self.history.filtered_pitch_rate - self._x_r[:, PITCH_RATE]
         return np.concatenate((self.history.estimate, error), 1)
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Simulate a step with finite ``actions`` (n, 2); an episode that is over begins anew instead.
+        """Simulate a step with finite ``actions``, shape (n, 2); an episode that is over begins anew instead.
 
         Returns:
-            Rewards (n), 0 for an episode that begins anew; masks (n) of the episodes that terminate; masks (n) of
-            those that are truncated.
+            Three arrays of shape (n,): rewards, 0 for an episode that begins anew; a mask of the episodes that
+            terminate; and a mask of those that are truncated.
 
         Raises:
             ControllerError: An action is not finite.
@@ -211,7 +211,7 @@ class _Episodes:
 class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """An environment in which the agent tracks the reference of a scenario by fuel and elevator, see :mod:`hsv.gym`.
 
-    ``info`` has ``nominal_input``, u_r + u_n (2), and ``flight``, the number of the flight in its campaign.
+    ``info`` has ``nominal_input``, u_r + u_n with shape (2,), and ``flight``, the flight's number in the campaign.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012 (as in the base class)
@@ -220,7 +220,7 @@ class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def __init__(self, scenario: str = "case1", scale: float = 0.0, factors: Factors | None = None) -> None:
         """Read a scenario, whose controller is replaced by the agent.
 
-        If the scenario has no distributions and nothing varies, every episode is the flight of ``hsv simulate``.
+        If the scenario has no distributions and nothing varies, every episode is flown as by ``hsv simulate``.
         Otherwise every episode is a random flight of the campaign :func:`hsv.montecarlo` with these arguments.
 
         Args:
@@ -235,15 +235,15 @@ class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._draws = _Draws(scenario, scale, factors)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, Info]:
-        """Begin an episode; return the first observation (18) and ``info``. ``options`` are not used."""
+        """Begin an episode; return the first observation, shape (18,), and ``info``; ``options`` are ignored."""
         super().reset(seed=seed)
         self._episodes = _Episodes(self._draws, [self.np_random], recorded=True)
         return self._episodes.observation[0], self._info
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, Info]:
-        """Simulate a control period with a finite ``action`` (2).
+        """Simulate a control period with a finite ``action``, shape (2,).
 
-        Return the observation (18), the reward, whether the episode terminates, whether it is truncated, and ``info``.
+        Return the observation, shape (18,), the reward, whether the episode terminates or is truncated, and ``info``.
         """
         [reward], [terminated], [truncated] = self._episodes.step(np.asarray(action, float)[None])
         return self._episodes.observation[0], float(reward), bool(terminated), bool(truncated), self._info
@@ -266,7 +266,7 @@ class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
 
 class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
-    """Several :class:`TrackEnv`, simulated side by side in the lanes of the core with the same bits as alone.
+    """Several :class:`TrackEnv`, simulated side by side by the core; the results have the same bits as alone.
 
     Environment i has the seed of the reset plus i. Flights that are simulated side by side have a common step: when one
     of them diverges, the others are truncated, and all begin anew in the next step. Flights that the core cannot
@@ -290,7 +290,7 @@ class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     ) -> tuple[np.ndarray, Info]:
         """Begin all episodes, with one ``seed`` or with one per environment; ``options`` are not used.
 
-        Return the first observations (n, 18), and ``info`` with arrays over the environments.
+        Return the first observations, shape (n, 18), and ``info`` with arrays over the n environments.
         """
         rows = range(self.num_envs)
         seeds = [int(seed) + i for i in rows] if isinstance(seed, int | np.integer) else seed or [None for _ in rows]
@@ -299,9 +299,10 @@ class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         return self._episodes.observation, self._infos
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, Info]:
-        """Simulate a control period with finite ``actions`` (n, 2); an episode that is over begins anew instead.
+        """Simulate a control period with finite ``actions``, shape (n, 2); an episode that is over begins anew instead.
 
-        Return observations (n, 18), rewards (n), masks (n) of terminated and of truncated episodes, and ``info``.
+        Return observations, shape (n, 18), and with shape (n,) rewards and masks of terminated and of truncated
+        episodes; then ``info``.
         """
         found = self._episodes.step(np.asarray(actions, float))
         return self._episodes.observation, *found, self._infos

@@ -1,4 +1,4 @@
-"""Exceptions of the library: one base class, and one subclass per cause that also inherits a built-in one."""
+"""Exceptions of the library: a base class, and for each cause a subclass that also inherits a built-in exception."""
 
 import difflib
 import os
@@ -73,7 +73,7 @@ class ParameterError(HsvError, ValueError):
 
 
 def one_of(known: Iterable[str], name: str, also: str = "") -> str:
-    """Return the end of a message about an unknown ``name``: all the known ones, ``also``, and the nearest one."""
+    """Return "one of ..." for a message about an unknown ``name``: the known names, ``also``, and the nearest name."""
     return f"one of {', '.join(known := [*known])}{also}{did_you_mean(name, known)}"
 
 

@@ -147,7 +147,7 @@ class _Loader(Composer, _Parser, SafeConstructor, Resolver):
         self._sizes: dict[Any, int] = {}
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        """Return the next node; check the nesting depth and the number of nodes, including those behind aliases."""
+        """Return the next YAML node; check the nesting depth and the number of nodes, with aliases expanded."""
         event, before = self.peek_event(), self._nodes
         self._levels += 1
         if self._levels > MAX_LEVELS:

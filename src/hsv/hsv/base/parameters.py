@@ -1,4 +1,4 @@
-"""Parameters of the components: each has one table, by which nodes declare their parameters and files are checked."""
+"""Parameters: each component has one table of them, with which nodes declare parameters and files are checked."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Parameter:
         return f"{self.kind.replace('_', ' ')}{words}{' ' + self.unit if self.unit else ''}{whole}"
 
     def check(self, value: object) -> Any:
-        """Return ``value``, an array as a list, if it is admissible.
+        """Return ``value`` if it is admissible; an array is returned as a list.
 
         Raises:
             ParameterError: The type is wrong (an integer is not a double), or the value is not finite, not
@@ -166,7 +166,7 @@ def read_number(parameter: Parameter, text: object, field: str) -> float:
 
 
 def limits_in_words(parameter: Parameter, text: object) -> str:
-    """Return the range of a ``parameter`` in words, after a space, in the unit of the quantity ``text``."""
+    """Return a ``parameter``'s range in the unit of ``text``, such as " of at least 2 m"; if it has none, " m"."""
     ends, unit = in_unit_of((parameter.minimum, parameter.maximum), parameter.unit or "1", text)
     return _range(*ends) + unit
 

@@ -89,7 +89,7 @@ def ignore_ctrl_c_at_end() -> None:
 
 
 def end_with_parent(parent: int) -> None:
-    """Have Linux terminate this process when the thread of the process ``parent`` that started it ends."""
+    """Have Linux terminate this process when the thread that started it, in the process ``parent``, ends."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
         if os.getppid() != parent:  # it has ended already
@@ -141,8 +141,8 @@ def over_threads(
 def ctrl_c_held_back() -> Iterator[None]:
     """Delay Ctrl-C until the end of the ``with`` block; threads and processes started in the block never receive it.
 
-    A pool of workers needs this because it cannot be closed if it is interrupted while it starts. The command ends
-    the processes of the pool itself.
+    A pool of workers needs this because it cannot be closed if it is interrupted while it starts. After Ctrl-C,
+    the code that started the pool must end its processes.
     """
     resource_tracker.ensure_running()  # its start would unblock SIGINT
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

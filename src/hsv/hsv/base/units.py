@@ -102,7 +102,7 @@ def unit_system(name: str) -> UnitSystem:
 
 
 def unit_in(system: UnitSystem, unit: str) -> str:
-    """Return the unit that ``system`` shows for the SI ``unit``; of most quotients, only the dividend is converted."""
+    """Return the unit that ``system`` shows for the SI ``unit``; divisors of quotients outside its table stay in SI."""
     if system is UnitSystem.si:
         return unit
     own = PAPER_UNITS if system is UnitSystem.paper else METRIC_UNITS
@@ -192,7 +192,8 @@ def has_unit(text: object) -> bool:
 def in_unit_of(values: Sequence[float], unit: str, text: object) -> tuple[list[float], str]:
     """Return ``values``, given in the SI ``unit``, in the unit of the quantity ``text``.
 
-    The second result is that unit after a space; without a unit in ``text``, it is the SI ``unit`` or empty.
+    The second result is the name of that unit after a space. If ``text`` has no unit, values and ``unit`` remain; the
+    name is empty for ``"1"``.
     """
     found = _QUANTITY.fullmatch(text.strip()) if isinstance(text, str) else None
     own = (found["unit"] or "") if found else ""
@@ -315,7 +316,7 @@ def _squared(unit: str) -> Square:
 
 
 def _composed(unit: str) -> tuple[Fraction, dict[str, int]]:
-    """Return the square of a product or quotient of the units in ``_KNOWN``; a KeyError names an unknown one."""
+    """Return the square (see ``Square``) of a product or quotient of units; a KeyError names one not in ``_KNOWN``."""
     if unit in _KNOWN:
         return _KNOWN[unit]
     if product := re.fullmatch(r"(.*)([*/ ])([^*/ ]+)", unit):
@@ -331,7 +332,7 @@ def _composed(unit: str) -> tuple[Fraction, dict[str, int]]:
 
 
 def square_by_pint(unit: str) -> Square:
-    """Return the square of ``unit`` from the definitions of pint.
+    """Return the square of ``unit``, see ``Square``, from the definitions of pint.
 
     Raises:
         ValueError: pint knows no such unit, or an exponent is not a multiple of one half.

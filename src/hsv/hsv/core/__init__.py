@@ -44,7 +44,7 @@ _ELEMENTS = {"double": np.dtype(float), "int64_t": np.dtype(np.int64), "uint8_t"
 
 
 class _Dimension(NamedTuple):
-    """A dimension of an array: a fixed ``size``, or the field ``counts``, at most ``greatest``, plus ``more``."""
+    """A dimension: a fixed ``size``, or the value of the field ``counts`` (at most ``greatest``) plus ``more``."""
 
     text: str
     size: int | None
@@ -155,7 +155,7 @@ def instruction_set() -> str:
 
 
 def lanes() -> int:
-    """Return how many flights the core can simulate at a time."""
+    """Return the maximum number of flights that the core can simulate side by side."""
     return _LANES[instruction_set()]
 
 
@@ -167,13 +167,13 @@ def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int, ha
         memory: State of the loop between calls, see :func:`loop_memory`; step 0 initialises it.
         start: First step.
         stop: Step after the last one.
-        halves: The halves of each step that are simulated, ``lib.SENSE``, ``lib.ACT`` or both.
+        halves: ``lib.SENSE`` (each step up to the nominal input), ``lib.ACT`` (from the controller on), or both.
 
     Returns:
         The step after the last one simulated, or -1 - k if an external block failed in step k.
 
     Raises:
-        ValueError: The number of flights is wrong, the memory too small, or a history has fewer rows than steps.
+        ValueError: The number of flights is wrong, the memory unsuitable, or a history has fewer rows than steps.
     """
     if len(flights) not in (1, lanes()) or memory.nbytes < lib.hsv_memory_size(len(flights)) or memory.ctypes.data % 64:
         raise ValueError(f"{len(flights)} flights, expected 1 or {lanes()}, with the memory for as many")
@@ -185,13 +185,13 @@ def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int, ha
 
 
 def loop_memory(flights: int) -> np.ndarray:
-    """Return aligned memory (bytes) for the state of the loop of so many ``flights`` between calls of :func:`fly`."""
+    """Return aligned memory (bytes) that holds the loop state of ``flights`` flights between calls of :func:`fly`."""
     room = np.zeros(lib.hsv_memory_size(flights) + 64, np.uint8)
     return room[-room.ctypes.data % 64 :]
 
 
 class Struct:
-    """A struct of core.h; the values of its fields are attributes, which keep alive the arrays that it points to."""
+    """A struct of core.h; its fields are attributes, which also keep alive the arrays to which the struct points."""
 
     def __init__(self, kind: str, **values: Any) -> None:
         """Fill the struct ``kind``.
@@ -282,14 +282,14 @@ def _copy_array(target: Any, declared: Any, value: np.ndarray) -> None:
 
 
 def _contiguous(value: np.ndarray, required: np.dtype[Any]) -> np.ndarray:
-    """Return ``value`` as a contiguous array of the ``required`` type; raise a TypeError for another kind."""
+    """Return ``value`` as a contiguous array of the ``required`` type; a TypeError if floats would become integers."""
     if value.size and not np.can_cast(value.dtype, required, "same_kind"):
         raise TypeError(f"array of {value.dtype}, expected {required}")
     return np.ascontiguousarray(value, required)
 
 
 def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: dict[str, int]) -> None:
-    """Store the ``counts`` that follow from the shape ``found``; raise a ValueError if it is not as ``declared``."""
+    """Add to ``counts`` the lengths in the shape ``found``; raise a ValueError if it differs from ``declared``."""
     fits = len(found) == len(declared)
     for size, dimension in zip(found, declared, strict=False):
         count = size - dimension.more
@@ -305,7 +305,7 @@ def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: d
 class Callback:
     """A Python function that the core can call as a step function of ``hsv_block.h``, as long as this object lives.
 
-    ``error`` is the exception that the function raised, or None; ``times`` are the wall times (s) of its calls.
+    ``error`` is the exception that the function raised, or None; ``times`` are the durations (s) of calls without one.
     """
 
     def __init__(self, function: Callable[[int, Any, Any], None]) -> None:

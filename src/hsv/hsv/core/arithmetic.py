@@ -24,7 +24,7 @@ logarithm: Callable[[float], float] = lib.hsv_logarithm
 
 
 def of_each(function: Callable[[float], float], values: Any) -> np.ndarray:
-    """Return the array (n) of ``function`` applied to each of ``values`` (n)."""
+    """Return the results of ``function`` for each of ``values``, both of shape (n,)."""
     return np.array([function(value) for value in np.asarray(values, float).tolist()])
 
 

@@ -1,8 +1,8 @@
-"""Actuators of the vehicle: published sets, their parameters, and the data that ``core/actuators.h`` steps.
+"""Actuators of the vehicle: published sets, their parameters, and the data with which ``core/actuators.h`` moves them.
 
-Actuators and vehicle are advanced by substeps of a quarter of the control period. Over a substep, the effector is held
-at the mean of its positions at the two ends. An ideal actuator reaches its command at once. If all actuators are ideal
-and have no fault, the vehicle receives the command itself, limited by the stops.
+An ideal actuator reaches its command at once. If all are ideal, the command is not delayed and no fault of an actuator
+or effector acts, the vehicle receives the command itself, limited by the stops. Otherwise actuators and vehicle are
+advanced by substeps of a quarter of the control period; over a substep, an effector is held at its mean position.
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, peri
 
 
 def actuators_at_rest(position: np.ndarray) -> np.ndarray:
-    """Return the state (2, 2) of actuators at rest at ``position`` (2): per channel the position and a zero rate."""
+    """Return the state, one row [position, rate] per input, of actuators at rest at ``position``, shape (2,)."""
     state = np.zeros((N_INPUTS, 2))
     state[:, 0] = position
     return state

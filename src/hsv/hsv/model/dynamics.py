@@ -1,6 +1,6 @@
 """Equations of motion of the vehicle (paper eq. 1 to eq. 4) and their parameters, see ``core/vehicle.h``.
 
-The order of the state x (9) and the input u (2) is that of :mod:`hsv.model.signals`.
+The 9 states x and the 2 inputs u are ordered as in :mod:`hsv.model.signals`.
 """
 
 from __future__ import annotations
@@ -220,11 +220,11 @@ def forces(
     Lift is perpendicular to the inertial velocity, drag opposite to it.
 
     Args:
-        x: State (9).
-        u: Input (2).
+        x: State, shape (9,).
+        u: Input, shape (2,).
         p: Parameters.
-        conditions: Air and engine (7): wind forward and up (m/s), density relative to the model's, factors of thrust,
-            lift and drag, and increment of the pitching moment coefficient. None: still air and a working engine.
+        conditions: Air and engine, shape (7,): wind forward and up (m/s), density relative to the model's, factors of
+            thrust, lift and drag, and increment of the pitching moment coefficient. None: still air, working engine.
     """
     found = ffi.new("double[6]")
     lib.hsv_forces(
@@ -239,7 +239,7 @@ def forces(
 
 
 def derivative(x: Any, u: Any, p: VehicleParameters, conditions: np.ndarray | None = None) -> np.ndarray:
-    """Return dx/dt (9) of the coupled model (paper eq. 1), or decoupled model (eq. 4) if both couplings are zero.
+    """Return dx/dt, shape (9,), of the coupled model (paper eq. 1), or decoupled if both couplings are zero (eq. 4).
 
     A complex state or input gives a complex derivative, for the complex step; ``conditions`` are then ignored.
     """
@@ -280,9 +280,9 @@ def advance(
     substeps: int,
     conditions: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return the state (9) one ``period`` (s) after ``x`` (9), by ``substeps`` classical Runge-Kutta steps.
+    """Return the state one ``period`` (s) after the state ``x``, by ``substeps`` classical Runge-Kutta steps.
 
-    The input ``u`` (2) and the ``conditions`` (7), see :func:`forces`, are held.
+    The input ``u`` and the ``conditions``, see :func:`forces`, are held.
     """
     new = np.array(x, float)
     lib.hsv_advance(
@@ -299,10 +299,10 @@ def advance(
 def transitions(
     state: np.ndarray, inputs: np.ndarray, period: np.ndarray, substeps: np.ndarray, p: VehicleParameters
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the final states (N, 9) of N separate transitions, and their derivatives (N, 9, 12).
+    """Return the final states, shape (N, 9), of N independent transitions, and their derivatives, shape (N, 9, 12).
 
-    A transition starts from its row of ``state`` (N, 9) and holds its row of ``inputs`` (N, 2) over its ``period`` (s).
-    The last axis of the derivatives is state (9), input (2) and period; the complex step makes them exact to rounding.
+    Transition i starts from ``state[i]``, shape (9,), and holds ``inputs[i]``, shape (2,), for ``period[i]`` (s).
+    The last axis is the 9 initial states, 2 inputs and period; the complex step makes derivatives exact to rounding.
     """
     end, changes = np.empty((len(period), N_STATES)), np.empty((len(period), N_STATES, N_STATES + N_INPUTS + 1))
     lib.hsv_transitions(
@@ -320,5 +320,5 @@ def _conditions(conditions: np.ndarray | None) -> Any:
 
 
 def in_model_range(x: np.ndarray, angle_limit: float) -> bool:
-    """Return whether ``x`` (9) is finite, its velocity positive, and its angles at most ``angle_limit`` (rad)."""
+    """Return whether ``x`` is finite, V > 0, and angle of attack and pitch angle are within +-``angle_limit`` (rad)."""
     return bool(lib.hsv_in_model_range(doubles(vector(x), 9), angle_limit))

@@ -113,12 +113,12 @@ def _link(name: str, values: Mapping[str, object], computing: int) -> Struct:
 
 
 def link_state(link: Struct, size: int, before: np.ndarray | None = None) -> np.ndarray:
-    """Return the initial memory of a ``link``.
+    """Return the initial state of a ``link``.
 
     Args:
         link: The link.
         size: Number of values in a payload.
-        before: Payload (size) sent before the flight; None: equal to the first payload of the flight.
+        before: Payload, shape (size,), sent before the flight; None: equal to the first payload of the flight.
     """
     memory = np.zeros(_ACCEPTED + size * (link.delay + link.jitter + 2))
     if before is not None:

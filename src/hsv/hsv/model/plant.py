@@ -77,17 +77,17 @@ _CALM = CALM.tolist()
 
 
 def plant_faults(scheduled: Sequence[ScheduledFault], period: float, before: Struct | None = None) -> Struct:
-    """Return the ``scheduled`` faults of the plant, for the core; faults also in ``before`` keep their memory."""
+    """Return the ``scheduled`` faults of the plant, for the core; those also in ``before`` keep their memory."""
     sides = {"effector": (DYNAMICS, EFFECTOR), "engine": (ENGINE_SIDE,), "sensor": (SENSOR,)}
     rows = {name: fault_rows(side, scheduled, period, before and getattr(before, name)) for name, side in sides.items()}
     return Struct("hsv_plant_faults", **rows)
 
 
 class PlantResult(NamedTuple):
-    """The state x (9) of a step, its measurement (9), and the forces, effectors and air in that state.
+    """The state x of a step, shape (9,), its measurement, shape (9,), and the forces, effectors and air in that state.
 
-    ``forces``: lift (N), drag (N), thrust (N), pitching moment (N m), dynamic pressure (Pa). ``effector`` (2): last
-    positions. ``air`` (3): wind forward and up (m/s) and density relative to the model's, as held over the last period.
+    ``forces``: lift (N), drag (N), thrust (N), pitching moment (N m), dynamic pressure (Pa). As last held before the
+    step: ``effector``, fuel and elevator; ``air``, wind forward and up (m/s) and density relative to the model's.
     """
 
     step: int
@@ -186,7 +186,7 @@ class Plant:
         self._faults = plant_faults((), self.period)
 
     def memory(self) -> Struct:
-        """Return the initial memory of the equipment: actuators at rest in the trim, still air."""
+        """Return the equipment's state before step 0: actuators at rest in the trim, still air."""
         held = self.initial.input
         return Struct(
             "hsv_plant_memory",
@@ -200,12 +200,12 @@ class Plant:
         )
 
     def place(self, step: int, state: np.ndarray) -> None:
-        """Set the current step and ``state`` (9), as a replay does with each recorded state."""
+        """Set the current step and ``state``, shape (9,), as a replay does with each recorded state."""
         self._state[:] = state
         self._step = step
 
     def step(self, actuator: np.ndarray, active: tuple[ActiveFault, ...] = ()) -> PlantResult:
-        """Hold ``actuator`` (2), the input of the actuators, over one period and return the result at its end.
+        """Hold ``actuator``, the 2 inputs of the actuators, over one period and return the result at its end.
 
         ``active``: the active faults; those of the command have already been applied to ``actuator``.
         """

@@ -170,5 +170,5 @@ def sensor_data(values: Mapping[str, object], period: float) -> Struct:
 
 
 def sensor_state() -> np.ndarray:
-    """Return the memory of the nine sensors, which step 0 fills."""
+    """Return the state of the nine sensors: zeros, until step 0 draws its start."""
     return np.zeros(N_STATES, dtype("hsv_sensor_memory"))

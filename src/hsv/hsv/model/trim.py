@@ -25,9 +25,9 @@ INITIAL_GUESS = np.array([0.03, 0.3, 0.2])
 
 @dataclass(frozen=True)
 class Trim:
-    """An equilibrium: ``state`` (9) and ``input`` (2), in SI units, and the largest remaining imbalance, ``residual``.
+    """An equilibrium (SI): ``state``, shape (9,), ``input``, shape (2,), and the largest imbalance left, ``residual``.
 
-    The imbalance of a state is |dx/dt| (SI per second) without the commanded climb rate and acceleration.
+    The imbalance of a state is |dx/dt| (SI per second) after the commanded climb rate and acceleration are subtracted.
     """
 
     state: np.ndarray
@@ -104,7 +104,7 @@ def trim_at(
 
 
 def check_equilibrium(where: str, size: float, u: np.ndarray, vehicle: VehicleParameters) -> None:
-    """Check the imbalance ``size`` of an equilibrium, and that the input ``u`` (2) is within the limits of ``vehicle``.
+    """Check that the imbalance ``size`` is small and the input ``u``, shape (2,), within the limits of ``vehicle``.
 
     Raises:
         TrimError: The imbalance is too large or an input outside; the message names ``where`` and the reason.

@@ -151,7 +151,7 @@ class Vehicle:
         return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
 
     def condition(self, altitude: float | str, velocity: float | str) -> tuple[float | str, float | str]:
-        """Return altitude and velocity; empty texts become the published ones, or the centre if these are outside."""
+        """Return altitude and velocity; empty ones become the published trim's, or the centre's if it is outside."""
         published_altitude = parse_quantity(PUBLISHED_ALTITUDE, "m", "altitude")
         published_velocity = parse_quantity(PUBLISHED_VELOCITY, "m/s", "velocity")
         (h_low, h_high), (v_low, v_high) = self.altitude_range, self.velocity_range
@@ -191,11 +191,11 @@ class Vehicle:
         return self.decoupled._replace(inertial_coupling_1=psi_1, inertial_coupling_2=psi_2)
 
     def coupling_scale(self, coupling: str) -> float:
-        """Return kappa of a set of inertial coupling: the ratio of its psi_1 to that of the derived set."""
+        """Return kappa of a set of inertial coupling: its psi_1 as a multiple of the derived set's."""
         return self.couplings[coupling][0] / self.couplings[DERIVED][0]
 
     def check_envelope(self, table: Iterable[Parameter], values: Mapping[str, Any]) -> None:
-        """Check that altitudes and velocities, the parameters of a ``table`` in m and m/s, lie in the flight envelope.
+        """Check that altitudes and velocities (values of ``table``'s parameters in m and m/s) lie in the envelope.
 
         Raises:
             ParameterError: A value is outside; the message names its parameter.
@@ -304,7 +304,7 @@ def vehicle_names() -> list[str]:
 
 
 def _places_elsewhere() -> dict[str, str]:
-    """Return the entry points, ``package:file.toml``, of vehicles in other packages by name."""
+    """Return the entry points, such as ``package:file.toml``, of the vehicles in other packages, by vehicle name."""
     from importlib.metadata import entry_points  # slow
 
     return {entry.name: entry.value for entry in reversed([*entry_points(group=GROUP)])}

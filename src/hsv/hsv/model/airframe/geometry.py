@@ -34,7 +34,7 @@ class Cantilever:
     """Mass per length in kg/m."""
 
     def shape(self, distance: np.ndarray | float, derivative: int = 0) -> np.ndarray:
-        """Return the mode shape (kg^-0.5) or its n-th derivative (kg^-0.5/m^n) at a ``distance`` (m) from the clamp."""
+        """Return the mode shape, or its n-th ``derivative`` (kg^-0.5/m^n), at a ``distance`` (m) from the clamp."""
         b = EIGENVALUE
         x = b * np.asarray(distance, float) / self.length
         ratio = (np.cosh(b) + np.cos(b)) / (np.sinh(b) + np.sin(b))
@@ -53,7 +53,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Airframe:
-    """Dimensions of the airframe, in metres and radians; ``airframe.toml`` explains each of them."""
+    """Dimensions and other data of the airframe, in SI units and radians; ``airframe.toml`` explains most of them."""
 
     fore_body: float
     aft_body: float
@@ -84,12 +84,12 @@ class Airframe:
 
     @property
     def inlet(self) -> float:
-        """Station of the inlet (m)."""
+        """The x coordinate (m) of the inlet, from the centre of gravity."""
         return self.fore_body - self.inlet_ramp
 
     @property
     def nozzle(self) -> float:
-        """Station of the nozzle (m)."""
+        """The x coordinate (m) of the nozzle, from the centre of gravity."""
         return self.inlet - self.engine
 
     @property
@@ -108,22 +108,22 @@ class Airframe:
         return -self.aft_body, float(self.upper(-self.aft_body))
 
     def upper(self, x: float | np.ndarray) -> Any:
-        """Return the height z (m) of the upper surface at a station ``x`` (m), a number or an array."""
+        """Return the height z (m) of the upper surface at the coordinate ``x`` (m), a number or an array."""
         return self.nose[1] + (self.fore_body - x) * math.tan(self.upper_surface_angle)
 
     def lower(self, x: float | np.ndarray) -> Any:
-        """Return the height z (m) of the lower surface at a station ``x`` (m), a number or an array."""
+        """Return the height z (m) of the lower surface at the coordinate ``x`` (m), a number or an array."""
         corners = [self.tail, (self.nozzle, self.engine_roof), (self.inlet, self.engine_roof), self.nose]
         stations, heights = np.array(corners).T
         return np.interp(x, stations, heights)
 
     def half_width_at(self, x: float) -> float:
-        """Return half the width of the body (m) at a station ``x`` (m)."""
+        """Return half the width of the body (m) at the coordinate ``x`` (m)."""
         return float(np.interp(x, [self.inlet, self.fore_body], [self.half_width, self.nose_half_width]))
 
     @cached_property
     def elevator_hinge(self) -> Point:
-        """Position (x, z) of the elevator's axis (m): the middle of its chord, half-way between the surfaces."""
+        """Position (x, z) of the elevator's axis (m): its mid-chord, half-way between the body's surfaces."""
         x = -self.elevator_arm
         return x, 0.5 * float(self.upper(x) + self.lower(x))
 
@@ -133,11 +133,11 @@ class Airframe:
         return Cantilever(self.fore_body, self.mass_per_length), Cantilever(self.aft_body, self.mass_per_length)
 
     def mode(self, x: float) -> int:
-        """Return the index of the mode that bends the body at station ``x`` (m): 0 for the fore body, 1 for the aft."""
+        """Return the index of the mode that bends the body at ``x`` (m): 0 for the fore body, 1 for the aft body."""
         return 0 if x >= 0.0 else 1
 
     def shape(self, x: float, derivative: int = 0) -> float:
-        """Return the mode shape (kg^-0.5, up positive) at station ``x`` (m), or its n-th derivative (kg^-0.5/m^n)."""
+        """Return the mode shape at ``x`` (m), up positive, or its n-th ``derivative`` (kg^-0.5/m^n)."""
         return (-1.0 if x < 0.0 and derivative % 2 else 1.0) * float(
             self.cantilevers[self.mode(x)].shape(abs(x), derivative)
         )
@@ -145,7 +145,7 @@ class Airframe:
 
 @cache
 def airframe() -> Airframe:
-    """Return the airframe of the drawings, from ``airframe.toml`` and the vehicle's parameters."""
+    """Return the airframe of the drawings, from ``airframe.toml`` and the paper's vehicle."""
     tables = tomllib.loads(files("hsv.model.airframe").joinpath("airframe.toml").read_text(encoding="utf-8"))
     values = {name: value for table in tables.values() for name, value in table.items()}
     units = {name: "rad" if name.endswith("angle") else "m" for name in values} | {"mass_per_length": "kg/m"}

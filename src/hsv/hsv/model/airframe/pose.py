@@ -31,7 +31,7 @@ STEEPEST = 0.9
 
 
 class Sample(NamedTuple):
-    """Quantities that determine the drawing at one time: angles in rad, elastic coordinates in kg^0.5 m."""
+    """The quantities that determine the pose at one time: angles in rad, elastic coordinates in kg^0.5 m."""
 
     angle_of_attack: float
     pitch_angle: float
@@ -87,7 +87,7 @@ def transforms(sample: Sample, exaggeration: float | None = None) -> list[Transf
 
 
 def segments(frame: Airframe) -> dict[str, np.ndarray]:
-    """Return the stations (m) of the segment ends of each part of the body, from the centre of gravity outward."""
+    """Return the x coordinates (m) of the ends of the body's segments, by part, from the centre of gravity outward."""
     return {
         "fore_body": np.array([0.0, *np.linspace(frame.inlet, frame.fore_body, FORE_SEGMENTS + 1)]),
         "aft_body": np.array([0.0, *np.linspace(frame.nozzle, -frame.aft_body, AFT_SEGMENTS + 1)]),
@@ -95,7 +95,7 @@ def segments(frame: Airframe) -> dict[str, np.ndarray]:
 
 
 def segment_at(frame: Airframe, x: float) -> tuple[str, float]:
-    """Return the frame name of the segment at station ``x`` (m), and the station of the frame's origin (m)."""
+    """Return the name of the frame of the segment at ``x`` (m), and the x coordinate (m) of the frame's origin."""
     name = "fore_body" if x >= 0.0 else "aft_body"
     stations = np.abs(segments(frame)[name])
     index = min(int(np.searchsorted(stations, abs(x), side="right")), len(stations) - 1)
@@ -103,7 +103,7 @@ def segment_at(frame: Airframe, x: float) -> tuple[str, float]:
 
 
 def _chain(frame: Airframe, name: str, stations: np.ndarray, coordinate: float) -> list[Transform]:
-    """Return the transforms of the segments of a beam bent by an elastic ``coordinate``; segments keep their length."""
+    """Return the transforms of a part's rigid segments if its beam is bent by an elastic ``coordinate`` (kg^0.5 m)."""
     height = np.array([frame.shape(x) for x in stations]) * coordinate
     sines = np.clip(np.diff(height) / np.diff(stations), -STEEPEST, STEEPEST)
     found, parent, x, previous = [], BODY, 0.0, 0.0

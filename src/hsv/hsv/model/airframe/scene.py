@@ -33,7 +33,7 @@ _ARROWS: dict[str, Colour] = {FLIGHT_PATH: (0.1, 0.5, 0.25, 1.0), BODY: (0.0, 0.
 
 
 def scene(time_ns: int, exaggeration: float | None = None) -> SceneUpdate:
-    """Return the scene, stamped ``time_ns``; each client needs it once, and again when the exaggeration changes."""
+    """Return the scene, stamped ``time_ns``; send it to each client once, and again when the exaggeration changes."""
     stamp = _stamp(time_ns)
     entities = [_entity(solid, stamp) for solid in solids()]
     length = 0.7 * airframe().length

@@ -31,7 +31,7 @@ _SUNK = 0.8
 
 @dataclass(frozen=True)
 class Solid:
-    """A solid in a frame: triangles (n, 3, 3) in metres, counter-clockwise when seen from outside."""
+    """A solid in a frame: triangles [triangle, corner, xyz] in metres, counter-clockwise when seen from outside."""
 
     frame: str
     name: str
@@ -40,7 +40,7 @@ class Solid:
 
 
 def label(exaggeration: float | None = None) -> str:
-    """Return the text of the label, for ``exaggeration`` as in :func:`hsv.model.airframe.pose.transforms`."""
+    """Return the label of the picture, which states the factor ``exaggeration`` on the bending; None: the default."""
     return f"bending x {airframe().exaggeration if exaggeration is None else exaggeration:g}"
 
 
@@ -104,7 +104,7 @@ def _flame(frame: Airframe, name: str, height: float, colour: Colour) -> Solid:
 
 
 def _prism(section: Sequence[Point], sides: Callable[[float], tuple[float, float]]) -> np.ndarray:
-    """Return the triangles (n, 3, 3) of a prism whose width is given by ``sides``, the right and left y at a station.
+    """Return the triangles, shape (n, 3, 3), of a prism; ``sides`` gives its right and left y at a coordinate x.
 
     ``section`` has the corners (x, z) of the convex side view, counter-clockwise as seen from the right.
     """

@@ -37,7 +37,7 @@ NEVER_TIME = 1e9
 
 
 class FaultResult(NamedTuple):
-    """The input that reaches the actuators (2), and the active faults.
+    """The input that reaches the actuators, shape (2,), and the active faults.
 
     Faults of the command, actuators, effectors and engine act in this step, those of sensors on the next measurement.
     """
@@ -69,7 +69,7 @@ class FaultInjector:
             period: Control period T (s).
             seed: Seed of the flight.
             link: Link from the controller; None: an ideal link.
-            before: Input (2) that the link delivers first, sent before the flight; None: zeros.
+            before: Input, shape (2,), that the link delivers until a command has arrived; None: zeros.
         """
         for row in scheduled:
             row.fault.check_period(period)
@@ -86,7 +86,7 @@ class FaultInjector:
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
         """Return the injector that values of :attr:`PARAMETERS` describe.
 
-        Those of the vehicle and of its initial trim are used only if the link is not ideal.
+        The parameters of the vehicle and of its initial trim are used only if the link is not ideal.
         """
         v = validate(FAULT_PARAMETERS, values)
         period, seed = v["period"], v[SEED_PARAMETER.name]
@@ -113,18 +113,18 @@ class FaultInjector:
         return other
 
     def reset(self) -> None:
-        """Reset to the schedule; what was injected or cleared in flight is discarded."""
+        """Reset to the schedule: undo what was injected or cleared in flight."""
         self.known = list(self.scheduled)
         self._next = 0
         self._rows = self.rows((COMMAND,))
         self._link_state = self.link_state()
 
     def link_state(self) -> np.ndarray:
-        """Return the initial memory of the link."""
+        """Return the initial state of the link from the controller."""
         return link_state(self.link, N_INPUTS, self._before)
 
     def rows(self, sides: Sequence[str], earlier: Struct | None = None) -> Struct:
-        """Return the known faults of the given ``sides``, for the core; faults in ``earlier`` keep their memory."""
+        """Return the known faults on ``sides``, see :func:`fault_rows`; those in ``earlier`` keep their memory."""
         return fault_rows(sides, self.known, self.period, earlier)
 
     def parameters(self) -> dict[str, list[str] | list[float]]:
@@ -140,10 +140,10 @@ class FaultInjector:
         }
 
     def inject(self, fault: Fault, steps: int = NEVER) -> int:
-        """Start ``fault`` in the next step, for ``steps`` steps; it replaces any fault of the same type and channel.
+        """Start ``fault`` for ``steps`` steps; it replaces active faults of the same type and channel.
 
         Returns:
-            The first step of the fault.
+            The first step of the fault: the next step, or the one after it for a fault of a sensor.
 
         Raises:
             ParameterError: The period of an intermittent fault is shorter than the control period.
@@ -177,7 +177,7 @@ class FaultInjector:
         return min(ended, default=self._next)
 
     def step(self, step: int, command: np.ndarray) -> FaultResult:
-        """Return the input that reaches the actuators for ``command`` (2) in ``step``."""
+        """Return the input that reaches the actuators, for ``command``, shape (2,), in ``step``."""
         actuator = np.array(command, float)
         link, payload = self.link.pointer, doubles(actuator)
         lib.hsv_receive(link, doubles(self._link_state), len(self._link_state), step, self.seed, payload, N_INPUTS)

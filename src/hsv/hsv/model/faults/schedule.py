@@ -14,7 +14,7 @@ from hsv.model.signals import INPUT_NAMES, NEVER, STATE_NAMES
 
 
 class ScheduledFault(NamedTuple):
-    """A fault that acts in the steps [start, stop)."""
+    """A fault that acts from step ``start`` to step ``stop`` - 1."""
 
     fault: Fault
     start: int
@@ -37,13 +37,13 @@ def fault_rows(
     period: float,
     earlier: Struct | None = None,
 ) -> Struct:
-    """Return the scheduled faults of the given ``sides``, in the order of composition, as an ``hsv_faults``.
+    """Return the faults of the given ``sides`` as an ``hsv_faults``, in the order in which the core applies them.
 
     Args:
         sides: Names of sides, see :mod:`hsv.model.faults.table`.
         scheduled: Faults with their first step and the step after their last one, in any order.
-        period: T (s).
-        earlier: The result before a change in flight; faults that are in both keep their memory.
+        period: Control period T (s).
+        earlier: The result before a change in flight; faults that are also in ``scheduled`` keep their memory.
     """
     chosen = sorted((row for row in scheduled if row[0].kind.side in sides), key=_order)
     rows = np.zeros(len(chosen), dtype("hsv_fault"))

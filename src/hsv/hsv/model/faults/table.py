@@ -25,7 +25,7 @@ ENGINE = "engine"
 
 @dataclass(frozen=True)
 class Channel:
-    """Channel on which faults can act: SI unit of its signal, and a typical travel that scales ranges of parameters."""
+    """A channel on which faults can act: its SI unit, and a typical travel, with which parameter ranges are scaled."""
 
     unit: str
     travel: float
@@ -62,7 +62,7 @@ MAX_DELAY = lib.MAX_DELAY
 class FaultParameter:
     """A parameter of a kind of fault. ``{}`` in ``unit`` stands for the channel's unit.
 
-    With ``{}``, the range is relative to the travel of the channel.
+    With ``{}``, ``minimum`` and ``maximum`` are multiples of the channel's travel.
     """
 
     name: str
@@ -300,7 +300,7 @@ class Fault:
         return cls(channel, kind, tuple(given[p.name] for p in table))
 
     def check_period(self, period: float) -> None:
-        """Check that the fault comes and goes no faster than the control ``period`` (s).
+        """Check that an intermittent fault with a period does not repeat faster than the control ``period`` (s).
 
         Raises:
             ParameterError: Its period is shorter than that; the message names the parameter.

@@ -45,10 +45,10 @@ def actuator_system(actuators: Sequence[ActuatorSet]) -> tuple[np.ndarray, np.nd
 
 
 def sampled_actuators(actuators: Sequence[ActuatorSet], period: float) -> Struct:
-    """Return ``actuators`` (see :func:`actuator_system`) sampled at ``period`` (s) with held commands.
+    """Return ``actuators`` (see :func:`actuator_system`) sampled at ``period`` (s) with held commands c.
 
-    The state a+ = A a + B c is exact. C a + D c is the mean position over the period; a vehicle that is slow compared
-    with the period responds to this mean, which is therefore the input of the unchanged polytopic model.
+    Their states at the next sample are A a + B c, exactly. C a + D c is the mean position over the period; a vehicle
+    that is slow compared with the period responds to this mean, so it can be the input of the polytopic model.
     """
     A, B, C, D = actuator_system(actuators)
     # Integrators of the positions give their means.
@@ -60,7 +60,7 @@ def sampled_actuators(actuators: Sequence[ActuatorSet], period: float) -> Struct
 
 
 def respond(actuators: Struct, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the states (k, a) at the start of each period and the mean positions (k, 2) over it.
+    """Return the actuator states, shape (k, a), at the start of k periods, and the mean positions, (k, 2), over them.
 
     Args:
         actuators: Sampled actuators, initially at rest.
@@ -75,7 +75,7 @@ def respond(actuators: Struct, commands: np.ndarray) -> tuple[np.ndarray, np.nda
 def held_behind(
     A: np.ndarray, B: np.ndarray, period: float, actuators: Sequence[ActuatorSet] = (), delay: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the discrete A and B of dx/dt = A x + B p, where p are the actuator positions and commands are held.
+    """Return A and B in discrete time of dx/dt = A x + B p, for actuator positions p that follow held commands.
 
     Args:
         A: (n, n) state matrix, continuous time.
@@ -85,8 +85,8 @@ def held_behind(
         delay: Delay of all commands (s), which may exceed the period.
 
     Returns:
-        A (n + a + d, n + a + d) and B (n + a + d, 2) for n states of x, a states of the actuators and d delayed
-        commands, the newest first.
+        A (n + a + d, n + a + d) and B (n + a + d, 2) for n states of x, a states of the actuators and d numbers
+        of delayed commands, the newest command first.
     """
     from scipy.linalg import expm  # see hsv.model.lpv.linearisation
 

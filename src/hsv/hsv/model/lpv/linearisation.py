@@ -51,7 +51,7 @@ def extended_derivative(x: np.ndarray, u: np.ndarray, p: VehicleParameters, notc
         u: (2) inputs, real or complex.
         p: Vehicle.
         notch: Filter with k states.
-        printed: Whether the filtered pitch rate moves the vehicle, as the paper prints it, or the true one does.
+        printed: True: the filtered pitch rate moves the vehicle, as the paper prints it; False: the true one does.
     """
     filtered, s = x[PITCH_RATE], x[N_STATES:]
     passed = 0.0 * filtered

@@ -17,7 +17,7 @@ BLOCK = lib.SUMS
 
 
 def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: str) -> Struct:
-    """Return the interpolated weights of one scheduling variable, an ``hsv_axis``.
+    """Return the vertices' weights as functions of one scheduling variable, as an ``hsv_axis``.
 
     Args:
         breakpoints: (s) increasing values of the scheduling variable, SI.
@@ -76,7 +76,7 @@ def _spline(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def evaluate(weights: Struct, values: np.ndarray) -> np.ndarray:
-    """Return the weights (n, r) of r vertices at ``values`` (n) of the variable, clamped to the breakpoints."""
+    """Return the weights, shape (n, r), of r vertices at n ``values`` of their variable, clamped to the breakpoints."""
     breakpoints, coefficients = weights.breakpoints, weights.coefficients
     clamped = np.clip(values, breakpoints[0], breakpoints[-1])
     piece = np.clip(np.searchsorted(breakpoints, clamped, side="right") - 1, 0, len(breakpoints) - 2)

@@ -40,8 +40,8 @@ class PolytopicModel:
     """A polytopic model of a vehicle, and ``exact``, the continuous-time model that it approximates.
 
     ``polytope`` has the nine states. ``whole`` is the model as it was computed: with a filter, the filtered pitch rate
-    replaces the true one, and the states of the filter follow the nine. ``samples``: breakpoints (k) and weights (k, v)
-    of the vertices in altitude and in velocity. ``singular_values``: see :func:`tensor_product`; else empty.
+    replaces the true one, and the states of the filter follow the nine. ``samples``, for altitude and for velocity:
+    k breakpoints, and weights (k, v) of v vertices. ``singular_values``: those of :func:`tensor_product`, or empty.
     """
 
     vehicle: Vehicle
@@ -54,7 +54,7 @@ class PolytopicModel:
     singular_values: Sequence[np.ndarray]
 
     def accuracy(self, judged: Polytope, scales: tuple[np.ndarray, np.ndarray]) -> dict[str, float]:
-        """Return the largest deviations of ``judged`` from the linearised vehicle between the samples, for JSON.
+        """Return the largest deviations of ``judged`` from the linearised vehicle, and errors of its weights, by name.
 
         The error of the scaled [A - I, B] is relative to its Frobenius norm. Bode plots from all inputs to all states
         are compared at the point of the largest error and on a coarser grid that covers the envelope.
@@ -68,7 +68,7 @@ class PolytopicModel:
             return zero_order_hold(*self.exact(altitude, velocity), self.period)
 
         ranges = self.vehicle.altitude_range, self.vehicle.velocity_range
-        # Midpoints of equal intervals, which are not samples.
+        # Midpoints of equal intervals, of which few or none are samples.
         altitudes, velocities = (
             (low + (high - low) * (np.arange(_POINTS) + 0.5) / _POINTS).tolist() for low, high in ranges
         )
@@ -120,7 +120,8 @@ def polytopic_model(
         tensor: Tolerance and functions of :func:`tensor_product`; None: the samples are the vertices.
 
     Raises:
-        DesignError: There are too few samples for the tolerance, or no hull was found.
+        DesignError: There are too few samples for the tolerance, unknown functions, or no hull was found.
+        TrimError: There is no equilibrium at a sample.
     """
     exact: Linearised = partial(linearise, vehicle.decoupled)
     if notch:

@@ -28,8 +28,8 @@ def tensor_product(
 ) -> tuple[Polytope, tuple[Samples, Samples], list[np.ndarray]]:
     """Return a polytopic model of discrete-time samples on a grid (paper eq. 11) with a tight hull.
 
-    The other results, one for altitude and one for velocity each, are the samples of the weights and the singular
-    values of the unfolding along the variable, relative to the largest.
+    Then return, each for altitude and for velocity, the samples of the weights, and the singular values of the samples
+    unfolded along this variable, relative to the largest.
 
     The higher-order singular value decomposition is applied to the scaled [A - I, B]; with A in place of A - I the
     ranks would depend on the sampling period.
@@ -129,13 +129,13 @@ def smallest_weight(breakpoints: np.ndarray, weights: np.ndarray) -> float:
 
 
 def relaxed(weights: np.ndarray, least: float) -> np.ndarray:
-    """Return the weights (s, r) in a simplex enlarged about its centre until the smallest one, ``least``, is zero."""
+    """Return the weights (s, r) after enlarging the simplex so that the smallest, ``least``, is zero if negative."""
     excess = max(0.0, -least)
     return np.asarray((weights + excess) / (1.0 + weights.shape[1] * excess))
 
 
 def _start(basis: np.ndarray) -> np.ndarray:
-    """Return Q (r, r), see :func:`_smallest_simplex`, of a simplex through r points, enlarged to contain the curve."""
+    """Return Q (r, r), see :func:`_smallest_simplex`, of a simplex through r points, enlarged to enclose the curve."""
     s, r = basis.shape
     chosen = np.round(0.5 * (1.0 - np.cos(np.pi * np.arange(r) / (r - 1))) * (s - 1)).astype(int)
     if np.linalg.matrix_rank(basis[chosen]) < r:
