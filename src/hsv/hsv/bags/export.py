@@ -129,7 +129,7 @@ def _fields(bag: Bag, topic: str) -> dict[str, tuple[NDArray[Any], str]]:
 
 
 def table(columns: Mapping[str, NDArray[Any]], units: Mapping[str, Units]) -> dict[str, NDArray[Any]]:
-    """Return one column per number, with its unit in its name; short sequences are padded with NaN.
+    """Return one column per number or other field, its unit in its name; short sequences are padded with NaN.
 
     Args:
         columns: Fields of messages from :mod:`hsv.bags.columns`.

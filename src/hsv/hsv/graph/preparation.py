@@ -95,7 +95,7 @@ def prepare(
         folder: Directory for the parameter files; if not given, a temporary one that is removed with the result.
 
     Raises:
-        ParameterError: ``live_port`` or the port after it is in use.
+        ParameterError: ``live_port`` or the port after it is out of range or in use.
         ScenarioError: Names the field that is wrong, or what is wrong with the design.
         RecordingError: ``bag`` exists already or cannot be made.
     """
