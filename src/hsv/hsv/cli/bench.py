@@ -298,7 +298,7 @@ def graph_lap(duration: float) -> float:
 
 
 def ring_lap(laps: int) -> float:
-    """Pass the graph's messages ``laps`` times around a ring of bare processes, recorded; return the time (s) of a lap.
+    """Pass the graph's messages ``laps`` times around a recorded ring of bare processes; return the time (s) of a lap.
 
     Raises:
         RunError: A process ended before its time, or the workspace is not built.

@@ -289,7 +289,7 @@ def _factors(scenario: Scenario, drawn: Mapping[str, Distribution], scale: float
 def _check_ends(campaign: Campaign) -> None:
     """Raise an error if the scenario does not admit the least or largest values of the factors.
 
-    All least values, then all largest values are tried together, and each alone with the others at middle values.
+    Tried are all least values, all largest values, and each of these alone with the other factors at middle values.
     """
     low, high, mean = ([getattr(f, end) for f in campaign.factors] for end in ("low", "high", "middle"))
     for ends in (low, high):

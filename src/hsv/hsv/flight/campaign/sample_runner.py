@@ -104,7 +104,7 @@ class SampleRunner:
         return self._levels.worst(flight)
 
     def outcome(self, flown: FlownSample) -> Outcome:
-        """Return the results of a flight by column: how it ended and, unless the controller crashed, numbers (SI)."""
+        """Return the results of a flight by column: how it ended and, without a crash, :data:`OUTCOMES` and fingerprint."""
         if isinstance(flown, ControllerError):
             return {"diverged": False, "crashed": str(flown)}
         flight, level = flown

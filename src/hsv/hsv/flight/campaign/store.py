@@ -53,7 +53,7 @@ class ResultStore(Store):
         return {batch for batch in batches if self._is_whole(batch)}
 
     def finish(self) -> None:
-        """Join the files of all batches into the result file, then delete them; if it exists already, do nothing."""
+        """Unless the result file exists, join the files of all batches into it, and then delete these files."""
         if self.out.exists():
             return
         temporary = self.out.with_name(self.out.name + ".unfinished")

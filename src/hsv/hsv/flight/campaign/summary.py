@@ -34,7 +34,7 @@ TUBE_LIMIT = 1.0
 
 @dataclass(frozen=True)
 class Share:
-    """The flights that finish within a ``limit`` (SI), or at all if it is None: ``within`` of ``flights``."""
+    """How many flights finish within ``limit`` (SI), or finish at all if it is None: ``within`` of ``flights``."""
 
     name: str
     limit: float | None
