@@ -104,7 +104,7 @@ class SampleRunner:
         return self._levels.worst(flight)
 
     def outcome(self, flown: FlownSample) -> Outcome:
-        """Return the results of a flight by column: how it ended and, without a crash, :data:`OUTCOMES` and fingerprint."""
+        """Return the results of a flight by column: how it ended, :data:`OUTCOMES` and fingerprint, or the crash."""
         if isinstance(flown, ControllerError):
             return {"diverged": False, "crashed": str(flown)}
         flight, level = flown
