@@ -43,7 +43,7 @@ def scenario_parameters(scenario: Scenario) -> dict[str, Any]:
 
 
 def own_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the flat parameters of a custom controller, whose class is imported; otherwise return none."""
+    """Return the flat parameters of a custom controller, whose class is imported; empty for a shipped one or a node."""
     if scenario.controller in SHIPPED_CONTROLLERS:
         return {}
     if scenario.controller.startswith(NODE):
@@ -70,7 +70,7 @@ def flight_parameters(scenario: Scenario) -> dict[str, Any]:
 def assemble(values: Mapping[str, Any], design: ControlDesign | None = None) -> Components:
     """Return the five components of the loop for the flat parameters ``values``.
 
-    ``design`` is the design in ``values`` if it has been parsed before.
+    ``design`` is the design in ``values``, if the caller has parsed it already; otherwise it is parsed here.
     """
     design = design or design_of(values)
     return Components(**{block.name: block.build(values, design) for block in LOOP})
@@ -130,15 +130,15 @@ def uncovered_of(
 
 
 def require_trust(controller: str, source: object, trust: bool) -> None:
-    """Refuse a ``controller`` whose code the bag or campaign ``source`` names, unless the user passed ``--trust``.
+    """Refuse custom code as the ``controller`` of a bag or campaign, the ``source``, unless the user passed ``--trust``.
 
-    A controller that is registered here under a name is installed code; a file may select it but not supply it.
+    Custom code is a class, a library or an FMU. A registered name selects installed code, which is not refused.
     """
     if names_code(controller) and not trust:
         raise ParameterError(f"{source}: controller = {controller!r}: code that this file names, run only with --trust")
 
 
 def require_path_inside(path: str, field: str, source: object, trust: bool) -> None:
-    """Refuse a path in the bag or campaign ``source`` that leads out of its folder, unless the user trusts it."""
+    """Refuse an absolute ``path``, or one with ``..``, in the bag or campaign ``source``, unless the user trusts it."""
     if (PurePath(path).is_absolute() or ".." in PurePath(path).parts) and not trust:
         raise ParameterError(f"{source}: {field} = {path!r}: a path out of the folder, followed only with --trust")

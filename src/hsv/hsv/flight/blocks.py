@@ -66,7 +66,7 @@ class Block:
     def build(self, values: Mapping[str, Any], design: ControlDesign | None = None) -> Any:
         """Return the component for the flat parameters ``values``.
 
-        ``design`` is the design in ``values`` if it has been parsed before.
+        ``design`` is the design in ``values``, if the caller has parsed it already.
         """
         module, _, path = self.built_by.partition(":")
         build = attrgetter(path)(import_module(module))

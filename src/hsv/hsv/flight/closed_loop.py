@@ -65,7 +65,7 @@ def fly(components: Components) -> Flight:
 
 
 def is_ideal(components: Components) -> bool:
-    """Return whether equipment, links and air are ideal, so that the controller receives the true state."""
+    """Return whether the controller receives the true state: hardware and air are ideal and no estimator is enabled."""
     injector = components.fault_injector
     ideal = components.plant.is_ideal(injector.known) and injector.link.ideal
     return ideal and components.notch_filter.estimator is None
@@ -73,9 +73,9 @@ def is_ideal(components: Components) -> bool:
 
 @contextmanager
 def watched(controller: Controller, rows: int) -> Iterator[tuple[History, Callable[..., Any]]]:
-    """Yield a history of ``rows`` steps, and the function that sends a request to the process of a library controller.
+    """Yield a history of ``rows`` steps in shared memory, and a function that requests flights into it.
 
-    The process writes the flights that are requested into the history, which is in shared memory.
+    The requests go to the child process of the ``controller``, which is in a shared library.
 
     Raises:
         ControllerError: The child process crashed or made no progress; the message names the step.
@@ -135,8 +135,8 @@ NO_CALL = Struct("hsv_call", function=None, state=None, par=None)
 def flight_struct(components: Components, history: History, **others: Any) -> Struct:
     """Return the core's struct of a flight before its first step; the core writes the flight to ``history``.
 
-    ``others`` replace fields of the struct: ``nominal_law`` and ``controller`` call external laws, ``commanded``
-    (2) is an external input before saturation, and ``set`` is the invariant set in which the error's level is computed.
+    ``others`` replace fields of the struct: ``nominal_law`` and ``controller`` call external laws; ``commanded``, shape
+    (2,), is an external input before saturation; ``set`` is the invariant set in which the error's level is computed.
     """
     plant, notch, injector = components.plant, components.notch_filter, components.fault_injector
     nominal, controller = components.nominal_trajectory, components.controller

@@ -1,4 +1,4 @@
-"""The region that a design declares: one flight, and the corners of the bounds on the uncertain parameters."""
+"""The flight in which a design's disturbances are measured, and the corners of the vehicle's uncertain parameters."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def corners(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, f
 
 
 def fraction(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, float]]:
-    """Return the nominal vehicle, then a quarter of the corners, or all with fewer than ten parameters.
+    """Return the nominal vehicle, then a quarter of the corners, or all if there are fewer than ten parameters.
 
     The order is fixed. The quarter is a regular fraction of resolution VI: two of ten signs are products of five
     others. Any three parameters therefore still occur in all combinations of their signs.
@@ -47,10 +47,10 @@ def fraction(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, 
 
 
 def screening_corners(bounds: Mapping[str, float], share: float = 1.0) -> list[Corner]:
-    """Return the nominal vehicle, then 32 corners of ``share`` times the bounds (at most 15), in a fixed order.
+    """Return the nominal vehicle, then 32 corners of ``share`` times the ``bounds``, in a fixed order.
 
-    The corners are the 16 runs of a Hadamard matrix and their mirror images. Any three parameters occur in all
-    combinations of their signs.
+    The signs of the corners are the 16 rows of a Hadamard matrix and their opposites, for at most 15 parameters. Any
+    three parameters occur in all combinations of their signs.
     """
     runs = hadamard(16)[:, 1 : 1 + len(bounds)]
     rows = share * np.vstack((runs, -runs)) * np.array(list(bounds.values()))

@@ -51,7 +51,7 @@ _TAIL = (
 
 
 def standard_quantiles(shares: np.ndarray) -> np.ndarray:
-    """Return the quantiles (n) of the standard normal distribution at the probabilities ``shares`` (n).
+    """Return the quantiles of the standard normal distribution at the probabilities ``shares``, both of shape (n,).
 
     The error is about 1e-15 for probabilities from 1e-10 to 1 - 1e-10.
     """
@@ -80,12 +80,12 @@ class Distribution:
 
     @property
     def middle(self) -> float:
-        """The mean, rounded down for integers; it is the value of a single flight outside a campaign."""
+        """The mean, rounded down for integers; it stands for the number wherever none is drawn, as in checks."""
         mean = (self.low + self.high) / 2.0
         return float(np.floor(mean)) if self.whole else rounded(mean)
 
     def quantiles(self, shares: np.ndarray) -> np.ndarray:
-        """Return the quantiles (n) at the probabilities ``shares`` (n), rounded to 15 digits."""
+        """Return the quantiles at the probabilities ``shares``, both of shape (n,), rounded to 15 digits."""
         if self.kind == "normal":
             deviation = (self.high - self.low) / (2.0 * TRUNCATION)
             values = (self.low + self.high) / 2.0 + deviation * standard_quantiles(
@@ -104,8 +104,8 @@ def read_distribution(given: Mapping[str, Any], unit: str, field: str, *, whole:
     """Return the distribution in the inline table ``given`` for a scenario's ``field``, whose numbers are in ``unit``.
 
     Raises:
-        QuantityError: The kind is unknown, or the values are no pair of quantities in this unit, in the wrong order, or
-            not integers although ``whole``.
+        QuantityError: The kind is unknown, or the values are not two quantities in ``unit`` or are in the wrong order,
+            or the deviation is not positive; with ``whole`` also if the kind is normal or the values are not integers.
     """
     forms = " or ".join(f"{{ {kind} = {pair} }}" for kind, pair in KINDS.items())
     if len(given) != 1 or next(iter(given)) not in KINDS:

@@ -37,10 +37,10 @@ DIGITS = 12
 
 
 def fingerprint(flown: np.ndarray) -> str:
-    """Return ``v1:`` and the hexadecimal SHA-256 of the rows ``flown`` (n + 1, 25).
+    """Return ``v1:`` and the hexadecimal SHA-256 of the rows of ``flown``, shape (n + 1, 25).
 
-    Row k has x (9), q_f, x_n (9), u_n (2), command u (2) and actuator input (2) of step k. The numbers are digested row
-    after row as little-endian float64, with all NaNs replaced by the same NaN.
+    Row k has 25 numbers of step k: x (9 numbers), q_f, x_n (9), u_n (2), command u (2) and actuator input (2). They are
+    digested row after row as little-endian float64, with all NaNs replaced by the same NaN.
     """
     digest = hashlib.sha256()
     # As many rows at a time as the processor's cache holds.
@@ -53,10 +53,10 @@ def fingerprint(flown: np.ndarray) -> str:
 
 
 def as_published(found: str | None, scenario: Scenario | None, design_hash: str) -> bool | None:
-    """Return whether the fingerprint ``found`` of a flight is published, for any scenario.
+    """Return whether ``found``, the fingerprint of a flight, is a published one, no matter of which scenario.
 
-    False: ``scenario`` and the design, with the digest ``design_hash``, are shipped and have another fingerprint. None:
-    neither is the case, or there is no fingerprint.
+    False: another fingerprint is published for ``scenario`` with the design whose digest is ``design_hash``. None: none
+    is published for them, or the flight has no fingerprint.
     """
     if any(found == entry["fingerprint"] for entry in _table().values()):
         return True
@@ -69,7 +69,7 @@ def as_published(found: str | None, scenario: Scenario | None, design_hash: str)
 
 
 def published_in_words(found: str | None, same: bool | None) -> str:
-    """Return the result of :func:`as_published` as text."""
+    """Return ``same``, the result of :func:`as_published` for the fingerprint ``found``, as text."""
     if found is None:
         return "none: the recording is not complete"
     return {True: "as published", False: "not the published flight of this scenario", None: "none is published"}[same]

@@ -42,7 +42,7 @@ class Flight(FlightData):
 
     @property
     def plan(self) -> np.ndarray:
-        """The input u_r + u_n (n + 1, 2) of the nominal trajectory."""
+        """The input u_r + u_n of the nominal trajectory, shape (n + 1, 2)."""
         return np.asarray(self.history.nominal_input + self.reference_input)
 
     @property
@@ -79,14 +79,14 @@ class Flight(FlightData):
 
 
 def step_statistics(seconds: Sequence[float]) -> dict[str, float]:
-    """Return median, 99th percentile and maximum, in ms, of wall times in ``seconds``; percentiles by nearest rank."""
+    """Return median, 99th percentile and maximum (ms) of the wall times ``seconds``; each is one of these times."""
     ordered = np.sort(seconds)
     shares = {"median_ms": 0.5, "p99_ms": 0.99, "max_ms": 1.0}
     return {name: 1e3 * float(ordered[round(share * (len(ordered) - 1))]) for name, share in shares.items()}
 
 
 def step_times_in_words(step_times: dict[str, Any]) -> str:
-    """Return one line with the wall times of the control laws by node, and of a whole step of the loop if known."""
+    """Return one line: the wall times of the control laws by node and, if known, of a whole step, and the period."""
     times = [
         f"{name} {times['median_ms']:.3g} ms in the median, 99 % {times['p99_ms']:.3g}, largest {times['max_ms']:.3g}"
         for name, times in step_times["nodes"].items()

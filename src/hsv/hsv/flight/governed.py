@@ -26,11 +26,12 @@ class GovernedScenario:
 
 
 def governed(name: str, blend: float) -> GovernedScenario:
-    """Return the scenario ``name`` (or path) with governed commands; corners are blended over twice ``blend`` (s).
+    """Return the scenario ``name`` (or path) with governed commands; each corner's blend lasts twice ``blend`` (s).
 
     Raises:
         ScenarioError: There is no such scenario, or it cannot be flown.
-        GovernorError: Controller, design or nominal law do not certify a plan, or no reference fits a command.
+        GovernorError: The controller is not ``tube_mpc``, the design has no tightened inputs, the nominal law is not
+            ``family``, ``blend`` is out of range, or no reference fits the commands.
     """
     scenario = load_scenario(name)
     components = assemble_flight(scenario)

@@ -41,7 +41,7 @@ class History(_Matrices):
 
     @classmethod
     def of(cls, **signals: np.ndarray) -> History:
-        """Return a history with the given ``signals`` (n + 1 rows each), by name; all others are NaN."""
+        """Return a history of ``signals`` (n + 1 rows each) by name; others are NaN, but ``estimate`` is ``state``."""
         history = cls.empty(len(next(iter(signals.values()))), estimated=False)
         history.signals[:] = history.auxiliary[:] = np.nan
         for name, values in signals.items():
@@ -50,7 +50,7 @@ class History(_Matrices):
 
     @classmethod
     def over(cls, memory: np.ndarray, rows: int, *, estimated: bool = True) -> History:
-        """Return a history of ``rows`` steps in ``memory``, whose last axis holds one matrix after the other."""
+        """Return a history of ``rows`` steps whose matrices lie one after the other on the last axis of ``memory``."""
         matrices, start = [], 0
         for width in (SIGNAL_COLUMNS, AUXILIARY_COLUMNS, N_STATES)[: 3 if estimated else 2]:
             stop = start + rows * width

@@ -1,7 +1,7 @@
 """Child process that loads a shared library and simulates the loop with its controller.
 
-There are two processes. The supervisor never loads the library; it forks the worker, which does. If the worker crashes,
-the supervisor reports the crash to the parent and forks a fresh worker.
+There are two processes. The supervisor never loads the library; it forks the worker, which does. If the worker crashes
+or exits, the supervisor reports this to the parent and forks a fresh worker.
 
 :mod:`hsv.control.library_process` starts the supervisor as
 ``python3 -m hsv.flight.library_child LIBRARY CONNECTION MEMORY``; the last two are file descriptors.
@@ -48,7 +48,7 @@ class LoadedLibrary:
         yield self._memory.numbers(numbers)
 
     def request(self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, **_: Any) -> Any:
-        """Call the method ``name`` with the ``arguments`` and the keywords ``kept``, and return its result."""
+        """Return the result of the method ``name`` with ``arguments`` and the keywords ``kept``; ignore all others."""
         return getattr(self, name)(*arguments, **(kept or {}))
 
     def describe(self, symbol: str) -> CBlock:
@@ -69,14 +69,14 @@ class LoadedLibrary:
     def step(
         self, symbol: str, k: int, inputs: np.ndarray, state: np.ndarray, parameters: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Call the step function of the library; return the unsaturated input (2) and the state after the step."""
+        """Call the library's step function; return the unsaturated input, shape (2,), and the state after the step."""
         with self._reason():
             u_unsaturated = call_step_function(self.describe(symbol).address, k, inputs, state, parameters)
         return u_unsaturated, state
 
     @contextmanager
     def _reason(self) -> Iterator[None]:
-        """In an error that is raised in this context, replace the return value by the reason why the FMU failed."""
+        """Replace the return code in the message of an error raised in this context by the FMU's failure, if any."""
         try:
             yield
         except RunError as error:

@@ -53,7 +53,7 @@ def not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, float]) -> l
 
 
 def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float], system: UnitSystem) -> str:
-    """Return one line: whether a flight kept its limits, which limits it broke, and which metrics have no limit."""
+    """Return one line: whether a flight kept its limits, which it did not keep, and which criteria have no limit."""
     text = limits_kept(judged, system)
     words = criteria_not_judged(judged, metrics, system)
     if others := len(not_judged(judged, metrics)) - len(words):

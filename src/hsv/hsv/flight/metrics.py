@@ -134,7 +134,7 @@ class FlightData:
 
     @cached_property
     def _evaluated(self) -> tuple[np.ndarray, np.ndarray]:
-        """The curves (10, n + 1) and the saturation (n + 1, 2)."""
+        """The :attr:`curves`, shape (10, n + 1), and :attr:`saturated`, shape (n + 1, 2)."""
         rows = len(self.time)
         curves, saturated = np.empty((CURVES, rows)), np.empty((rows, N_INPUTS), np.uint8)
         inputs = map(doubles, map(vector, (self.history.signals, self.history.auxiliary, self.reference)))
@@ -143,16 +143,16 @@ class FlightData:
 
     @property
     def curves(self) -> np.ndarray:
-        """The curves (10, n + 1) from which metrics are computed, SI.
+        """The ten signals from which metrics are computed, shape (10, n + 1), SI.
 
-        Errors of altitude and velocity, angle of attack, pitch angle, the two elastic rates, the two commands, and the
-        absolute differences of angle of attack and pitch angle from x_r + x_n.
+        Rows: altitude error; velocity error; angle of attack; pitch angle; rates of the two elastic modes; the two
+        inputs; absolute differences of angle of attack and of pitch angle from x_r + x_n.
         """
         return self._evaluated[0]
 
     @property
     def saturated(self) -> np.ndarray:
-        """Whether each command was limited (n + 1, 2)."""
+        """Whether each of the two inputs was limited, by step, shape (n + 1, 2)."""
         return self._evaluated[1]
 
     @cached_property
@@ -164,7 +164,7 @@ class FlightData:
 def _metrics(flight: FlightData) -> dict[str, float]:
     """Return the metrics of a flight, SI, by name, in the order of :data:`METRICS`.
 
-    Metrics of a step, a fault or an elastic mode are omitted if the flight has none.
+    Metrics of a step response, a fault or elastic modes are omitted if the flight has none.
     """
     values: dict[str, float] = {}
     time, curves = flight.time, flight.curves
@@ -201,7 +201,7 @@ def _metrics(flight: FlightData) -> dict[str, float]:
 def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
     """Return rise time (s), settling time (s) and overshoot (share of the step) of a step response, by name.
 
-    ``time`` (n) is in seconds, ``error`` (n) is the tracking error; its first value is the size of the step. A time is
+    ``time`` (s) and ``error``, the tracking error, have shape (n,); the first error is the size of the step. A time is
     omitted if the response does not rise or settle. Without a step the result is empty.
     """
     if len(time) < 2 or abs(error[0]) < 1e-6:

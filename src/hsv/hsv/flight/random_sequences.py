@@ -1,9 +1,9 @@
-"""Random sequences of vertices and disturbances that may drive the error e out of an ellipsoid.
+"""Random sequences of the model's vertices and of disturbances that try to drive the error e out of an ellipsoid.
 
 They test the invariance of the ellipsoid without the matrix inequality that certifies it. They start at e = 0, where
 flights start, or on the boundary. Kinds: *iid* draws the vertex and the signs of all disturbances anew at every step;
 *held* keeps them; *switching* keeps them for random times; *adversarial* keeps vertices for random times and picks the
-signs that push outwards most. Every twenty-fifth adversarial sequence picks the vertex in this way, too.
+signs one by one so that they push outwards. Every twenty-fifth adversarial sequence also picks the worst vertex.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ def random_sequences(
 ) -> dict[str, Any]:
     """Return the largest levels that random sequences reach, in total and by start and kind; 1 is the boundary.
 
-    The same ``seed`` gives the same bits on any number of threads.
+    The result also has ``sequences``, ``steps`` and ``seed``, which give the same bits on any number of threads.
 
     Args:
         A: (r, n, n) closed loops at the vertices, between which the sequences switch.
-        columns: (r, n, d) effects of d disturbances, each of magnitude 1 at most, on the error less ``centre``.
+        columns: (r, n, d + 1) effects of d disturbances, each 1 or -1, and of a constant 1, on e - ``centre`` in one step.
         centre: (n) centre of the ellipsoid.
         Q: (n, n) its matrix; the level of an error e is (e - centre)' Q^-1 (e - centre).
         sequences: Number of sequences.

@@ -34,7 +34,7 @@ _FLIGHTS = 2
 
 @dataclass(frozen=True)
 class Finding:
-    """The result of a check: its name, its number of flights, and in words where bytes first differ, if they do."""
+    """The result of a check: its name, its number of flights, and the first difference or failure in words, if any."""
 
     check: str
     flights: int
@@ -63,9 +63,9 @@ def findings(scenario: Scenario) -> Iterator[Finding]:
 
 
 def from_copied_state(parts: Components, flight: Flight) -> str:
-    """Step the controller along a ``flight`` again, and a copy of it from the middle of the flight on.
+    """Step the controller along a ``flight`` again, and from the middle of the flight on also a copy of it.
 
-    Return in words where an unsaturated input first differs from that of the flight, or empty text.
+    Return the first step with another unsaturated input, or a failure, in words; empty if there is none.
     """
     h, steps = flight.history, len(flight.time)
     steppers = {"the controller": parts.controller}
@@ -95,7 +95,7 @@ def from_copied_state(parts: Components, flight: Flight) -> str:
 
 
 def under_load(scenario: Scenario, first: Flight) -> Finding:
-    """Fly ``scenario`` in up to five processes, several flights at a time in each, and return the finding."""
+    """Fly ``scenario`` in two to five processes, several flights at a time in each; compare them with ``first``."""
     processes = min(os.cpu_count() or 1, 4) + 1
     name, histories = f"under load, {processes} processes", list[History]()
     try:

@@ -10,9 +10,9 @@ from hsv.model.signals import N_INPUTS, N_RIGID
 
 
 def along_filter(notch: Struct, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the output (k) of the notch filter for the pitch ``rate`` (k), and its states (k, s) before each step.
+    """Return the output of the notch filter for the pitch ``rate``, both of shape (k,), and its states, shape (k, s).
 
-    The filter starts at the equilibrium for the first rate; s is twice its number of sections.
+    The filter starts at the equilibrium for the first rate. Row i has the s states, two per section, before step i.
     """
     filtered, states = np.empty(len(rate)), np.empty((len(rate), 2 * len(notch.D)))
     lib.hsv_notch_along(notch.pointer, len(rate), *map(doubles, (vector(rate), filtered, states)))
@@ -27,9 +27,9 @@ def lag_response(
     scheduled: np.ndarray,
     lag: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the response of the error e (k, n) and of the feedback (k, 2) to the lag of the plan, in closed loop.
+    """Return the responses of the error e, shape (k, n), and the feedback, shape (k, 2), to ``lag``, in closed loop.
 
-    The error starts at zero. The n states of e are those of the rigid body (5), the notch filter and the actuators.
+    The error starts at zero. Its n states are those of the rigid body (five), the notch filter and the actuators.
 
     Args:
         polytope: Model of the vehicle.
@@ -37,7 +37,7 @@ def lag_response(
         notch: Notch filter.
         actuators: Sampled actuators.
         scheduled: (k, 2) altitude (m) and velocity (m/s) of the flight.
-        lag: (k, 2) mean positions of actuators driven by the plan, less the plan.
+        lag: (k, 2) mean positions in each step of actuators driven by the plan u_r + u_n, less the plan.
     """
     a, s, data = len(actuators.A), 2 * len(notch.D), polytope.data()
     errors, feedback = np.empty((len(lag), N_RIGID + s + a)), np.empty((len(lag), N_INPUTS))

@@ -174,9 +174,9 @@ def scenario_text(name: str) -> str:
 
 
 def _located(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return the ``table`` of the scenario file ``name`` with paths relative to the working directory.
+    """Return the ``table`` of the scenario file ``name`` with the vehicle's path relative to the working directory.
 
-    The path of a library becomes absolute. A named vehicle replaces the vehicle definition of the extended scenario.
+    The path of a library becomes absolute. A vehicle that is named here replaces an inherited vehicle definition.
     """
     folder = Path(name).parent if is_path(name) else Path()
     controller, vehicle = table.get("controller"), table.get("vehicle", {})
@@ -386,9 +386,9 @@ def _check(scenario: Scenario, tables: Collection[str]) -> None:
 
 
 def _check_starts(scenario: Scenario) -> None:
-    """Refuse events that start after the flight's end, simultaneous changes of tau, and faults without a duration.
+    """Refuse late starts of events, simultaneous changes of tau, and faults that do not end after their start.
 
-    A ramp or a fault may end after the flight.
+    An event must start at 0 s or before the flight's end; a ramp or a fault may end after the flight.
     """
     changes = [change.start for change in scenario.tube.change]
     starts = {

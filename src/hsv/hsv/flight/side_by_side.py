@@ -33,7 +33,7 @@ class FlightGroup:
 
     @staticmethod
     def takes(components: Sequence[Components], rows: int | None = None) -> bool:
-        """Return whether flights can be flown side by side.
+        """Return whether the flights of ``components``, two to :func:`hsv.core.lanes`, can be flown side by side.
 
         Nominal law and controller must be the core's own. Only vehicle, seed, initial state, faults, reference, gains,
         and the numbers of sensors, links and air may differ. Histories of ``rows`` steps each must not be too large.

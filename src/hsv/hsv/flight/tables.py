@@ -104,7 +104,7 @@ def quantity(
     axis: str = "",
     bare: bool = True,
 ) -> BeforeValidator:
-    """Return a validator of a quantity within ``limits`` (SI), which error messages describe as ``shown``.
+    """Return a validator of a quantity within ``limits`` (SI); ``shown`` describes the limits in error messages.
 
     With an ``axis``, altitude or velocity, the limits are the envelope of the scenario's vehicle. Unless ``bare``, a
     number without a unit is refused, because 5 might mean 5 % but would be read as 500 %.
@@ -125,7 +125,7 @@ def quantity(
 
 
 def _numbers(given: object, info: ValidationInfo) -> tuple[float, ...]:
-    """Return a dimensionless number, or a list of them, as a tuple."""
+    """Return a dimensionless number, or a list of them, as a tuple, with means in place of distributions."""
     texts = given if isinstance(given, list | tuple) else [given]
     if not texts:
         raise QuantityError(f"{info.field_name} = []: expected one value at least")
@@ -236,7 +236,7 @@ class TubeTable(Table):
 
 
 class FaultTable(Table):
-    """A scheduled fault; in a file, its parameters are keys next to the others."""
+    """A scheduled fault; in a file, the parameters of its type are further keys of the same table."""
 
     channel: str
     type: str

@@ -50,17 +50,17 @@ _FLIGHTS, _SEED = 48, 7
 
 
 def region(subject: Subject, design: ControlDesign, share: float) -> Components:
-    """Return the loop of the design's declared flight: nominal vehicle, and ``share`` of the fault (eq. 47)."""
+    """Return the components for the flight that the design declares, with ``share`` of its fault (eq. 47)."""
     declared = region_parameters(subject.certificate["inputs"], subject.vehicle, share)
     return assemble({**design.to_parameters(), **declared})
 
 
 class Disturbances(NamedTuple):
-    """Disturbances and error of a flight, one row per step.
+    """Disturbances, tube error and feedback to the actuators' lag in a flight, one row per step, SI.
 
-    ``channels`` (n, 7): disturbances in the order of :data:`~hsv.control.verification.CHANNELS`. ``error``
-    (n + 1, states): tube error e, without its response to the lag of actuators behind the plan. ``lag`` (n + 1, 2):
-    response of the feedback to this lag.
+    ``channels``, shape (n, 7), are the disturbances in the order of :data:`~hsv.control.verification.CHANNELS`.
+    ``error``, shape (n + 1, states), is the tube error e, less its response to the lag of the actuators behind the
+    plan u_r + u_n. ``lag``, shape (n + 1, 2), is the response of the feedback to this lag.
     """
 
     channels: np.ndarray
@@ -114,9 +114,9 @@ def disturbances(subject: Subject, flight: Flight) -> Disturbances:
 class Evidence:
     """Extremes of a flight: largest ``level`` in the tube, and largest ``ratio`` of a disturbance to its bound.
 
-    The largest ratio occurs in ``channel`` at ``step``. ``lowest`` and ``highest`` (3) are the extremes of u_r + u_n
-    (2) and of the nominal pitch acceleration (rad/s^2). The rows of ``lag`` (2, 2) and ``channels`` (2, 7) are minimum
-    and maximum of the feedback to the lag and of the disturbances.
+    The largest ratio occurs in ``channel`` at ``step``. ``lowest`` and ``highest``, shape (3,), are the extremes of the
+    two inputs u_r + u_n and of the nominal pitch acceleration (rad/s^2). ``lag``, shape (2, 2), and ``channels``, shape
+    (2, 7), have the minima (row 0) and maxima (row 1) of the two fields of :class:`Disturbances` with these names.
     """
 
     level: float
@@ -158,15 +158,15 @@ def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
 
 
 def share_of(inputs: Mapping[str, Any]) -> float:
-    """Return the share of fault and parameter bounds that the set W' covers (eq. 47): largest tau, 1 if it is fixed."""
+    """Return the share of fault and parameter bounds that W' covers (eq. 47): the largest tau, 1 if not adjustable."""
     return float(max(inputs["adjustable"]["tau"])) if inputs.get("adjustable") else 1.0
 
 
 def flight_checks(subject: Subject) -> Checks:
-    """Yield the checks of flights at the corners that set a bound of W (eq. 19), and at a sample of all corners.
+    """Yield the checks of flights at the corners where a bound of W was measured (eq. 19), and at random corners.
 
-    Errors must stay in the set (eq. 26), and plans in the stated range, which is within the bounds of eq. 30. The check
-    of the pitch acceleration is our own.
+    Errors must stay in the set (eq. 26), and plans u_r + u_n in the stated range, which is within the bounds of eq. 30.
+    The check of the pitch acceleration is our own.
     """
     certified = replace(subject.design, tau=subject.design.tau_minimum)  # a flight may use another tau
     subject = replace(subject, design=certified)
@@ -206,7 +206,7 @@ def flight_checks(subject: Subject) -> Checks:
 
 
 def _worst(subject: Subject, field: str, flown: Sequence[Evidence]) -> Checks:
-    """Yield the checks that the flown corners do not exceed the extremes that ``field`` states for all corners."""
+    """Yield the checks that no flight exceeds the extremes that the certificate's ``field`` states for all corners."""
     stated, allowance = subject.stated(field), 1.0 + TOLERANCES["flights"].relative
     yield at_most(f"{field}: level", max(f.level for f in flown), min(1.0, stated["worst_level"] * allowance))
     ratio = stated["disturbance_membership"]["worst_ratio"] * allowance
@@ -214,9 +214,9 @@ def _worst(subject: Subject, field: str, flown: Sequence[Evidence]) -> Checks:
 
 
 def _lag_check(name: str, subject: Subject, flown: Sequence[Evidence]) -> Check:
-    """Return the check that the feedback to the lag of the plan stays within its bounds.
+    """Return the check that the feedback's response to the lag of the actuators stays within the stated bounds.
 
-    The check is our own: actuators of the paper have no dynamics, so that their plan has no lag.
+    The check is our own: the paper's actuators have no dynamics, so that they do not lag behind the plan.
     """
     lower, upper = lag_feedback(subject)
     room = min(float(min((f.lag[0] - lower).min(), (upper - f.lag[1]).min())) for f in flown)
@@ -249,7 +249,7 @@ def scenario_checks(
     """Fly ``scenario`` with each change in ``over``; check level (eq. 26), disturbances (eq. 19) and plan (eq. 30).
 
     Raises:
-        DesignError: The controller of the scenario is not the tube law.
+        DesignError: The controller is not the tube law, a flight diverged, or an input was limited.
     """
     name = scenario.name
     if scenario.controller != "tube_mpc":
