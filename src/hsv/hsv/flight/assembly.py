@@ -130,7 +130,7 @@ def uncovered_of(
 
 
 def require_trust(controller: str, source: object, trust: bool) -> None:
-    """Refuse custom code as the ``controller`` of a bag or campaign, the ``source``, unless the user passed ``--trust``.
+    """Refuse custom code as the ``controller`` of the bag or campaign ``source``, unless the user passed ``--trust``.
 
     Custom code is a class, a library or an FMU. A registered name selects installed code, which is not refused.
     """

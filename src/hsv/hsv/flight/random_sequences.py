@@ -33,7 +33,7 @@ def random_sequences(
 
     Args:
         A: (r, n, n) closed loops at the vertices, between which the sequences switch.
-        columns: (r, n, d + 1) effects of d disturbances, each 1 or -1, and of a constant 1, on e - ``centre`` in one step.
+        columns: (r, n, d + 1) effects of d disturbances, each 1 or -1, and a constant 1 on e - ``centre`` in one step.
         centre: (n) centre of the ellipsoid.
         Q: (n, n) its matrix; the level of an error e is (e - centre)' Q^-1 (e - centre).
         sequences: Number of sequences.
