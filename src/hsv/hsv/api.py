@@ -57,7 +57,8 @@ def sweep(
         changes: Values of further fields, the same in every flight.
 
     Raises:
-        ScenarioError: A field or the design is wrong. RunError: A custom controller failed.
+        ScenarioError: A field or the design is wrong; the message names it.
+        RunError: A custom controller failed.
     """
     return {value: fly(load(name, {**(changes or {}), field: value})) for value in values}
 

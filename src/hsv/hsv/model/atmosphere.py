@@ -78,5 +78,5 @@ def atmosphere_data(values: Mapping[str, object], period: float) -> Struct:
 
 
 def atmosphere_state(data: Struct) -> np.ndarray:
-    """Return the state, shape (4 + gusts,), of turbulence, density and gusts: zeros, until step 0 draws its start."""
+    """Return the state, shape (4 + gusts,), of turbulence, density and gusts: zeros; step 0 draws the random ones."""
     return np.zeros(_MEMORY + len(data.gust_start))

@@ -239,7 +239,7 @@ def forces(
 
 
 def derivative(x: Any, u: Any, p: VehicleParameters, conditions: np.ndarray | None = None) -> np.ndarray:
-    """Return dx/dt, shape (9,), of the coupled model (paper eq. 1), or decoupled if both couplings are zero (eq. 4).
+    """Return dx/dt, shape (9,), of the coupled model (paper eq. 1); with zero coupling, the decoupled one (eq. 4).
 
     A complex state or input gives a complex derivative, for the complex step; ``conditions`` are then ignored.
     """

@@ -170,5 +170,5 @@ def sensor_data(values: Mapping[str, object], period: float) -> Struct:
 
 
 def sensor_state() -> np.ndarray:
-    """Return the state of the nine sensors: zeros, until step 0 draws its start."""
+    """Return the state of the nine sensors: zeros, which step 0 replaces."""
     return np.zeros(N_STATES, dtype("hsv_sensor_memory"))

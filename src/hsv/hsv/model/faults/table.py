@@ -300,7 +300,7 @@ class Fault:
         return cls(channel, kind, tuple(given[p.name] for p in table))
 
     def check_period(self, period: float) -> None:
-        """Check that an intermittent fault with a period does not repeat faster than the control ``period`` (s).
+        """Check that a fault that repeats periodically does so no faster than the control ``period`` (s).
 
         Raises:
             ParameterError: Its period is shorter than that; the message names the parameter.

@@ -129,7 +129,7 @@ def smallest_weight(breakpoints: np.ndarray, weights: np.ndarray) -> float:
 
 
 def relaxed(weights: np.ndarray, least: float) -> np.ndarray:
-    """Return the weights (s, r) after enlarging the simplex so that the smallest, ``least``, is zero if negative."""
+    """Return the weights (s, r); if the smallest, ``least``, is negative, enlarge their simplex until it is zero."""
     excess = max(0.0, -least)
     return np.asarray((weights + excess) / (1.0 + weights.shape[1] * excess))
 
