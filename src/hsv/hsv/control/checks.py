@@ -45,7 +45,7 @@ Checks = Iterable[Check]
 
 @dataclass(frozen=True)
 class Subject:
-    """A design to verify: the design in flight, and its certificate."""
+    """A design to verify: its numbers from the design file, and its certificate."""
 
     design: ControlDesign
     certificate: dict[str, Any]
@@ -89,7 +89,7 @@ def load_subject(path: Path) -> Subject:
 def same(name: str, value: Any, expected: Any, tolerance: str, size: Any = 1.0) -> Check:
     """Return the check that every entry of the array ``value`` equals that of ``expected``, within a tolerance.
 
-    ``tolerance`` is its key in :data:`hsv.control.tolerances.TOLERANCES`, ``size`` the size of the entries.
+    ``tolerance`` is a key of :data:`hsv.control.tolerances.TOLERANCES`, ``size`` the typical magnitude of the entries.
     """
     value, expected = np.asarray(value, float), np.asarray(expected, float)
     if value.shape != expected.shape:
@@ -163,8 +163,8 @@ def gathered(name: str, checks: Callable[[], Checks]) -> list[Check]:
 def unchecked(subject: Subject, checks: Iterable[Check], *, whole: bool = True) -> list[str]:
     """Return the fields of the certificate that none of the ``checks`` covers: they are stated, not checked.
 
-    By default a table without any covered field is one item, and so is a field of all entries of a list, as in
-    ``nominal.*.gamma``. With ``whole=False`` every field is listed.
+    By default only the path of a table is listed if none of its fields is covered, and ``*`` replaces every index of
+    a list, as in ``nominal.*.gamma``. With ``whole=False`` every uncovered field is listed by its own path.
     """
     held = {field for check in checks for field in check.fields}
     free: dict[str, bool] = {}

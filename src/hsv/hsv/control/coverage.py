@@ -183,7 +183,7 @@ def _effectiveness(certificate: Mapping[str, Any]) -> float:
 
 
 def commanded(design: ControlDesign) -> np.ndarray:
-    """Return the largest magnitude (2) of the inputs in the tube: plan plus feedback, or limits without plan bounds."""
+    """Return the largest |u| (2) of plan plus feedback in the tube; without plan bounds, that of the input limits."""
     bounds = design.plan_bounds
     if bounds is None:
         return np.maximum(np.abs(design.input_minimum), np.abs(design.input_maximum))

@@ -52,8 +52,8 @@ def rigid_factors(values: Sequence[float], name: str) -> np.ndarray:
 def certified(values: Sequence[float], minimum: np.ndarray, name: str = TAU.name) -> np.ndarray:
     """Return the factors tau (5) in ``values``, one or five, if they are certified.
 
-    The certified factors lie on the straight line from ``minimum`` (5) to ones: one Lyapunov function covers the closed
-    loops along it. Factors that are small for one state and large for another are not on this line.
+    The certified factors lie on the straight line from ``minimum`` (5) to 1 for every state: one Lyapunov function
+    covers the closed loops along it. Factors that are small for one state and large for another are not on this line.
 
     Raises:
         ParameterError: The factors are not certified; the message names a value and the range.
@@ -83,9 +83,10 @@ def compact(tau: np.ndarray) -> np.ndarray:
 
 
 def scheduled_changes(values: Mapping[str, Any], minimum: np.ndarray, period: float) -> list[tuple[int, np.ndarray]]:
-    """Return first step and factors tau (5) of each change in the parameters :data:`TAU_CHANGE_PARAMETERS`.
+    """Return the changes of tau that ``values`` schedule, as pairs of first step and factors tau (5).
 
-    ``minimum`` (5) are the smallest certified factors, ``period`` is the control period (s).
+    ``values`` are flat parameters, of which :data:`TAU_CHANGE_PARAMETERS` are used. ``minimum`` (5) are the smallest
+    certified factors, ``period`` is the control period (s).
 
     Raises:
         ParameterError: The arrays do not match, times decrease, or a factor is not certified.
@@ -106,7 +107,7 @@ def scheduled_changes(values: Mapping[str, Any], minimum: np.ndarray, period: fl
 
 
 def change_parameters(changes: Sequence[tuple[int, np.ndarray]], period: float) -> dict[str, list[float]]:
-    """Return parameters :data:`TAU_CHANGE_PARAMETERS` that describe ``changes``, first step and factors (5) of each."""
+    """Return :data:`TAU_CHANGE_PARAMETERS` for ``changes``; each change is a pair of first step and factors tau (5)."""
     return {
         "tau_change.starts": [start * period for start, _ in changes],
         "tau_change.values": [float(value) for _, tau in changes for value in tau],
@@ -117,7 +118,8 @@ def change_parameters(changes: Sequence[tuple[int, np.ndarray]], period: float) 
 class TubeSet:
     """The invariant set (e - c)' P (e - c) <= 1 for errors e (n) of the rigid states and the notch filter, SI.
 
-    ``centre`` is c (n), ``shape`` P (n, n), and ``half_width`` (n) that of the box around the set.
+    ``centre`` is c (n), ``shape`` P (n, n). ``half_width`` (n) is the certified bound of |e - c| by entry; for the
+    rigid states it may be narrower than the set, see :class:`hsv.control.verification.StarNorms`.
     """
 
     centre: np.ndarray
@@ -147,12 +149,12 @@ class PlanBounds:
 
     @property
     def lower(self) -> np.ndarray:
-        """Smallest inputs (2) within both kinds of bounds."""
+        """Larger of ``input_minimum`` and ``region_minimum`` for each input (2)."""
         return np.maximum(self.input_minimum, self.region_minimum[:2])
 
     @property
     def upper(self) -> np.ndarray:
-        """Largest inputs (2) within both kinds of bounds."""
+        """Smaller of ``input_maximum`` and ``region_maximum`` for each input (2)."""
         return np.minimum(self.input_maximum, self.region_maximum[:2])
 
     @property
@@ -237,7 +239,7 @@ def positive(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np
 
 
 def samples(values: Mapping[str, Any], axis: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the breakpoints (n) along a scheduling axis and the weights (n, v) of its v vertices there."""
+    """Return breakpoints (n) of ``axis``, e.g. ``"scheduling.altitude"``, and weights (n, v) of its v vertices."""
     breakpoints = np.array(values[f"{axis}.breakpoints"], float)
     if len(breakpoints) < 2:
         raise DesignError(f"parameter {axis}.breakpoints: {len(breakpoints)} values, expected at least 2")
@@ -647,7 +649,7 @@ def read_certificate(path: Path) -> dict[str, Any]:
 
 
 def design_files(design: Path) -> dict[str, str]:
-    """Return the texts that a bag stores of its design, by attachment name: parameters and, if any, certificate."""
+    """Return the texts of a ``design`` file and, if any, its certificate, by their attachment names in a bag."""
     return {"design.yaml": read_text(design)} | attached_certificate(certificate_path(design))
 
 

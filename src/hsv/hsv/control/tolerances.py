@@ -11,17 +11,18 @@ from hsv.model.signals import INPUT_NAMES, STATE_NAMES
 
 
 class Tolerance(NamedTuple):
-    """Largest difference of an entry from its recomputed value: the larger of two bounds.
+    """Largest permitted difference of an entry from its recomputed value: the larger of two bounds.
 
-    The ``relative`` bound is a share of the recomputed entry. The ``absolute`` bound is a share of the size of the
-    entry, see :func:`entry_size`; it decides for entries that are zero, exactly or except for rounding.
+    The bounds are ``relative`` times the magnitude of the recomputed entry, and ``absolute`` times the typical
+    magnitude of such an entry, see :func:`entry_size`. The second decides for entries that are zero, exactly or except
+    for rounding.
     """
 
     relative: float
     absolute: float
 
     def allowed(self, expected: np.ndarray, size: Any = 1.0) -> np.ndarray:
-        """Return the largest difference allowed for each entry of ``expected``, given its ``size``; all in SI."""
+        """Return the largest permitted difference (SI) from each entry of ``expected`` of typical magnitude ``size``."""
         return np.maximum(self.relative * np.abs(expected), self.absolute * np.asarray(size, float))
 
 
@@ -83,10 +84,10 @@ ROUNDING = TOLERANCES["inequalities"].absolute
 
 
 def entry_size(parameter: str, certificate: Mapping[str, Any]) -> np.ndarray:
-    """Return the size (SI) of each entry of a design ``parameter``, as an array that broadcasts to its shape.
+    """Return the typical magnitude (SI) of each entry of a design ``parameter``, broadcastable to its array.
 
     Raises:
-        KeyError: The certificate lacks a field that gives the size.
+        KeyError: The certificate lacks a field that gives the magnitude.
     """
     kind = PARAMETERS[parameter]
     if parameter.startswith("model.") or kind in ("feedback gain", "nominal gains"):

@@ -95,9 +95,10 @@ _KEPT_OFF = 0.05
 
 
 def image(Q: np.ndarray, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
-    """Return the largest singular value (...) of L^-1 [M L, columns] for each M (..., n, n), with Q = L L' (n, n).
+    """Return, for each M (..., n, n), the largest singular value of L^-1 [M L, columns] with Q = L L' (n, n).
 
-    If it is at most 1, then M x + columns d lies in {x: x' Q^-1 x <= 1} for all x, d with x' Q^-1 x + d' d <= 1.
+    If it is at most 1, then M x + columns d lies in the ellipsoid {x: x' Q^-1 x <= 1} for all x and d that satisfy
+    x' Q^-1 x + d' d <= 1.
     """
     L = np.linalg.cholesky(Q)
     return np.asarray(np.linalg.norm(np.linalg.solve(L, np.concatenate((M @ L, *columns), axis=-1)), 2, axis=(-2, -1)))
@@ -357,7 +358,7 @@ def nominal_checks(subject: Subject) -> Checks:
 
 
 def step(subject: Subject) -> np.ndarray:
-    """Return x_n(0) (5) of the step for which the gains are designed: trim at its start minus trim at its target."""
+    """Return x_n(0) (5) of the jump for which the gains are designed: trim at its start minus trim at its target."""
     inputs, vehicle = subject.certificate["inputs"]["nominal"], subject.vehicle.decoupled
     start, target = (trim(vehicle, inputs[at]["altitude"], inputs[at]["velocity"]).state for at in ("start", "target"))
     return np.asarray((start - target)[:N_RIGID])
@@ -396,7 +397,10 @@ def symmetric(name: str, Q: np.ndarray) -> Check:
 
 
 def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
-    """Return the changes (5, 3) of the rigid states by unit accelerations held over ``period`` s, at mid-envelope."""
+    """Return the changes (5, 3) of the rigid states by the first three channels of W, each held at 1 for ``period`` s.
+
+    The vehicle is linearised at mid-envelope.
+    """
     A, _ = linearise(vehicle.decoupled, *vehicle.centre)
     unit = np.zeros((N_RIGID, 3))
     unit[ACCELERATED, [0, 1, 2]] = 1.0
@@ -454,9 +458,9 @@ def error_system(design: ControlDesign, vehicle: Vehicle, tau: np.ndarray, effec
 
 
 def factors(design: ControlDesign) -> list[np.ndarray]:
-    """Return the extreme factors tau (5 each) of the feedback: the smallest certified ones and ones, or ones alone.
+    """Return the extreme factors tau (5 each): ``tau_minimum`` and all ones; the latter alone if they are equal.
 
-    A set that is invariant under both is invariant under any variation of tau on the line between them.
+    A set that is invariant under both extremes is invariant under any variation of tau on the line between them.
     """
     one = np.ones(N_RIGID)
     return [one] if np.array_equal(design.tau_minimum, one) else [design.tau_minimum, one]
@@ -511,7 +515,7 @@ class Tube:
         return self._narrowed(np.sqrt(np.sum((F @ self.Q) * F, axis=1)), slice(N_RIGID, None))
 
     def _narrowed(self, bounds: np.ndarray, rows: slice) -> np.ndarray:
-        """Return ``bounds``, the first ones lowered to the star norms of output ``rows`` where these are smaller."""
+        """Return ``bounds``, the first of which the star norms of output ``rows`` replace where they are smaller."""
         if self.star is None:
             return bounds
         # An output is bounded by the sum, over all channels, of its half-range in the ellipsoid of the channel.
@@ -634,7 +638,7 @@ def set_checks(subject: Subject) -> Checks:
 
 
 def lag_feedback(subject: Subject) -> Sequence[Sequence[float]]:
-    """Return the stated minimum and maximum (2 each), or zeros, of the feedback due to the actuators' lag."""
+    """Return minimum and maximum (2 each) of the feedback due to the actuators' lag; zeros if none are stated."""
     lag = subject.certificate["tube"]["tightening"].get("lag_feedback")
     return (lag["lower"], lag["upper"]) if lag else ((0.0, 0.0), (0.0, 0.0))
 
@@ -848,14 +852,15 @@ def preflight(design: ControlDesign, certificate: str = "") -> str:
     a common Lyapunov function (eq. 24), and so has every K (eq. 34). The invariant set monitored in flight is the
     certified one, it contains e = 0, and it is invariant at every vertex under the feedback in flight. Actuators, range
     of tau, ``nominal.filtered`` and ``nominal.interpolated`` are as certified. If one of these or any other required
-    check fails, the design is refused. Other differences from the certificate, or a missing one, are a warning.
+    check fails, the design is refused. Other differences from the certificate are a warning, and so is a missing
+    certificate if none is named and none lies next to the design.
 
     Args:
         design: The design to check.
-        certificate: Path of the certificate; empty: the certificate next to the design file.
+        certificate: Path of the certificate; empty: the one next to the file of the design with this name.
 
     Raises:
-        DesignError: A required check fails, or the certificate cannot be read.
+        DesignError: A required check fails, or the certificate that is named or found cannot be read.
     """
     path = find_certificate(design.name, certificate)
     if path is None:
