@@ -90,8 +90,8 @@ def legs_of(
 ) -> list[Leg]:
     """Return the legs of piecewise-linear commands from the point ``start``: altitude (m), velocity (m/s).
 
-    A step, given by two equal times, becomes a leg without minimum duration, and so does a first command at time 0 that
-    is not the start. Constant parts become no legs.
+    A jump, given by two equal times, becomes a leg without minimum duration, and so does a first command at time 0 that
+    differs from ``start``. Constant parts do not become legs.
     """
     legs, now, there = [], 0.0, start
     for time, *point in zip(times, altitudes, velocities, strict=True):
@@ -180,7 +180,7 @@ class Governor:
         return half
 
     def _corner(self, corners: Sequence[Corner], leg: Leg, half: int, name: str, beginning: Beginning) -> Corner:
-        """Return the earliest corner at the end of ``leg`` with a fitting plan; ``half`` is its half-width in steps."""
+        """Return the earliest end of ``leg`` for which the plan fits; ``half`` is its blend's half-width in steps."""
         begin = self._steps(corners[-1].time)
 
         def end(length: int) -> Corner:
@@ -262,7 +262,7 @@ def command_in_flight(
     duration: float = 0.0,
     blend: float = 0.0,
 ) -> tuple[int, Callable[[], ReferenceTrajectory]]:
-    """Check a command in flight: a leg to another point, as fast as the tightened inputs permit, after earlier legs.
+    """Check a command in flight: a leg to another point, as fast as the tightened bounds permit, after earlier legs.
 
     Args:
         values: Flat parameters from which ``design`` and ``trajectory`` were built.
@@ -278,7 +278,8 @@ def command_in_flight(
         the new reference, or raises a GovernorError if none fits.
 
     Raises:
-        GovernorError: The design has no tightened inputs, a number is out of its range, or no step has been computed.
+        GovernorError: The design, nominal law or trim does not permit it, a number is out of its range, the target is
+            that of the previous command, or no step has been computed.
     """
     if design is None or design.plan_bounds is None:
         name = design.name if design else "none"

@@ -43,11 +43,11 @@ from hsv.model.trim import trim
 
 @dataclass(frozen=True)
 class NominalProblem:
-    """The data of the nominal problem (31)-(35), SI.
+    """The data of the nominal problem (eq. 31 to eq. 35), SI.
 
     ``A`` (r, n, n) and ``B`` (r, n, m) are the vertices, discretised with the ``period`` (s). ``state_scale`` (n) and
     ``input_scale`` (m) are deviations that cost the same: psi = period diag(1 / state_scale^2), sigma likewise. The
-    factor period gives costs in seconds that hardly depend on it. ``input_bound`` (m) is the largest |u_n|.
+    factor period makes costs integrals over time (s), which hardly depend on it. ``input_bound`` (m): largest |u_n|.
     """
 
     A: np.ndarray
@@ -59,14 +59,14 @@ class NominalProblem:
 
 
 def step_deviation(vehicle: VehicleParameters, start: tuple[float, float], target: tuple[float, float]) -> np.ndarray:
-    """Return x_n(0) (5) of a step, SI: trim at ``start`` minus trim at ``target``, each altitude and velocity."""
+    """Return x_n(0) (5), SI: trim at ``start`` minus trim at ``target``, each given by altitude (m), velocity (m/s)."""
     return np.asarray((trim(vehicle, *start).state - trim(vehicle, *target).state)[:N_RIGID])
 
 
 def certified_cost(problem: NominalProblem, K: np.ndarray, Q: np.ndarray, name: str) -> tuple[float, np.ndarray]:
-    """Return the largest cost (paper eq. 31) from any state of the ellipsoid under K, and the residuals (r) of eq. 34.
+    """Return a bound of the cost (paper eq. 31) from all states of the ellipsoid under K, and residuals (r) of eq. 34.
 
-    The cost is the smallest gamma that satisfies (34) with the given matrices at every vertex:
+    The bound is 1 + 1e-9 times the smallest gamma that satisfies eq. 34 with the given matrices at every vertex:
     gamma (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K with A_c = A + B K.
 
     Args:
@@ -102,10 +102,10 @@ def certified_cost(problem: NominalProblem, K: np.ndarray, Q: np.ndarray, name: 
 def decrease_between(problem: NominalProblem, K: np.ndarray, outside: np.ndarray) -> np.ndarray:
     """Return the decrease (r) of the level in the ellipsoid ``outside`` (n, n) under ``K``, at each vertex.
 
-    It is the smallest eigenvalue of 1 - M' M, with M = A + B K in coordinates in which the ellipsoid is the unit ball;
-    ``K`` (m, n) is the gain of the next ellipsoid inside. If all values are positive, the level decreases under every
-    gain between the two, at every point of the polytope: under the gain of ``outside`` by (34), and between because
-    M' M is convex in M. x_n then never leaves ``outside``, and reaches the next ellipsoid.
+    ``K`` (m, n) is the gain of the next ellipsoid inside. The decrease is the smallest eigenvalue of 1 - M' M, with M =
+    A + B K in coordinates in which ``outside`` is the unit ball. If it is positive at all vertices, the level decreases
+    at every point of the polytope under K, under the gain of ``outside`` (by eq. 34), and under every gain between
+    these two (M' M is convex in M). x_n then never leaves ``outside``, and reaches the next ellipsoid.
     """
     factor = np.linalg.cholesky(outside)
     M = np.linalg.solve(factor, (problem.A + problem.B @ K) @ factor)
@@ -128,13 +128,13 @@ def _decrease_blocks(contraction: np.ndarray, weighted: np.ndarray) -> np.ndarra
 class NominalGain:
     """The gain K = Y Q^-1 of one ellipsoid x' Q^-1 x <= 1, with its evidence.
 
-    ``K`` (m, n) and ``Q`` (n, n) are in SI and rounded, ``Y`` (m, n) is K Q. ``gamma`` (s) is the bound of (32) from
+    ``K`` (m, n) and ``Q`` (n, n) are in SI and rounded, ``Y`` (m, n) is K Q. ``gamma`` (s) is the bound of eq. 32 from
     the solver, ``certified_gamma`` (s) the recomputed bound of the cost from any state of the ellipsoid. The residuals
-    belong to the rounded matrices. ``decrease`` (r): smallest eigenvalues of (34) with the certified bound, scaled to a
-    unit diagonal. ``state``: 1 minus the level of the design state (33). ``input`` (m): 1 minus the largest squared
-    input over its squared bound (35). ``nesting``: smallest eigenvalue of 1 - Q in coordinates in which the next
-    ellipsoid outside is the unit ball. ``between`` (r): for an interpolated family, the decrease of the level in that
-    ellipsoid under K. ``radii`` (r): closed-loop spectral radii.
+    belong to the rounded matrices. ``decrease`` (r): smallest eigenvalue of eq. 34 at each vertex with the certified
+    bound, scaled to a unit diagonal. ``state``: 1 minus the level of the design state (eq. 33). ``input`` (m): 1 minus
+    the largest squared input over its squared bound (eq. 35). ``nesting``: smallest eigenvalue of 1 - Q in coordinates
+    in which the next ellipsoid outside is the unit ball. ``between`` (r): for an interpolated family, the decrease of
+    the level in that outer ellipsoid under K. ``radii`` (r): closed-loop spectral radii.
     """
 
     K: np.ndarray

@@ -85,13 +85,13 @@ _HEADROOM = 1.02
 
 
 class KothareLaw(FamilyLaw):
-    """Nominal law u_n = K x_n with K from the LMI (32)-(35) for x_n(k), used from step k + ``SOLVE_STEPS`` exactly.
+    """Nominal law u_n = K x_n with K from eq. 32 to 35 for x_n(k), used from exactly step k + ``SOLVE_STEPS`` on.
 
     A worker thread solves the LMI between the steps. A step whose solution is late waits for it, so that the flight
     depends on the nominal state alone, never on timing. Until the first solution, the family of gains is used. A new
-    gain replaces the last one only if x_n lies in its ellipsoid, in which (35) bounds the input. Otherwise, and if the
-    solver fails, the last gain is kept and the status reports it. In the innermost ellipsoid of the family no new gain
-    is computed.
+    gain replaces the last one only if x_n lies in its ellipsoid, in which eq. 35 bounds the input. Otherwise, and if
+    the solver fails, the last gain is kept and the status reports it. In the innermost ellipsoid of the family no new
+    gain is computed.
     """
 
     in_core = False
@@ -116,7 +116,7 @@ class KothareLaw(FamilyLaw):
         self.reset()
 
     def reset(self) -> None:
-        """Return to the family of gains, and discard a solution that is being computed."""
+        """Go back to the family of gains, and discard a solution that is being computed."""
         if self._pending:
             self._pending.cancel()
         self._pending = None

@@ -97,7 +97,7 @@ class NominalTrajectory:
         self.reference = reference
 
     def reset(self) -> None:
-        """Return to the original reference and to step 0, where the next nominal trajectory begins."""
+        """Go back to the original reference and to step 0, where the next nominal trajectory begins."""
         self.reference = self._planned
         self._deviation[:] = 0.0
         self._step = 0

@@ -99,7 +99,7 @@ def continuous(sections: Sequence[NotchSection]) -> Struct:
 
 
 def _in_series(sections: Sequence[NotchSection], found: Sequence[tuple[Any, ...]]) -> Struct:
-    """Return the struct ``hsv_notch`` with the matrices A, B, C, D of each section in ``found``.
+    """Return the struct ``hsv_notch`` for ``sections``; ``found`` has the matrices A, B, C, D of each of them.
 
     It also contains the equilibrium of each section for unit input, which the bilinear transform does not change.
     """
@@ -163,7 +163,7 @@ def series(data: Struct) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
 
 
 def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
-    """Return the sections of the filter in flight: parameters ``notch.flown.*`` if given, else those of the design.
+    """Return the sections of the filter in flight; each array of ``notch.flown.*`` that is given replaces the design's.
 
     Raises:
         ParameterError: Arrays have different lengths, or there are too many sections.

@@ -13,7 +13,7 @@ Newton's method finds it to rounding from any interior point; Clarabel provides 
 
 Unscaled, or scaled by typical sizes only, the inequalities of a fast-sampled integrator chain defeat interior-point
 solvers. In coordinates whitened by an LQR problem at the mean vertex (:class:`Whitening`), the Lyapunov matrices are
-near multiples of the identity. The results of each stage of a design are rounded to their significant digits.
+close to multiples of the identity. The results of each stage of a design are rounded to their significant digits.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class SolverReport:
     objective: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report as a dictionary for JSON, the same at every run."""
+        """Return the report as a dictionary for JSON, the same whenever this machine solves the problem."""
         return asdict(self)
 
 
@@ -56,7 +56,7 @@ def spectral_radii(matrices: np.ndarray) -> np.ndarray:
 
 
 def image(Q: np.ndarray, name: str, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
-    """Return the largest singular value (...) of L^-1 [M L, columns] with Q = L L'.
+    """Return, for each M, the largest singular value of L^-1 [M L, columns] with Q = L L'; shape (...).
 
     If it is at most 1, M maps the ellipsoid x' Q^-1 x <= 1 into itself. Without further columns, the smallest
     eigenvalue of [Q, (M Q)'; M Q, Q], with its diagonal blocks scaled to the identity, is 1 minus this value.
@@ -116,7 +116,7 @@ def rounded_matrix(matrix: np.ndarray) -> np.ndarray:
 def outward(values: np.ndarray) -> np.ndarray:
     """Return ``values`` rounded away from zero to :data:`BOUND_DIGITS` significant digits.
 
-    A value above a number with so many digits, by a relative 1e-12 or less, is rounded to that number instead.
+    A magnitude that exceeds one with so many digits by no more than a relative 1e-12 is rounded down to it.
     """
     values = np.asarray(values, float)
     size = np.where(values == 0.0, 1.0, np.abs(values))
@@ -138,7 +138,7 @@ class Whitening:
     input_scale: np.ndarray
 
     def dynamics(self, A: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the matrices ``A`` (..., n, n) and ``B`` (..., n, m) of a system in the new coordinates."""
+        """Return in the new coordinates ``A`` (..., n, n) and ``B`` (..., n, m), given in the original ones."""
         return self.to_white @ A @ self.from_white, self.to_white @ B * self.input_scale
 
     def gain(self, K: np.ndarray) -> np.ndarray:
@@ -211,7 +211,7 @@ class Unknown:
         return n * (n + 1) // 2 if self.symmetric else m * n
 
     def matrix(self, x: np.ndarray) -> np.ndarray:
-        """Return the matrix with the free entries ``x``, row by row; for a symmetric one, of its upper triangle."""
+        """Return the matrix with the free entries ``x``: row by row, only in the upper triangle if it is symmetric."""
         if not self.symmetric:
             return x.reshape(self.shape)
         value = np.zeros(self.shape)
@@ -248,7 +248,7 @@ def minimise(
 
     Args:
         unknowns: Unknown matrices, in the order of the solution.
-        cost: Linear cost; if it is zero for all unknowns, the solution is that of the solver.
+        cost: Linear cost; if it is always zero, the solution is the solver's instead, a feasible point.
         inequalities: Affine inequalities, with entries near one.
         name: Name of the result, for error messages.
 
@@ -284,8 +284,8 @@ def minimise(
 def _solved(c: np.ndarray, found: list[_Inequality], least: float, name: str) -> tuple[np.ndarray, SolverReport]:
     """Return the x that minimises c'x, found by Clarabel, and the solver's report.
 
-    No eigenvalue of an inequality may be below ``least``. Clarabel runs in one thread, so that the same input gives the
-    same bits on the same machine. The status "optimal_inaccurate" is accepted, because every caller recomputes its
+    No eigenvalue of a matrix G_k(x) may be below ``least``. Clarabel runs in one thread, so that the same input gives
+    the same bits on the same machine. The status "optimal_inaccurate" is accepted, because every caller recomputes its
     inequalities from the returned matrices.
 
     Raises:
@@ -335,7 +335,7 @@ def _inside(c: np.ndarray, found: list[_Inequality], name: str) -> tuple[np.ndar
 
 
 def _factors(found: list[_Inequality], x: np.ndarray) -> list[np.ndarray] | None:
-    """Return the Cholesky factors of all inequalities at ``x``, or None if one does not hold strictly."""
+    """Return the Cholesky factors of all matrices G_k(x), or None if one of them is not positive definite."""
     try:
         return [np.linalg.cholesky(one.at(x)) for one in found]
     except np.linalg.LinAlgError:

@@ -135,8 +135,8 @@ def _predicted(
     ``closed`` is A + B K, ``rate`` (n + m) maps [x; u] to the pitch acceleration, and a block has ``block`` steps.
 
     Returns:
-        Matrices (rows, n) on x_n and (rows, m blocks) on c, and whether each row is bounded (rows). There are m + 1
-        rows for each time: the inputs, then the pitch acceleration, which is bounded in near blocks only.
+        Matrices on x_n (rows, n) and on c (rows, m times blocks), and flags (rows): whether a row is bounded. Each time
+        has m + 1 rows: the inputs, then the pitch acceleration, bounded in the first :data:`NEAR_BLOCKS` blocks only.
     """
     n, m = B.shape
     power, forced = [np.eye(n)], [np.zeros((n, m))]

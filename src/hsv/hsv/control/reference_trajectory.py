@@ -6,11 +6,11 @@ state is phi_T(x_r(k), u_r(k)) except for the defect
 
     d_r(k) = phi_T(x_r(k), u_r(k)) - x_r(k+1).
 
-The defect contains the jump at a step or at a corner of a ramp. On a ramp it is small: the difference between a
-sequence of trims and a solution of the equations of motion. If the reference is constant, the defect is exactly zero.
-It drives the nominal system, x_n(k+1) = A(p) x_n + B(p) u_n + d_r(k), with the model at altitude and velocity p. With
-x_r(k) - x_r(k+1) in place of d_r, the climb itself, about 6 cm per period, would be a disturbance; that form is right
-for static trims only, for which phi_T(x_r, u_r) = x_r.
+The defect contains the jump of x_r where the commands jump and at a corner of a ramp. On a ramp it is small: the
+difference between a sequence of trims and a solution of the equations of motion. If the reference is constant, the
+defect is exactly zero. It drives the nominal system, x_n(k+1) = A(p) x_n + B(p) u_n + d_r(k), with the model at
+altitude and velocity p. With x_r(k) - x_r(k+1) in place of d_r, the climb itself, about 6 cm per period, would be a
+disturbance; that form is right for static trims only, for which phi_T(x_r, u_r) = x_r.
 
 Corners can be blended: the piecewise-linear commands are averaged over time by a triangle of half-width w. Within w of
 a corner at which the rate changes by s, this adds s (w - |t|)^3 / (6 w^2), with t the time from the corner. The rate
@@ -87,7 +87,7 @@ class ReferenceTrajectory:
         """Trim the nominal decoupled vehicle at every step of the commands.
 
         Args:
-            times: (b) times of the corners, s, not decreasing; two equal times define a step to the later value.
+            times: (b) times of the corners, s, not decreasing; two equal times define a jump to the later value.
             altitudes: (b) m.
             velocities: (b) m/s.
             period: Control period, s.
@@ -201,7 +201,7 @@ def _blends(times: Sequence[float], blend: float | Sequence[float]) -> np.ndarra
     """Return the half-width (b) of the blend of each corner, s.
 
     Raises:
-        ParameterError: A blend begins before time 0 or lies at a step, or there is not one for each time.
+        ParameterError: A blend begins before time 0 or lies at a jump, or there is not one for each time.
     """
     if isinstance(blend, Sequence) and len(blend) != len(times):
         raise ParameterError(
@@ -232,7 +232,8 @@ def _blend(
     """Blend in place ``command`` (r, 2), altitude and velocity, its ``slope`` (r, 2), and the altitude's ``bend`` (r).
 
     All times are in steps: ``instants`` (b) and ``half`` (b) are the times of the corners and half-widths of their
-    blends, ``commands`` (b, 2) altitude and velocity there. Slope and bend are derivatives at the ``steps`` (r).
+    blends, ``commands`` (b, 2) altitude and velocity there. Slope and bend are first and second derivative at the
+    ``steps`` (r).
     """
     before = np.zeros(commands.shape[1])
     for index in range(len(instants)):
@@ -258,7 +259,7 @@ def _in_steps(times: np.ndarray, period: float) -> np.ndarray:
 
 
 def _evaluate(instants: np.ndarray, commands: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return altitude and velocity (r, 2) at the integer ``steps`` (r), and their slope per step (r, 2) after each.
+    """Return altitude and velocity (r, 2) at the integer ``steps`` (r), and the slopes (r, 2) per step just after.
 
     The corners have the times ``instants`` (b), in steps, and the altitudes and velocities ``commands`` (b, 2).
     """

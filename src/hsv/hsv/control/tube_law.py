@@ -72,7 +72,7 @@ def tube_data(
     """Return the data of the law as the struct ``hsv_tube`` of the core, by default a feedback on x - x_r alone.
 
     Args:
-        gains: (c, 2, 9) gains F diag(tau), each from its first step on.
+        gains: (c, 2, 9) gains F diag(tau); each is used from its first step, see ``starts``, until the next gain's.
         minimum: (2) smallest inputs.
         maximum: (2) largest inputs.
         period: Control period T, s.
@@ -224,7 +224,7 @@ class TubeLaw(Controller):
         return np.asarray(self.kernel.gains[active_gain(self.kernel, self._next)])
 
     def reset(self) -> None:
-        """Prepare a new run from step 0: the current factors tau stay, and all scheduled changes apply again."""
+        """Prepare a new flight from step 0: the current factors tau stay, and all scheduled changes apply again."""
         self._next = 0
         self._arrange([(0, self._tau), *self._scheduled])
 
@@ -259,7 +259,7 @@ class TubeLaw(Controller):
         )
 
     def step(self, inputs: ControllerInput) -> TubeResult:
-        """Return the input of this step with diagnostics; the first step of a run has number 0.
+        """Return the input of this step with diagnostics; the first step of a flight has number 0.
 
         Raises:
             SignalError: ``inputs.filter_state`` is not empty, and its size does not fit the notch filter of the flight.
