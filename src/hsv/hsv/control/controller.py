@@ -95,7 +95,7 @@ class ControllerResult:
 
     @property
     def saturated(self) -> np.ndarray:
-        """Whether each of the inputs (2) is limited."""
+        """Whether the limits changed each input, shape (2,)."""
         return np.asarray(self.input != self.u_unsaturated)
 
 
@@ -127,7 +127,7 @@ class Controller(ABC):
 
     @abstractmethod
     def reset(self) -> None:
-        """Clear the state of the controller before a new run."""
+        """Clear the state of the controller before a new flight."""
 
     @abstractmethod
     def step(self, inputs: ControllerInput) -> ControllerResult:
@@ -159,7 +159,10 @@ class ControllerClass(Protocol):
     """Parameters of the controller, named ``table.parameter``; a scenario sets them in the table of that name."""
 
     def from_parameters(self, values: Mapping[str, Any], design: ControlDesign | None) -> Any:
-        """Return a controller from all flat parameters of a flight and its design, ``None`` if it has no design."""
+        """Return a controller for a flight with the flat parameters ``values``; ``design`` is None if it has no design.
+
+        ``values`` lacks :data:`hsv.control.controllers.HIDDEN_PARAMETERS` unless the class is part of this library.
+        """
 
 
 class NodeController(Controller):
@@ -200,7 +203,7 @@ class ExternalController(Controller):
             self.reset()
 
     def reset(self) -> None:
-        """Clear the state of the controller before a new run.
+        """Clear the state of the controller before a new flight.
 
         Raises:
             ControllerError: The controller failed.

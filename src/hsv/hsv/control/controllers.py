@@ -104,12 +104,12 @@ def controller_class(name: str) -> ControllerClass:
 
 
 def class_place(name: str) -> str:
-    """Return the place of the class of the controller ``name``, ``package.module:Class``, without loading it.
+    """Return ``package.module:Class``, the place of the class of the controller ``name``, without loading it.
 
-    The name of a controller in a library or an FMU is returned unchanged.
+    A name that is a place itself, or that means a library, an FMU or a node, is returned unchanged.
 
     Raises:
-        ParameterError: There is no such controller.
+        ParameterError: No controller is registered as ``name``, or it is malformed.
     """
     place = SHIPPED_CONTROLLERS.get(name, name)
     if library_place(place):

@@ -104,7 +104,7 @@ def design_header(design: ControlDesign) -> str:
 
 
 def step_bounds(design: ControlDesign) -> dict[str, StepBound]:
-    """Return the maximum numbers of operations in a step, by block name, counted from the loops of the headers."""
+    """Return the maximum operations in a step, and the state size, by block name, from the C headers' loop bounds."""
     n, m, rigid, integrated = N_STATES, N_INPUTS, N_RIGID, 2
     sections, gains, polytope = len(design.notch), len(design.nominal_gains), design.polytope.data()
     axes = [axis.coefficients.shape[1:] for axis in (polytope.altitude, polytope.velocity)]
@@ -138,7 +138,7 @@ def step_bounds(design: ControlDesign) -> dict[str, StepBound]:
 
 
 def constant(name: str, struct: Struct) -> list[str]:
-    """Return C definitions: the arrays to which ``struct``, a struct of ``core.h``, points, then the struct ``name``.
+    """Return C definitions of ``struct``, of a type in ``core.h``: first of its arrays, then of the constant ``name``.
 
     An array is named after the path of its field, e.g. ``tube_data_notch_A``.
     """

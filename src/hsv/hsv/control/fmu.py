@@ -62,7 +62,7 @@ class FmuClass(LibraryClass):
         """Return the controller for a flight with the flat parameters ``values``; ``design`` is not used.
 
         Raises:
-            ParameterError: A variable of the FMU is missing or has another unit.
+            ParameterError: A variable of the FMU is missing, has another type or unit, or is not a signal of the bench.
         """
         own = validate(_PARAMETERS, values)
         try:
@@ -75,7 +75,7 @@ class FmuClass(LibraryClass):
         return LibraryController(self._name, self._path, self._symbol, self.block.state_size, numbers, vehicle)
 
     def _routes(self, own: Mapping[str, Any]) -> list[int]:
-        """Return for each FMU input its index in ``_INPUTS``, -1 if unconnected, then for each output its FMU index."""
+        """Return each FMU input's index in ``_INPUTS``, or -1, then the FMU output's index for each of ``_OUTPUTS``."""
         sources = {own[f"fmu.{name}"]: (i, name, unit) for i, (name, unit) in enumerate(_INPUTS)}
         if len(sources) < len(_INPUTS):
             raise ParameterError("[fmu]: a name stands twice, expected a variable for each input")

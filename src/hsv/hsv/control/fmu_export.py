@@ -107,7 +107,7 @@ def _numbers(signals: tuple[SignalType, ...]) -> list[tuple[str, str]]:
 
 
 def _parameter_numbers(block: CBlock) -> list[tuple[str, str, float, float, float]]:
-    """Return name, unit, value, minimum and maximum of every number of the parameters."""
+    """Return name, unit, value, minimum and maximum of each scalar; a parameter that is an array has several."""
     rows = []
     for parameter in block.parameters:
         values, name = np.ravel(parameter.default), parameter.name.partition(".")[2]

@@ -98,7 +98,7 @@ def load_block(path: Path, symbol: str) -> CBlock:
     """Load the library at ``path`` into this process and return the block that it exports as ``symbol``.
 
     Raises:
-        ParameterError: It is not a library, has no such symbol, or a field of the block, which is named, is wrong.
+        ParameterError: It is not a library, has no such symbol, or a field of the block is wrong (and is named).
     """
     try:
         library = ctypes.CDLL(str(path))
@@ -215,7 +215,7 @@ def inside(controller: str, folder: Path) -> str:
 
 
 def seen_from(controller: str, folder: Path) -> str:
-    """Return the ``controller`` for a scenario file in ``folder``: the path of a library inside it is made relative."""
+    """Return the ``controller`` for a scenario in ``folder``; the path of a library or FMU there is made relative."""
     place = library_place(controller)
     if place is None or not place[0].is_relative_to(folder.resolve()):
         return controller
@@ -361,7 +361,7 @@ class LibraryController(ExternalController):
         return ExternalController(self.name, SimpleNamespace(kernel=kernel), self.vehicle)
 
     def reset(self) -> None:
-        """Set the state of the controller to zero before a new run."""
+        """Set the state of the controller to zero before a new flight."""
         self._state = np.zeros_like(self._state)
 
     def _call(self, inputs: ControllerInput) -> Any:

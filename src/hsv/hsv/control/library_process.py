@@ -44,7 +44,7 @@ class SharedMemory:
         self._mapped = np.empty(0)
 
     def numbers(self, count: int) -> np.ndarray:
-        """Return the first ``count`` numbers of the memory as an array (count); the memory grows as needed."""
+        """Return the first ``count`` 64-bit floats of the memory as an array; the memory grows as needed."""
         if len(self._mapped) < count:
             if os.fstat(self.descriptor).st_size < 8 * count:
                 os.truncate(self.descriptor, 8 * count)
@@ -88,9 +88,10 @@ class LibraryProcess:
             name: Name of the request.
             arguments: Arguments of the request.
             kept: Keyword arguments that the child stores; an object that it already has is not sent again.
-            begun: Returns the number of steps begun; while it is 0, there is no time limit.
+            begun: Returns the number of steps that the child has begun; while it is 0, there is no time limit.
 
         Raises:
+            OSError: The file cannot be read.
             ProcessError: The child crashed or hangs.
             HsvError: Raised in the child.
         """
@@ -118,7 +119,7 @@ class LibraryProcess:
 
     @contextmanager
     def sharing(self, numbers: int) -> Iterator[np.ndarray]:
-        """Yield the memory shared with the child as an array (numbers); other threads' requests wait meanwhile."""
+        """Yield the memory shared with the child, ``numbers`` floats; requests of other threads wait meanwhile."""
         with self._lock:
             yield self._memory.numbers(numbers)
 

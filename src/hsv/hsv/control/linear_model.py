@@ -101,7 +101,7 @@ class LinearModel:
         return control.ss(self.A, self.B, self.C, self.D, **names)
 
     def save(self, path: Path) -> None:
-        """Write the model to ``path``, in the format of MATLAB and Octave (``.mat``) or else of numpy (``.npz``)."""
+        """Write the model to ``path``: for MATLAB and Octave if the suffix is ``.mat``, else as numpy's ``.npz``."""
         with path.open("wb") as stream:
             if path.suffix == ".mat":
                 from scipy.io import savemat
