@@ -151,7 +151,7 @@ class Vehicle:
         return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
 
     def condition(self, altitude: float | str, velocity: float | str) -> tuple[float | str, float | str]:
-        """Return both; an empty one becomes the published trim's, or the envelope centre's if that is outside."""
+        """Return altitude and velocity; if empty, the published trim's, or the envelope centre's if that is outside."""
         published_altitude = parse_quantity(PUBLISHED_ALTITUDE, "m", "altitude")
         published_velocity = parse_quantity(PUBLISHED_VELOCITY, "m/s", "velocity")
         (h_low, h_high), (v_low, v_high) = self.altitude_range, self.velocity_range
