@@ -282,7 +282,7 @@ def _copy_array(target: Any, declared: Any, value: np.ndarray) -> None:
 
 
 def _contiguous(value: np.ndarray, required: np.dtype[Any]) -> np.ndarray:
-    """Return ``value`` as a contiguous array of type ``required``; refuse floats where integers are required."""
+    """Return ``value`` as a contiguous array of type ``required``; floats instead of integers raise a TypeError."""
     if value.size and not np.can_cast(value.dtype, required, "same_kind"):
         raise TypeError(f"array of {value.dtype}, expected {required}")
     return np.ascontiguousarray(value, required)
