@@ -50,8 +50,8 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
 
     W' is W with the fault and the parameter bounds scaled by tau (paper eq. 47). Z' is invariant under tau F' and under
     F', so that tau may change in flight between its value here and 1. The paper's Z' = tau Z would require W' = tau W
-    under F'; its half-widths are reported for comparison. The bounds of |u_n| for K' grow with U minus F' Z' (eq. 52,
-    eq. 53).
+    under F'; the half-widths of tau Z are reported for comparison. The bounds of |u_n| for K' grow with U minus F' Z'
+    (eq. 52, eq. 53).
 
     Arguments and errors are those of :func:`hsv.design.baseline.design_baseline`. DesignError is also raised if
     ``inputs`` has no adjustable factor or an option that an adjustable design does not allow, or if the nominal plan
@@ -151,7 +151,8 @@ def certified_loops(design: ControlDesign, vehicle: Vehicle, effectiveness: floa
     """Return the closed-loop state matrices (r, n, n) of error and notch filter that must share a Lyapunov function.
 
     There is one for each vertex, elevator effectiveness (1, ``effectiveness``) and tube factor (the smallest, 1); the
-    vertex varies fastest, the tube factor slowest. n: five rigid states, then those of the filter.
+    vertex varies fastest, the tube factor slowest. If the smallest factor is 1, it is the only one. n: five rigid
+    states, then those of the filter.
     """
     polytope, model = design.polytope, ChannelModel(design, vehicle)
 
@@ -165,10 +166,10 @@ def certified_loops(design: ControlDesign, vehicle: Vehicle, effectiveness: floa
 def relaxed_bound(
     bound: np.ndarray, trim_input: np.ndarray, complete: TightenedInputs, incomplete: TightenedInputs
 ) -> np.ndarray:
-    """Return the bounds (2) of |u_n| in (52): ``bound`` (2) scaled by the growth of the tightened inputs, and rounded.
+    """Return the bounds of |u_n| in eq. 52, shape (2,): ``bound`` times the growth of the tightened inputs, rounded.
 
-    The growth is the ratio of U minus F' Z' (``incomplete``) to U minus F Z at tau = 1 (``complete``). The size of
-    either is the distance from the target's ``trim_input`` (2) to the nearer bound (paper eq. 53).
+    The growth is the size of U minus F' Z' (``incomplete``) over that of U minus F Z at tau = 1 (``complete``). This
+    size is the distance, by input, from the target's ``trim_input`` to the nearer bound (paper eq. 53).
 
     Raises:
         DesignError: The trim input is not inside the tightened bounds for tau = 1 or for the tau of the design.
@@ -181,7 +182,7 @@ def relaxed_bound(
 
 
 def room_at_one(design: ControlDesign, vehicle: Vehicle, tube: dict[str, Any]) -> np.ndarray:
-    """Return the margin (2) of the nominal plan to the bounds tightened for tau = 1, at the nearer bound of each input.
+    """Return the margins, shape (2,), of the nominal plan to the nearer bound of each input, tightened for tau = 1.
 
     ``tube`` is the report on the tube of ``design``; it contains the plan, the invariant set and the disturbance set.
 

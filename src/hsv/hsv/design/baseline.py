@@ -38,7 +38,7 @@ class DesignResult:
 def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> DesignResult:
     """Return the baseline design (paper section 3) with its tube: gains, disturbance set, invariant set, input bounds.
 
-    The report is the certificate; it is the same at every run on one machine.
+    The report is the certificate; on one machine, the same inputs always give the same report.
 
     Args:
         inputs: Design inputs, from :func:`hsv.design.inputs.read_inputs`.
@@ -129,7 +129,7 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
 
 
 def nominal_problem(inputs: DesignInputs, polytope: Polytope, input_bound: np.ndarray) -> NominalProblem:
-    """Return the LMI problem (31)-(35) of the gains K on the rigid states, with |u_n| at most ``input_bound`` (2)."""
+    """Return the problem of the gains K on rigid states (eq. 31 to 35); ``input_bound``, shape (2,), limits |u_n|."""
     return NominalProblem(
         polytope.A[:, :N_RIGID, :N_RIGID],
         polytope.B[:, :N_RIGID],
@@ -141,7 +141,7 @@ def nominal_problem(inputs: DesignInputs, polytope: Polytope, input_bound: np.nd
 
 
 def nominal_family(inputs: DesignInputs, problem: NominalProblem, progress: Progress) -> list[NominalGain]:
-    """Return one nominal gain for each scale of the design's step, outermost first; errors of :func:`nested_gains`."""
+    """Return one nominal gain for each scale of x_n(0) in the inputs, outermost first; errors: :func:`nested_gains`."""
     deviation = initial_deviation(inputs)
     return nested_gains(
         problem,
@@ -163,17 +163,17 @@ def with_family(design: ControlDesign, problem: NominalProblem, gains: list[Nomi
 
 
 def initial_deviation(inputs: DesignInputs) -> np.ndarray:
-    """Return x_n(0) (5), the initial nominal state of the design's step: trim at start minus trim at target, SI."""
+    """Return x_n(0), shape (5,), for a step command from start to target: trim at start minus trim at target, SI."""
     start, target = inputs.nominal.start, inputs.nominal.target
     points = (start.altitude, start.velocity), (target.altitude, target.velocity)
     return step_deviation(inputs.flown_vehicle.decoupled, *points)
 
 
 def disturbance_columns(inputs: DesignInputs) -> np.ndarray:
-    """Return the disturbance columns (5, 4) whose responses F attenuates: changes of the rigid states per period, SI.
+    """Return the disturbances that F attenuates, as changes of the rigid states per period, shape (5, 4), SI.
 
-    The columns are the lost share of the trim elevator, and constant errors of the derivatives of velocity, angle of
-    attack and pitch rate, all linearised at mid-envelope.
+    The columns are the effect of losing a share of the trim elevator deflection, then those of constant errors in the
+    derivatives of velocity, angle of attack and pitch rate, all linearised at mid-envelope.
     """
     vehicle, centre = inputs.flown_vehicle.decoupled, inputs.flown_vehicle.centre
     A, B = (matrix[:N_RIGID] for matrix in linearise(vehicle, *centre))
@@ -185,7 +185,7 @@ def disturbance_columns(inputs: DesignInputs) -> np.ndarray:
 
 
 def _literal(inputs: DesignInputs, bounds: TightenedInputs) -> DesignInputs:
-    """Return ``inputs`` with the largest bound of |u_n| (35) that ``bounds`` (30) allow about the target's trim."""
+    """Return ``inputs`` with the largest |u_n| (eq. 35) inside the tightened ``bounds`` about the target's trim."""
     target = inputs.nominal.target
     bound = bounds.symmetric(trim(inputs.flown_vehicle.decoupled, target.altitude, target.velocity).input)
     if not bound.min() > 0.0:

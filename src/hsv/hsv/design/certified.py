@@ -48,7 +48,7 @@ class CertifiedDesign(Subject):
 
     @property
     def lag_feedback(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Minimum and maximum (2 each) of the feedback due to the actuators' lag behind the plan, or None."""
+        """Minimum and maximum, shape (2,) each, of the feedback due to the actuators' lag; None: ideal actuators."""
         lag = self.certificate["tube"]["tightening"].get("lag_feedback")
         return (np.array(lag["lower"]), np.array(lag["upper"])) if lag else None
 
@@ -69,7 +69,7 @@ def load_certified(path: Path) -> CertifiedDesign:
 
 @dataclass(frozen=True)
 class Plan:
-    """The plan (nominal trajectory) of the simulated ``flight`` of the nominal vehicle, with k steps.
+    """The plan (nominal trajectory) of ``flight``, a simulation of the nominal vehicle; its arrays have k rows.
 
     Methods that return bounds multiply them by :attr:`inflation`, like the bounds of the disturbance set.
     """
@@ -79,7 +79,7 @@ class Plan:
 
     @classmethod
     def of(cls, subject: CertifiedDesign) -> Plan:
-        """Simulate the nominal vehicle with the fault that the design declares, and return the plan of the flight."""
+        """Simulate the nominal vehicle with the fault of the design's declared region, and return the plan."""
         inputs = subject.inputs
         return cls(subject, Region(subject.design, inputs, incomplete_share(inputs)).fly({}))
 
@@ -95,24 +95,24 @@ class Plan:
 
     @property
     def half_width(self) -> np.ndarray:
-        """Half-widths (5) of the certified invariant set in the rigid states, SI."""
+        """Half-widths, shape (5,), of the certified invariant set in the rigid states, SI."""
         return np.array(self.subject.certificate["tube"]["invariant_set"]["half_width"][:N_RIGID])
 
     def largest(self) -> np.ndarray:
-        """Return the largest magnitude (5) of each rigid state along the plan, inflated, SI."""
+        """Return the largest magnitude of each rigid state along the plan, shape (5,), inflated, SI."""
         return np.asarray(self.inflation * np.abs(self.states).max(axis=0))
 
     def change(self, steps: np.ndarray) -> np.ndarray:
-        """Return the largest change (5) of each rigid state of the plan over ``steps`` (5, a number each), inflated."""
+        """Return the largest change of rigid state i of the plan over ``steps[i]`` steps, for each i, inflated, SI."""
         pairs = [(self.states[n:, i], self.states[: len(self.states) - n, i]) for i, n in enumerate(steps)]
         return np.array([self.inflation * np.abs(later - before).max() for later, before in pairs])
 
     def scheduling(self, errors: np.ndarray) -> np.ndarray:
-        """Return by how much measurement ``errors`` (2: m, m/s) widen the channels (7) of the disturbance set.
+        """Return by how much ``errors`` of measured altitude (m) and velocity (m/s) widen the disturbance set.
 
         The nominal model is scheduled with the measured altitude and velocity. An error in them changes the next x_n
-        by [A(p + error) - A(p)] x_n + [B(p + error) - B(p)] u_n. The result is the largest magnitude over the plan and
-        the four combinations of signs, by channel, inflated.
+        by [A(p + error) - A(p)] x_n + [B(p + error) - B(p)] u_n. The result, shape (7,), has an entry for each channel:
+        the largest magnitude over the plan and the four combinations of the errors' signs, inflated.
         """
         polytope, h = self.subject.design.polytope, self.flight.history
         points = h.state[:, :2]
@@ -129,7 +129,7 @@ class Plan:
         return self.inflation * largest
 
     def remeasured(self, equipment: Mapping[str, Any]) -> np.ndarray:
-        """Return by how much the disturbances in flights with ``equipment`` exceed their certified bounds (7); or 0.
+        """Return by how much disturbances in flights with ``equipment`` exceed certified bounds, by channel; or 0.
 
         Sensor noise moves the elevator, and the model does not explain all of the response. The unexplained part is
         measured in flights of the nominal vehicle and 32 corners, and inflated. ``equipment``: flat sensor parameters.

@@ -20,10 +20,10 @@ from hsv.model.signals import N_RIGID
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the comparison: one kind of set with its half-widths and its feedback on both inputs (2), SI.
+    """A row of the comparison: one kind of set with its half-widths and the half-range of its feedback by input, SI.
 
     ``note``: the error if there is no such set or no range of an input is left. ``size``: geometric mean of the scaled
-    half-widths of the rigid states. ``lower`` and ``upper`` (2): tightened bounds of u_n + u_r, or None.
+    half-widths of the rigid states. ``lower`` and ``upper``, shape (2,): tightened bounds of u_n + u_r, or None.
     """
 
     name: str
@@ -44,12 +44,15 @@ class Row:
 
 
 def compare_sets(design: ControlDesign, problem: TubeProblem, inputs: InvariantSetInputs) -> list[Row]:
-    """Return the rows of the ellipsoid, the star norms and the counter-examples, in this order.
+    """Return the rows of ellipsoid, star norms (omitted if no ellipsoid exists) and counter-examples, in this order.
 
     Args:
         design: Design; only the limits of its inputs are used.
         problem: Error system and disturbances.
         inputs: Scales of the sets, and contractions to try for the ellipsoid.
+
+    Raises:
+        DesignError: A vertex is not stable.
     """
     scale, rows = inputs.state_scale.array(), []
     try:

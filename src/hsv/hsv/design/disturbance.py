@@ -85,7 +85,7 @@ class Signals(NamedTuple):
 
     @property
     def remainder(self) -> np.ndarray:
-        """The disturbance f = Delta - w (n, 9) of (13)."""
+        """The disturbance f = Delta - w (paper eq. 13), shape (n, 9)."""
         return self.delta - self.fault
 
 
@@ -152,7 +152,7 @@ class ChannelModel:
         return lag_response(design.polytope, gain, self.notch, self.actuators, scheduled_at, lag)
 
     def at_rest(self, flight: Flight) -> np.ndarray:
-        """Return the rest positions (2) of the actuators before ``flight``: the trim input at its first state."""
+        """Return the actuators' rest positions before ``flight``, shape (2,): the trim input at its first state."""
         return trim(self.vehicle.decoupled, *flight.history.state[0, :2]).input
 
 
@@ -226,10 +226,10 @@ class Membership:
 
 @dataclass(frozen=True)
 class DisturbanceSet:
-    """The structured set: each of :data:`CHANNELS` between ``lower`` and ``upper`` (7), SI (paper eq. 19).
+    """The structured set (paper eq. 19): each of :data:`CHANNELS` between ``lower`` and ``upper``, shape (7,), SI.
 
-    It bounds the flights from which it was computed. Check :meth:`membership` in every other flight. Models of hardware
-    append further channels.
+    It is computed from the disturbances of some flights; check :meth:`membership` in every other flight. Models of
+    hardware and air append further channels.
     """
 
     lower: np.ndarray
@@ -237,12 +237,12 @@ class DisturbanceSet:
 
     @property
     def centre(self) -> np.ndarray:
-        """Mid-points (7) of the bounds; that of the one-sided fault is not zero and shifts the centre of the tube."""
+        """Mid-points of the bounds by channel; that of the one-sided fault is not zero and shifts the tube's centre."""
         return 0.5 * (self.lower + self.upper)
 
     @property
     def half_width(self) -> np.ndarray:
-        """Half-widths (7) of the bounds."""
+        """Half-widths of the bounds, by channel."""
         return 0.5 * (self.upper - self.lower)
 
     def scaled(self, share: float) -> DisturbanceSet:
@@ -252,8 +252,8 @@ class DisturbanceSet:
     def membership(self, channels: np.ndarray) -> Membership:
         """Return the largest ratio of the disturbances (n, 7) of a flight to their bounds, with channel and step.
 
-        A positive disturbance is divided by the upper bound, a negative one by the lower. The ratio to a bound of zero
-        is infinite.
+        A positive disturbance is divided by the upper bound, a negative one by the lower; if that bound is zero,
+        the ratio is infinite.
         """
         bounds = np.where(channels > 0.0, self.upper, self.lower)
         ratios = np.full(channels.shape, np.inf)
@@ -295,5 +295,5 @@ class Extremes:
         return cls(lower.min(axis=0), upper.max(axis=0), lower.argmin(axis=0), upper.argmax(axis=0))
 
     def structured(self, inflation: float) -> DisturbanceSet:
-        """Return the structured set with these extremes of the channels, extended to zero and times ``inflation``."""
+        """Return the structured set between these extremes of the channels, :func:`widened` by ``inflation``."""
         return DisturbanceSet(*widened(self.lower, self.upper, inflation))

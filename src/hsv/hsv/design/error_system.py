@@ -46,11 +46,11 @@ class ErrorSystem:
     F_d: np.ndarray
     names: tuple[str, ...]
     unseen: int = 0
-    """Number of states at the end that the controller does not know: states of actuators, and delayed samples."""
+    """Number of trailing states, those that the controller does not know: states of actuators, and delayed samples."""
 
     @property
     def seen(self) -> int:
-        """Number of states at the beginning that the controller knows: rigid states, and states of the notch filter."""
+        """Number of leading states, those that the controller knows: rigid states, then states of the notch filter."""
         return len(self.names) - self.unseen
 
 
@@ -134,7 +134,7 @@ def tube_errors(
         reference: (k, 9) x_r.
         notch: The notch filter in discrete time.
         actuators: Sampled actuators, without their limits; None: ideal ones, without states.
-        beyond_plan: (k, 2) input of the actuators minus the plan u_n + u_r, with the lost elevator in it.
+        beyond_plan: (k, 2) input of the actuators, after the fault, minus the plan u_n + u_r; None: ideal actuators.
     """
     rigid = (state - deviation - reference)[:, :N_RIGID]
     errors = [rigid, along_filter(notch, rigid[:, PITCH_RATE])[1]]

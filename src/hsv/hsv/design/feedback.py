@@ -73,8 +73,8 @@ def lyapunov_residuals(closed_loop: np.ndarray, N: np.ndarray, name: str) -> np.
 class FeedbackGain:
     """The feedback gain F = M N^-1 with its evidence.
 
-    ``F`` (m, n) and ``N`` (n, n) in SI, rounded; ``M`` (m, n) = F N. ``residuals`` (r): smallest eigenvalue of (24) at
-    each vertex, recomputed with N scaled to the identity. The root of e' N^-1 e shrinks in each step at least by the
+    ``F`` (m, n) and ``N`` (n, n) in SI, rounded; ``M`` (m, n) = F N. ``residuals`` (r): smallest eigenvalue of eq. 24
+    at each vertex, recomputed with N scaled to the identity. The root of e' N^-1 e shrinks in each step at least by the
     factor 1 - residual. ``radii`` (r): closed-loop spectral radii.
     """
 
@@ -109,7 +109,7 @@ def feedback_gain(
     """Return F such that all A_i + B_i F share one Lyapunov function (paper eq. 24), verified after solving.
 
     ``"guaranteed_cost"`` minimises a bound, common to all vertices, of the quadratic cost of the responses to the
-    disturbance columns. ``"feasibility"`` is (24) as printed, which does not determine F; it is for studies only.
+    disturbance columns. ``"feasibility"`` is eq. 24 as printed, which does not determine F; it is for studies only.
 
     Args:
         A: (r, n, n) state matrices of the vertices.
@@ -196,7 +196,7 @@ class CommonLyapunov:
 
 
 def common_lyapunov(closed_loop: np.ndarray, scale: np.ndarray, name: str) -> CommonLyapunov:
-    """Return a Lyapunov function e' N^-1 e common to all closed loops, with the largest margin in (24).
+    """Return a Lyapunov function e' N^-1 e common to all closed loops, with the largest margin in paper eq. 24.
 
     The margin is recomputed after solving.
 

@@ -160,7 +160,7 @@ class FeedbackInputs(_Table):
 
 
 class NominalInputs(_Table):
-    """Inputs of the nominal gains K (paper eq. 32 to eq. 35): one for the step to target, times each of ``scales``."""
+    """Inputs of the nominal gains K (paper eq. 32 to 35): one for each of ``scales`` times x_n(0) = start - target."""
 
     interpolated: bool | None = None
     """True: the gain is interpolated between two ellipsoids. False or None: it is switched."""
@@ -183,9 +183,9 @@ class NotchInputs(_Table):
 
 
 class RampInputs(_Table):
-    """A ramp of the commands, which leave the start at time ``start`` and reach the target at time ``end``.
+    """A ramp of the commands from the nominal start to the target, with its corners at the times ``start`` and ``end``.
 
-    ``blend``: half the time in which the rate changes at each of the two corners; None: the rate jumps.
+    ``blend``: half the duration of the change of rate about either corner; None: the rate jumps at the corners.
     """
 
     start: Duration = Field(ge=0.0)
@@ -210,7 +210,7 @@ def _coupling(value: Any) -> Any:
 
 
 class DisturbanceInputs(_Table):
-    """The flights in which disturbances are measured (paper eq. 13 to eq. 19): the nominal step, with a fault."""
+    """Flights that measure the disturbances (eq. 13 to 19): from nominal start to target, with an elevator fault."""
 
     coupling: Annotated[str, BeforeValidator(_coupling)]
     """Name of a set of inertial coupling of the vehicle, or a multiple of the derived coupling."""
@@ -258,7 +258,7 @@ class AdjustableInputs(_Table):
         return tau
 
     def array(self) -> np.ndarray:
-        """Return the factors (5), one for each rigid state."""
+        """Return the factors, one for each of the five rigid states."""
         return np.full(N_RIGID, self.tau[0]) if len(self.tau) == 1 else np.array(self.tau)
 
 
@@ -289,7 +289,7 @@ def _vehicle_values(vehicle: Vehicle | None) -> dict[str, Any] | None:
 
 
 def _vehicle(value: Any, info: ValidationInfo) -> Vehicle | None:
-    """Return the vehicle of a name, path or table (SI); None: the default vehicle, which old designs do not name."""
+    """Return the vehicle given by name, path or certificate table; None: the default one, unnamed in old designs."""
     if info.context == _SI:
         return Vehicle.from_parameters(value)
     if not isinstance(value, str):
@@ -338,7 +338,7 @@ class DesignInputs(_Table):
         return self.vehicle or load_vehicle()
 
     def error_scale(self) -> np.ndarray:
-        """Return the scales (5 + 2 s) of the errors of the rigid states and of s filter sections, SI.
+        """Return the scales of the errors, shape (5 + 2 m,), for the rigid states and the m filter sections, SI.
 
         Those of the rigid states are the scales of F. Those of the two states of a section are the scale of the pitch
         rate divided by the pole frequency, and by its square: roughly the amplitudes that this pitch rate excites.
@@ -406,7 +406,7 @@ def with_tau(inputs: DesignInputs, tau: list[float]) -> DesignInputs:
 
 
 def find_inputs(name: str) -> Path:
-    """Return the path of a TOML file of design inputs: a path, or a name in ``HSV_DESIGN_PATH`` or of a shipped design.
+    """Return the path of a design's TOML file; ``name``: a path, a name in ``HSV_DESIGN_PATH`` or of a shipped design.
 
     Raises:
         DesignError: There is no such file.

@@ -51,15 +51,15 @@ class Region:
         self._bounds = inputs.flown_vehicle.uncertainty
 
     def corners(self) -> list[dict[str, float]]:
-        """Return the parameter changes of the nominal vehicle, which has none, and of every corner of the region."""
+        """Return the parameter changes by flight: none (nominal vehicle), then those of every corner of the region."""
         return corners(self._bounds, self.share)
 
     def screening(self) -> list[Corner]:
-        """Return the parameter changes of the nominal vehicle, which has none, and of 32 corners of the region."""
+        """Return the parameter changes by flight: none (nominal vehicle), then those of 32 corners of the region."""
         return screening_corners(self._bounds, self.share)
 
     def fraction(self) -> list[dict[str, float]]:
-        """Return the parameter changes of the nominal vehicle and a quarter of the corners (few parameters: all)."""
+        """Return the parameter changes by flight: none, then those of a quarter of the corners, or of all if few."""
         return fraction(self._bounds, self.share)
 
     def fly(self, corner: Corner) -> Flight:
@@ -93,9 +93,9 @@ def _checked(corner: Corner, flight: Flight) -> Flight:
 
 @dataclass(frozen=True)
 class RegionResult:
-    """Extremes over a number of ``flights``, SI: ``channels`` (7); ``remainder`` f, ``fault`` w, ``delta`` (9 each).
+    """Extremes over ``flights`` flights, SI: of the ``channels``; by state, of ``remainder`` f, ``fault`` w, ``delta``.
 
-    ``lag_feedback`` (2): feedback due to the actuators' lag behind the plan, zero for ideal actuators.
+    ``lag_feedback``, by input: feedback due to the actuators' lag behind the plan, zero for ideal actuators.
     """
 
     flights: int

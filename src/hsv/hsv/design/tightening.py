@@ -27,26 +27,26 @@ Without this distance the acceleration channel reaches 1.02 of its bound."""
 
 @dataclass(frozen=True)
 class TightenedInputs:
-    """Minimum and maximum (2 each) of the nominal input u_n + u_r that leave room for the feedback, SI."""
+    """Minimum and maximum, shape (2,) each, of the nominal input u_n + u_r that leave room for the feedback, SI."""
 
     lower: np.ndarray
     upper: np.ndarray
 
     def margins(self, lowest: np.ndarray, highest: np.ndarray) -> np.ndarray:
-        """Return the margins (2 inputs x lower, upper) of a plan with inputs ``lowest`` to ``highest`` (2 each)."""
+        """Return the margins of a plan to both bounds, shape (2, 2): a row per input, lower side first, SI."""
         return np.stack((lowest - self.lower, self.upper - highest), axis=1)
 
     def symmetric(self, trim_input: np.ndarray) -> np.ndarray:
-        """Return the largest bound (2) of |u_n| for (35): the distance of ``trim_input`` (2) to the nearer bound."""
+        """Return the |u_n| permitted in eq. 35, shape (2,): the distance of ``trim_input`` to the nearer bound."""
         return np.minimum(trim_input - self.lower, self.upper - trim_input)
 
 
 def tighten(
     found: InvariantSet, minimum: np.ndarray, maximum: np.ndarray, lag: tuple[np.ndarray, np.ndarray] | None = None
 ) -> TightenedInputs:
-    """Return U minus F Z (paper eq. 30, eq. 53) for U between ``minimum`` and ``maximum`` (2).
+    """Return U minus F Z (paper eq. 30, eq. 53) for inputs U from ``minimum`` to ``maximum``.
 
-    ``lag``: minimum and maximum (2 each) of the feedback due to the actuators' lag behind the plan; None: no lag.
+    ``lag``: minimum and maximum, shape (2,) each, of the feedback due to the actuators' lag; None: no lag.
 
     Raises:
         DesignError: The feedback needs the whole range of an input.
@@ -81,8 +81,8 @@ def plan_bounds(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray
 
     Args:
         bounds: The tightened bounds.
-        lowest: (3) smallest u_n + u_r (2) and nominal pitch acceleration of the certified plans, SI.
-        highest: (3) their largest values.
+        lowest: Smallest values in the certified plans of the two u_n + u_r and the nominal pitch acceleration, SI.
+        highest: Their largest values.
     """
     shift = _KEPT_OFF * (highest - lowest)
     shift[2] = 0.0
@@ -94,8 +94,8 @@ def check_plan(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray)
 
     Args:
         bounds: The tightened bounds.
-        lowest: (2) smallest u_n + u_r of the plan.
-        highest: (2) largest u_n + u_r of the plan.
+        lowest: Smallest u_n + u_r of the plan, by input.
+        highest: Largest u_n + u_r of the plan, by input.
 
     Raises:
         DesignError: The plan exceeds a bound; the message states by how much.

@@ -70,7 +70,7 @@ class MeasuredSet:
     certified: dict[str, Any]
     bounds: TightenedInputs
     lag: tuple[np.ndarray, np.ndarray] | None
-    """Minimum and maximum (2 each) of the feedback due to the actuators' lag behind the plan; None: ideal actuators."""
+    """Minimum and maximum, shape (2,) each, of the feedback due to the actuators' lag; None: ideal actuators."""
 
     def report(self) -> dict[str, Any]:
         """Return the disturbance set, the invariant set and the tightened inputs, for JSON."""
@@ -87,7 +87,7 @@ class MeasuredSet:
 def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, progress: Progress) -> MeasuredSet:
     """Return the invariant set of ``design`` for the disturbances measured over ``region``.
 
-    The flights are those of :meth:`Region.fraction`: the nominal vehicle and a quarter of the corners.
+    The flights are those of :meth:`Region.fraction`: the nominal vehicle and a quarter of the corners, or all.
 
     Raises:
         DesignError: A flight diverges or saturates; no invariant set was found, or it fails when recomputed; or its
@@ -110,7 +110,7 @@ def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, pr
 def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress) -> Tube:
     """Return the certified tube of ``design`` for its declared region, with evidence from flights at all corners.
 
-    The disturbances are measured at a quarter of the corners only, so most of these flights are independent of it.
+    The disturbances are measured only at corners of :meth:`Region.fraction`; flights at other corners are independent.
 
     Raises:
         DesignError: As for :func:`measured_set`, or if the nominal plan exceeds the tightened bounds.
@@ -139,7 +139,7 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
 def flights_in_tube(
     model: ChannelModel, region: Region, found: InvariantSet, progress: Progress
 ) -> list[FlightEvidence]:
-    """Simulate all corners of ``region`` and return the :func:`flight_evidence` of each flight, in order."""
+    """Simulate the nominal vehicle and all corners of ``region``; return the :func:`flight_evidence`, in order."""
     everyone = region.corners()
     tell = partial(progress, "flights in the tube")
     return region.map(lambda flight: flight_evidence(flight, found, model), everyone, lambda n: tell(n, len(everyone)))
@@ -150,7 +150,7 @@ class FlightEvidence:
     """Evidence of one flight: largest ``level`` of the tube error e, ``membership`` of the disturbances in W, metrics.
 
     ``ratios`` (n): largest |e - c| of each state over the half-width z of the set with centre c. ``lowest`` and
-    ``highest`` (3): extremes of the total nominal inputs (2) and of the nominal pitch acceleration (rad/s^2).
+    ``highest``: extremes of the two total nominal inputs, then of the nominal pitch acceleration (rad/s^2).
     """
 
     level: float

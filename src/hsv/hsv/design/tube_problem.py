@@ -44,7 +44,7 @@ class TubeProblem:
 
 
 def bounding_factors(design: ControlDesign) -> list[np.ndarray]:
-    """Return the ends of the certified range of tube factors (5 each): the smallest factors, then 1.
+    """Return the ends of the certified range of tube factors, shape (5,) each: the smallest (if not 1), then 1.
 
     The closed loop for factors between the ends is a convex combination of the closed loops at the ends. A set that is
     invariant for both is therefore invariant however the factor varies between them.

@@ -55,8 +55,8 @@ class Effect:
     """The effect of a model of hardware or air on the error system: c further channels, wider bounds, and delays.
 
     ``columns`` (r, n, c): effect of the channels on e at each vertex; ``feedthrough`` (2, c): their effect on the
-    feedback; ``half_width`` (c): their bounds, about zero. ``widening`` (7): extension of the structured set on both
-    sides. ``late`` (5): delays of the measured rigid states, in steps.
+    feedback; ``half_width`` (c): their bounds, about zero. ``widening``, shape (7,): extension of the structured set on
+    both sides. ``late``, shape (5,): delays of the measured rigid states, in steps.
     """
 
     columns: np.ndarray
@@ -72,7 +72,7 @@ Model = Callable[[ErrorSystem], Effect]
 
 @dataclass(frozen=True)
 class Measured:
-    """The model of sensors of the rigid states, with largest errors ``error`` (5, SI) and delays ``late`` (5, steps).
+    """The model of sensors of the rigid states, with errors up to ``error`` (SI) and delays ``late`` (steps), by state.
 
     ``inertial``: the angle of attack also has the error of the pitch angle. ``plan``: the plan, whose change during a
     delay is an error, too; None: no such error, and no errors in the scheduling of the nominal model.
@@ -111,7 +111,7 @@ def entering(system: ErrorSystem) -> np.ndarray:
 
 
 def delayed(system: ErrorSystem, late: np.ndarray) -> ErrorSystem:
-    """Return ``system`` with the rigid states measured ``late`` (5) steps late; delayed samples are appended states."""
+    """Return ``system`` with rigid state i measured ``late[i]`` steps late; the delayed samples are appended states."""
     columns, n, extra = entering(system), len(system.names), int(late.sum())
     room = ((0, 0), (0, extra), (0, 0))
     A, B, G = np.pad(system.A, ((0, 0), (0, extra), (0, extra))), np.pad(system.B, room), np.pad(system.G, room)
@@ -153,7 +153,7 @@ def air(vehicle: Vehicle, period: float, forward: float = 0.0, up: float = 0.0, 
 
 
 def with_models(problem: TubeProblem, models: Sequence[Model]) -> TubeProblem:
-    """Return ``problem`` with the effects of all ``models``; channels with a bound of zero are omitted.
+    """Return ``problem`` with the effects of all ``models``; their channels with a bound of zero are omitted.
 
     If several models delay the same state, their delays add up.
     """
@@ -200,11 +200,11 @@ Declared = tuple[dict[str, Model], list[str]]
 
 
 def declared(subject: CertifiedDesign, scenario: Scenario, reach: float = REACH) -> Declared:
-    """Return the models of the sensors and the air of a scenario, by name, and its effects without a known bound.
+    """Return models of a scenario's sensors and air, by name, and the names of its effects without a known bound.
 
     Args:
         subject: The design.
-        scenario: The scenario; :func:`hsv.design.hardware.verdict.certified_with` takes its actuators.
+        scenario: The scenario; for its actuators see :func:`declared_actuators`.
         reach: Number of standard deviations that counts as the bound of a normally distributed quantity.
     """
     values, period = scenario.parameters(), subject.design.period
@@ -233,12 +233,14 @@ def described(
     density: str = "0 %",
     reach: float = REACH,
 ) -> Declared:
-    """Return the models of non-zero size in options of ``hsv certify``, by name, and the effects without a bound.
+    """Return the models that options of ``hsv certify`` describe, by name, and the effects without a known bound.
+
+    An option with the value zero gives no model.
 
     Args:
         subject: The design.
         sensor_set: Name of a published sensor set.
-        bias: Constant biases of rigid states, each a text "state=quantity".
+        bias: Magnitudes of constant biases of rigid states, each a text "state=quantity".
         gust: Bound of the wind forward and of the wind up, with unit.
         turbulence: Standard deviation of the turbulence forward and up, with unit.
         density: Bound of the relative error of the density.
@@ -281,7 +283,7 @@ def described(
 
 
 def _airs(subject: CertifiedDesign, bounds: Mapping[str, np.ndarray]) -> dict[str, Model]:
-    """Return a model of air for each of the ``bounds`` (3: wind forward and up, m/s; relative density) above zero."""
+    """Return a model of air for each non-zero triple in ``bounds``: wind forward and up (m/s), relative density."""
     return {name: air(subject.vehicle, subject.design.period, *of) for name, of in bounds.items() if of.any()}
 
 
@@ -305,7 +307,7 @@ def _without_bound(data: Struct, values: Mapping[str, Any], period: float) -> li
 def _remeasure(models: dict[str, Model], unbounded: list[str], plan: Plan, equipment: Mapping[str, Any]) -> None:
     """Add to ``models`` the widening of the disturbance set that is measured in flights with ``equipment``.
 
-    If such a flight diverges or saturates, it is added to the effects ``unbounded`` instead.
+    If such a flight diverges or saturates an input, the sensors are added to the ``unbounded`` effects instead.
     """
     try:
         widening = plan.remeasured(equipment)

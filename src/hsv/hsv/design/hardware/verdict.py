@@ -34,7 +34,7 @@ from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_RIGID
 from hsv.model.trim import trim
 
 Lag = tuple[np.ndarray, np.ndarray] | None
-"""Minimum and maximum (2 each) of the feedback due to the actuators' lag behind the plan; None: ideal actuators."""
+"""Minimum and maximum, shape (2,) each, of the feedback due to the actuators' lag; None: ideal actuators."""
 
 
 @dataclass(frozen=True)
@@ -82,10 +82,10 @@ class Reach:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Verdict on a design with models of hardware and air: ``half_width`` (5, rigid) and ``feedback`` (2) of the set.
+    """Verdict on a design with models of hardware and air: its invariant set, and the margins of the plan, SI.
 
-    ``room`` (2, 2): margins of the nominal plan to the tightened bounds of each input, lower and upper side, SI; if one
-    is negative the plan does not fit. ``reason``: explanation in words, if the margins alone do not decide.
+    ``half_width``: of the rigid states; ``feedback``: half-range by input. ``room[i]``: margins of the plan to the
+    lower and upper tightened bound of input i; it fits if all are positive. ``reason``: explanation, if these do not decide.
     """
 
     name: str
@@ -94,9 +94,9 @@ class Verdict:
     feedback: np.ndarray | None = None
     room: np.ndarray | None = None
     shares: np.ndarray | None = None
-    """The margins ``room`` (2, 2) as shares of the range of each input."""
+    """The margins ``room`` as shares of the range of each input."""
     start: float = 0.0
-    """Largest level of the tube error at the start: x_n starts at the first measurement, whose errors remain in e."""
+    """Bound on the start level of the tube error: x_n starts at the first measurement, whose errors remain in e."""
     reaches: tuple[Reach, ...] = ()
     """Ranges of the actuators over the invariant set."""
     without_limits: Verdict | None = None
@@ -142,9 +142,10 @@ def certified_with(
     progress: Progress = lambda *_: None,
     unbounded: Sequence[str] = (),
 ) -> list[Verdict]:
-    """Return the verdicts: as certified; with ``actuators``, if different; with each model alone; with all models.
+    """Return the verdicts: as certified, with other ``actuators``, with each of the ``models``, and with all of them.
 
-    If the last of these has actuators and an invariant set, a verdict on the limits of the actuators follows.
+    Verdicts that would repeat another are omitted; those on models include the actuators. If the last one has actuators
+    and an invariant set, a verdict on the limits of the actuators follows.
 
     Args:
         subject: The design with its certificate.
@@ -196,7 +197,7 @@ def _named(actuators: str) -> tuple[str, ...]:
 
 
 def _lag_of_the_plan(subject: CertifiedDesign, design: ControlDesign) -> tuple[np.ndarray, np.ndarray]:
-    """Return minimum and maximum (2 each) of the feedback due to the actuators' lag behind the plan, inflated like W.
+    """Return minimum and maximum, shape (2,) each, of the feedback due to the actuators' lag, inflated like W.
 
     The actuators are those of ``design``, the plan that of the nominal vehicle of ``subject``.
     """
@@ -254,7 +255,7 @@ def verdict(
 
 
 def _start(found: InvariantSet, error: np.ndarray) -> float:
-    """Return the largest level at the start of a flight for errors up to ``error`` (5) of the measured rigid states."""
+    """Return a bound on the start level of a flight for errors up to ``error``, shape (5,), in the measurement."""
     corners = np.array(list(product((-1.0, 1.0), repeat=N_RIGID))) * error
     errors = np.pad(corners, ((0, 0), (0, len(found.centre) - N_RIGID)))
     level = float(found.level(errors).max())
@@ -266,7 +267,8 @@ def _start(found: InvariantSet, error: np.ndarray) -> float:
 def reaches(found: InvariantSet, design: ControlDesign, plan: Plan) -> list[Reach]:
     """Return the range of positions and rates of each actuator of ``design``, for all errors in the set ``found``.
 
-    The errors add to the ``plan``. Positions and rates are evaluated at every substep, where the limits act.
+    Star norms are ignored: the errors are those of the ellipsoid, about the ``plan``. Positions and rates are evaluated
+    at every substep, where the limits act.
     """
     system, disturbance, known = found.problem.system, found.problem.disturbance, design.actuator_sets
     flown, commands = plan.actuators(design)

@@ -20,10 +20,10 @@ _LONGEST = 10_000
 
 @dataclass(frozen=True)
 class CounterExamples:
-    """For each output row, the constant vertex and the disturbance sequence that drive the output farthest.
+    """Range over which disturbances drive each output row from zero error, at the constant vertex where it is largest.
 
-    ``half_range`` (7): half the difference of the outputs that the sequence and its opposite reach from zero error,
-    SI; ``vertex`` (7): index; ``steps`` (7): length of the sequence. Rows as in :meth:`TubeProblem.output_rows`.
+    ``half_range``: half the difference of the outputs that the worst sequence and its opposite reach, SI; ``vertex``:
+    index of the vertex; ``steps``: length of the sequence. One entry per row of :meth:`TubeProblem.output_rows`.
     """
 
     half_range: np.ndarray
@@ -56,8 +56,8 @@ def counter_examples(problem: TubeProblem) -> CounterExamples:
 def responses(problem: TubeProblem, row: np.ndarray) -> np.ndarray:
     """Return the response (steps, r, d) of an output ``row`` (n) to unit disturbances at each vertex.
 
-    Entry [m, i, j] is due to disturbance j at vertex i, m + 1 steps earlier. Negligible steps at the end are omitted.
-    All vertices must be stable.
+    Entry [m, i, j] is due to disturbance j at vertex i, m + 1 steps earlier. Steps with negligible responses at the
+    end, and those after 10 000, are omitted. All vertices must be stable.
     """
     A, G, half_width = problem.system.A, problem.system.G, problem.disturbance.half_width
     found: list[np.ndarray] = []

@@ -44,7 +44,7 @@ class InvariantSet:
     """A set centre + Z that the error never leaves, with its evidence; SI.
 
     ``centre`` c (n), ``Q`` (n, n), ``contraction`` lam, ``multipliers`` l (r, d + 1). With ``star_norms`` the set is
-    the intersection of the ellipsoid with the sets of the star norms; half-widths and feedback are the smaller of both.
+    the intersection of the ellipsoid with the sets of the star norms; each half-width is then the smaller of the two.
     """
 
     problem: TubeProblem
@@ -62,7 +62,7 @@ class InvariantSet:
 
     @property
     def feedback(self) -> np.ndarray:
-        """Half-range (2) of the feedback F e over Z, for each input."""
+        """Half-range of the feedback F e over Z, for each input."""
         F = self.problem.system.F
         return self._bounds(np.sqrt(np.einsum("ij,jk,ik->i", F, self.Q, F)), slice(N_RIGID, None))
 
@@ -73,7 +73,7 @@ class InvariantSet:
         return bounds
 
     def seen(self) -> TubeSet:
-        """Return the ellipsoid projected onto the states that the controller knows, without those of actuators."""
+        """Return ellipsoid and half-widths for the states that the controller knows: rigid states and notch filter."""
         n = self.problem.system.seen
         return TubeSet(self.centre[:n], inverse(self.Q[:n, :n]), self.half_width[:n])
 
@@ -148,8 +148,8 @@ def ellipsoid(
 
     Args:
         problem: Error system and disturbances.
-        state_scale: (5) half-widths of the rigid states that weigh equally, SI.
-        input_scale: (2) half-ranges of the feedback that weigh as much, SI.
+        state_scale: Half-widths of the five rigid states that weigh equally, SI.
+        input_scale: Half-ranges of the feedback on the two inputs that weigh as much, SI.
         contractions: Values of lam to try.
 
     Raises:

@@ -56,7 +56,7 @@ class StarNorms:
     contraction: np.ndarray
 
     def bounds(self, problem: TubeProblem) -> np.ndarray:
-        """Return the bounds (7) of the output rows, as distances from their values at the centre, SI."""
+        """Return the bounds of the seven output rows, as distances from their values at the centre, SI."""
         rows = problem.output_rows()
         return np.asarray(np.sqrt(np.einsum("ki,kjil,kl->kj", rows, self.Q, rows)).sum(axis=1))
 
@@ -78,7 +78,7 @@ class StarNorms:
         return residuals
 
     def level_at_start(self, problem: TubeProblem, centre: np.ndarray, error: np.ndarray | None = None) -> float:
-        """Return a bound of the level of an initial ``error`` (n; None: zero) in the set of the star norms.
+        """Return an upper bound of the level of an initial ``error`` (None: zero) in the set of the star norms.
 
         If it is at most 1 the error is inside: the error minus the centre is then a sum of terms v, one per channel,
         each in its ellipsoid. The result is the largest v' Q^-1 v over all rows and channels. For zero error, each term
@@ -153,7 +153,7 @@ def _level(Q: np.ndarray, v: np.ndarray) -> float:
 def star_norms(
     problem: TubeProblem, centre: np.ndarray, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> StarNorms:
-    """Return the star norms: the ellipsoids that minimise the bound of each output row.
+    """Return the star norms: ellipsoids that make the bound of each output row small.
 
     Args:
         problem: Error system and disturbances.
@@ -230,7 +230,7 @@ def _coordinates(A: np.ndarray, g: np.ndarray, contraction: float) -> np.ndarray
 
 
 def _gramians(A: np.ndarray, held: np.ndarray, contraction: float) -> np.ndarray:
-    """Return the Gramian (r, n, n) of each A (r, n, n): Q = A Q A' / c + ``held`` / (1 - c), c the ``contraction``."""
+    """Return the Gramian of each A: Q = A Q A' / c + ``held`` / (1 - c); ``held`` is g g', c the ``contraction``."""
     power, gramian = A / np.sqrt(contraction), held / (1.0 - contraction)
 
     def diagonals(matrices: np.ndarray) -> np.ndarray:
