@@ -281,7 +281,7 @@ class ControlDesign:
     tube: TubeSet | None = None
     """The invariant set of the tube error, or ``None`` if the design has none."""
     plan_bounds: PlanBounds | None = None
-    """Bounds of the total nominal input, or ``None`` if the design has no tightened inputs."""
+    """Bounds of the total nominal input, or ``None`` if the design has no tightened bounds."""
     tau: np.ndarray = field(default_factory=lambda: np.ones(N_RIGID))
     """Factors tau (5) of the feedback of the rigid states in flight."""
     tau_minimum: np.ndarray = field(default_factory=lambda: np.ones(N_RIGID))

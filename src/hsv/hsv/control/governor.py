@@ -40,7 +40,8 @@ NOTICE = 2.0
 processor time, so that a flight in real time need not wait for it."""
 
 KEPT_FREE = 1e-3
-"""Share of U minus F Z that a plan leaves free on every side; in flight, measured states schedule the model instead."""
+"""Share of U minus F Z that a plan leaves free on every side. The model is scheduled by x_r + x_n in planning, by the
+measured state in flight."""
 
 
 class Leg(NamedTuple):

@@ -1,6 +1,6 @@
 """Nominal gains by the min-max LMI with input bounds (paper eq. 31 to eq. 35), one gain or a nested family.
 
-K = Y Q^-1 minimises gamma, a bound of the cost sum x_n' psi x_n + u_n' sigma u_n from x_n(0) (31), (32), subject to
+K = Y Q^-1 minimises gamma, a bound of the cost sum x_n' psi x_n + u_n' sigma u_n from x_n(0) (eq. 31, 32), subject to
 
     [1, x_n(0)'; x_n(0), Q] >= 0,                                                                                  (33)
     [Q, (A_i Q + B_i Y)', (psi^1/2 Q)', (sigma^1/2 Y)'; ., Q, 0, 0; ., ., gamma I, 0; ., ., ., gamma I] >= 0,      (34)

@@ -22,7 +22,7 @@ class Tolerance(NamedTuple):
     absolute: float
 
     def allowed(self, expected: np.ndarray, size: Any = 1.0) -> np.ndarray:
-        """Return the largest permitted difference (SI) from each entry of ``expected`` of typical magnitude ``size``."""
+        """Return the largest permitted differences from ``expected``, whose entries are typically as large as ``size``."""
         return np.maximum(self.relative * np.abs(expected), self.absolute * np.asarray(size, float))
 
 
@@ -55,7 +55,7 @@ TOLERANCES = {
 """Tolerances by kind of quantity."""
 
 RECOMPUTED_DESIGN = 1e-3
-"""Largest deviation of a recomputed design from the shipped one, as a share of the larger of an entry and its size."""
+"""Largest deviation of a recomputed design from the shipped one, relative to an entry or its typical size, if larger."""
 
 PARAMETERS = {
     name: kind

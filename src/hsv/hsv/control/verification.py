@@ -6,7 +6,7 @@ flight (vertices A_i, B_i, gains F and K) come from the design file, the stateme
 The vertices are recomputed from the parameters of the vehicle, and every inequality from its matrices.
 :mod:`hsv.flight.verification` repeats the flights, and :func:`hsv.control.checks.unchecked` lists the fields that no
 check covers. The parts follow the paper: model (eq. 10 to 12), gain F (eq. 24), gains K (eq. 31 to 35), error system
-(eq. 22, 23), invariant set (eq. 25 to 28), tightened inputs (eq. 30), adjustable factor (eq. 47 to 54).
+(eq. 22, 23), invariant set (eq. 25 to 28), tightened bounds (eq. 30), adjustable factor (eq. 47 to 54).
 
 The matrix inequalities are checked as bounds on singular values. With Q = L L', a matrix M maps the ellipsoid
 x' Q^-1 x <= 1 into itself if and only if the largest singular value of L^-1 M L is at most 1; see :func:`image`.
@@ -466,7 +466,7 @@ def factors(design: ControlDesign) -> list[np.ndarray]:
     return [one] if np.array_equal(design.tau_minimum, one) else [design.tau_minimum, one]
 
 
-# --- invariant set, eq. 25 to 28, and tightened inputs, eq. 30 --------------------------------------------------------
+# --- invariant set, eq. 25 to 28, and tightened bounds, eq. 30 --------------------------------------------------------
 
 
 class Tube:
@@ -596,7 +596,7 @@ class StarNorms(NamedTuple):
 
 
 def set_checks(subject: Subject) -> Checks:
-    """Check the tube used in flight: invariance, half-widths, W, star norms, tightened inputs and bounds of plans."""
+    """Check the tube used in flight: invariance, half-widths, W, star norms, tightened bounds and bounds of plans."""
     design = subject.design
     tube = Tube(subject, design, "tube")
     yield Check("tube parameters", str(design.tube is not None), "True", design.tube is not None)
@@ -644,7 +644,7 @@ def lag_feedback(subject: Subject) -> Sequence[Sequence[float]]:
 
 
 def _tube_checks(subject: Subject, tube: Tube) -> Checks:
-    """Check what the field of ``tube`` states: set (eq. 25 to 28), W (eq. 19) and tightened inputs (eq. 30, 53)."""
+    """Check what the field of ``tube`` states: set (eq. 25 to 28), W (eq. 19) and tightened bounds (eq. 30, 53)."""
     field = tube.field
     inside, inputs = f"{field}.invariant_set", subject.certificate["inputs"]["disturbance"]
     yield equal(subject, f"{inside}.kind", "ellipsoid")
