@@ -22,7 +22,7 @@ class Tolerance(NamedTuple):
     absolute: float
 
     def allowed(self, expected: np.ndarray, size: Any = 1.0) -> np.ndarray:
-        """Return the largest permitted differences from ``expected``, whose entries are typically as large as ``size``."""
+        """Return the largest permitted differences from ``expected``, entries of typical magnitude ``size``; SI."""
         return np.maximum(self.relative * np.abs(expected), self.absolute * np.asarray(size, float))
 
 
@@ -55,7 +55,7 @@ TOLERANCES = {
 """Tolerances by kind of quantity."""
 
 RECOMPUTED_DESIGN = 1e-3
-"""Largest deviation of a recomputed design from the shipped one, relative to an entry or its typical size, if larger."""
+"""Largest deviation of a recomputed design from the shipped one, relative to an entry or, if larger, its size."""
 
 PARAMETERS = {
     name: kind
