@@ -129,7 +129,7 @@ class Plan:
         return self.inflation * largest
 
     def remeasured(self, equipment: Mapping[str, Any]) -> np.ndarray:
-        """Return by how much disturbances in flights with ``equipment`` exceed certified bounds, by channel; or 0.
+        """Return by how much disturbances in flights with ``equipment`` exceed certified bounds, by channel; else 0.
 
         Sensor noise moves the elevator, and the model does not explain all of the response. The unexplained part is
         measured in flights of the nominal vehicle and 32 corners, and inflated. ``equipment``: flat sensor parameters.

@@ -1,4 +1,4 @@
-"""The inputs of an offline design: one TOML file, every quantity with its unit, checked before anything is computed."""
+"""The inputs of an offline design, checked before it is computed: a TOML file with units, or an SI table."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def plan_bounds(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray
 
     Args:
         bounds: The tightened bounds.
-        lowest: Smallest values in the certified plans of the two u_n + u_r and the nominal pitch acceleration, SI.
+        lowest: Smallest u_n + u_r of either input and smallest nominal pitch acceleration in the certified plans, SI.
         highest: Their largest values.
     """
     shift = _KEPT_OFF * (highest - lowest)

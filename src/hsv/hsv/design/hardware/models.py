@@ -129,7 +129,7 @@ def delayed(system: ErrorSystem, late: np.ndarray) -> ErrorSystem:
 
 
 def air(vehicle: Vehicle, period: float, forward: float = 0.0, up: float = 0.0, density: float = 0.0) -> Model:
-    """Return the model of air with wind up to ``forward`` and ``up`` (m/s) and a relative density error of ``density``.
+    """Return the model of air with bounds on wind ``forward`` and ``up`` (m/s) and on the relative ``density`` error.
 
     The effect is linearised at mid-envelope, with values held over a ``period`` (s).
     """
@@ -307,7 +307,7 @@ def _without_bound(data: Struct, values: Mapping[str, Any], period: float) -> li
 def _remeasure(models: dict[str, Model], unbounded: list[str], plan: Plan, equipment: Mapping[str, Any]) -> None:
     """Add to ``models`` the widening of the disturbance set that is measured in flights with ``equipment``.
 
-    If such a flight diverges or saturates an input, the sensors are added to the ``unbounded`` effects instead.
+    If such a flight diverges or saturates an input, that failure is added to the ``unbounded`` effects instead.
     """
     try:
         widening = plan.remeasured(equipment)
