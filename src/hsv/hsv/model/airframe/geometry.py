@@ -25,7 +25,7 @@ EIGENVALUE = 1.8751040687119611
 class Cantilever:
     """A uniform Euler-Bernoulli cantilever and its first mode, normalised to unit modal mass.
 
-    The deflection is w(s, t) = shape(s) * eta(t) with eta in kg^0.5 m, the unit of the vehicle's elastic states.
+    The deflection is w(s, t) = shape(s) * eta(t) with eta in kg^0.5 m, the unit of the vehicle's elastic coordinates.
     """
 
     length: float
