@@ -1,4 +1,4 @@
-"""Measurements for judging claims: numbers of certificates, flights of many vehicles, and poles of the sampled loop."""
+"""Measurements for claims: numbers from certificates, flights of many vehicles, and poles of the sampled loop."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Evidence:
         self.behind = cache(self._behind)
 
     def _behind(self, elevator: str) -> Evidence:
-        """Return the evidence with this elevator: itself if ideal, else a new one with at most 32 corners to fly."""
+        """Return evidence with this elevator: this object if ideal, else a new one that flies at most 32 corners."""
         if elevator == IDEAL:
             return self
         over = [corner for corner in screening_corners(load_vehicle().uncertainty) if corner in self.over]
@@ -77,14 +77,14 @@ class Evidence:
     def uncertain(self, scenario: str, measure: str, *changes: tuple[str, Any]) -> float:
         """Return the magnitude of a measure in the flight with uncertain parameters; NaN if it is not defined.
 
-        For ``case1_...`` this flight is the scenario ``case1_uncertain_...``, and so for Case 2.
+        For ``case1_...`` this flight is the scenario ``case1_uncertain_...``, and likewise for Case 2.
         """
         case, _, rest = scenario.partition("_")
         flight = self.changed("_".join(filter(None, (case, "uncertain", rest))), *changes)
         return abs(flight.get(measure, np.nan))
 
     def magnitudes(self, scenario: str, measure: str, *changes: tuple[str, Any]) -> np.ndarray:
-        """Return the magnitudes (vehicles) of a measure in the flights of a scenario, the nominal vehicle first."""
+        """Return the magnitudes of a measure in the flights of a scenario, one per vehicle, the nominal one first."""
         return np.abs(self.corners(scenario, *changes)[measure])
 
     def _growth(
@@ -100,7 +100,7 @@ class Evidence:
 
 
 def certified(entry: str) -> np.ndarray:
-    """Return the numbers (n) at ``design:path.to.entry`` in a certificate, from all elements of lists."""
+    """Return the numbers, shape (n,), at ``design:path.to.entry`` in a certificate, from all items of a list."""
     name, _, path = entry.partition(":")
     found = [certificate(name)]
     for key in path.split("."):
@@ -109,7 +109,7 @@ def certified(entry: str) -> np.ndarray:
 
 
 def shown(value: float, unit: str, digits: int = 4) -> str:
-    """Return a number (SI) as text in the paper's unit. An infinite time is "not by the end" of the flight."""
+    """Return a number (SI) as text in the paper's unit; an infinite time is written as "not by the end"."""
     if not math.isfinite(value):
         return "not defined" if math.isnan(value) else "not by the end" if unit == "s" else "unbounded"
     number, name = to_paper(value, unit)

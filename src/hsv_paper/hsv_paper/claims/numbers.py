@@ -1,7 +1,8 @@
-"""Numbers for the claims that neither a certificate nor a measure of a flight provides, in the order of the paper.
+"""Functions that return numbers for the claims, in the order of the paper.
 
-A claim names its function in ``claims.yaml``. Each function returns numbers (SI) and words by name. An array has one
-element per vehicle, the nominal one first.
+Other numbers of the claims come directly from certificates and measures of flights. A claim names its function in
+``claims.yaml``. Each function returns numbers (SI) and words by name. An array has one element per vehicle, the nominal
+one first; those of :func:`sets` have one per state.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ FAMILY = "case1_rmpc_fourth_k"
 
 
 def vertices(evidence: Evidence) -> Numbers:
-    """Return the numbers of vertices of the polytopic models of the baseline and of the adjustable design."""
+    """Return the number of vertices of the polytopic model, for the baseline and for the adjustable design."""
     return {name: float(len(design(name).polytope.A)) for name in ("baseline", "adjustable")}
 
 
@@ -85,13 +86,13 @@ def coupling(evidence: Evidence) -> Numbers:
 
 
 def _rise() -> np.ndarray:
-    """Return the rise (dB) of pitch rate over elevator by paper-like coupling, over :data:`modes.FREQUENCIES`."""
+    """Return the rise (dB) from elevator to pitch rate due to paper-like coupling, at :data:`modes.FREQUENCIES`."""
     coupled, alone = (bode(modes.pitch_rate_response(name, modes.FREQUENCIES))[0] for name in ("paper_like", 0.0))
     return coupled - alone
 
 
 def disturbance(evidence: Evidence) -> Numbers:
-    """Return how many flights were compared with the disturbance set W, and the share of W for the derived coupling."""
+    """Return how many flights were compared with W and, for the derived coupling, with a share of it, and the share."""
     other = certificate("baseline_derived")
     return {
         "flights": certificate("baseline")["tube"]["flights"]["flights"],
@@ -104,12 +105,13 @@ def disturbance(evidence: Evidence) -> Numbers:
 
 
 def box(evidence: Evidence) -> Numbers:
-    """Return the spectral radius that must be below 1 for the paper's invariant box (eq. 25 to eq. 28) to exist.
+    """Return the spectral radius of the entrywise maximum of |A_i + B_i F| over the vertices i of the baseline.
 
-    The box is Z = {|e| <= z}; w_i are the half-widths of the disturbance at vertex i. By the Farkas lemma (the paper's
-    Lemma 2), condition (27) is |A_i + B_i F| z + w_i <= z at every vertex. If |A_i + B_i F| has a spectral radius of at
-    least one at some vertex, no z exists: its left Perron vector y gives y'z + y'w_i <= y'z. The absolute value hides
-    the signs that make integrators and oscillating pairs stable.
+    Below 1, it would prove that the paper's invariant box (eq. 25 to eq. 28) exists. The box is Z = {|e| <= z}; w_i are
+    the half-widths of the disturbance at vertex i. By the Farkas lemma (the paper's Lemma 2), condition (eq. 27) is
+    |A_i + B_i F| z + w_i <= z at every vertex. If |A_i + B_i F| has a spectral radius of at least one at some vertex,
+    no z exists: its left Perron vector y gives y'z + y'w_i <= y'z. The absolute value hides the signs that make
+    integrators and oscillating pairs stable.
     """
     flown = design("baseline")
     largest = np.abs(flown.polytope.A + flown.polytope.B @ flown.feedback_gain).max(axis=0)
@@ -117,7 +119,7 @@ def box(evidence: Evidence) -> Numbers:
 
 
 def symmetric(evidence: Evidence) -> Numbers:
-    """Return the distances of the centres of the sets W and Z from zero over half-widths; the largest of each set."""
+    """Return the largest ratio of centre to half-width: of a channel of W, with its name, and of a state of Z."""
     tube = tube_of("baseline")
     channels = certificate("baseline")["tube"]["disturbance"]["channels"]
     off = {name: abs(b["upper"] + b["lower"]) / (b["upper"] - b["lower"]) for name, b in channels.items()}
@@ -156,7 +158,7 @@ def kept_of_level(A: np.ndarray, B: np.ndarray, gain: np.ndarray, shape: np.ndar
 def nominal_law(evidence: Evidence) -> Numbers:
     """Return the largest factor per step on the nominal Lyapunov functions, and levels of x_n in Case 1.
 
-    A level is x_n' P x_n of the outermost ellipsoid; ``left`` is the last one relative to the ``first``.
+    A level is x_n' P x_n of the outermost ellipsoid; ``left`` is the last level relative to the ``first``.
     """
     flown = design("baseline")
     A, B = flown.polytope.A[:, :N_RIGID, :N_RIGID], flown.polytope.B[:, :N_RIGID]
@@ -192,7 +194,7 @@ def seven_modes(evidence: Evidence) -> Numbers:
 
 
 def underdamped(evidence: Evidence) -> Numbers:
-    """Return the larger damping ratio of the elastic modes, and the rise (dB) by coupling at both peaks."""
+    """Return the larger damping ratio of the elastic modes, and the rise (dB) by coupling at each one's peak."""
     raised = _rise()
     first, second = (float(np.interp(peak.frequency, modes.FREQUENCIES, raised)) for peak in modes.peaks(()).values())
     return {
@@ -203,10 +205,10 @@ def underdamped(evidence: Evidence) -> Numbers:
 
 
 def coupling_in_pitch_rate(evidence: Evidence) -> Numbers:
-    """Return the share of the pitch rate in three effects of coupling, as ratios of sums of squares.
+    """Return the pitch rate's share of three effects of coupling, as ratios of sums of squares.
 
-    ``onto_rigid``, ``onto_elastic``: in the terms from modes to rigid body and back. ``answer``: in the change of the
-    response to the elevator.
+    ``onto_rigid``: of the terms by which elastic states act on rigid-body states. ``onto_elastic``: of those in the
+    other direction. ``answer``: of the change of the rigid-body states' response to the elevator.
     """
     scale = np.array(list(certificate("baseline")["inputs"]["model"]["tensor_product"]["state_scale"].values()))
     models = [modes.linearised(name) for name in ("paper_like", 0.0)]
@@ -243,8 +245,8 @@ def passed(evidence: Evidence) -> Numbers:
     """Return the effects of the design's filter away from its centre: phase lags (rad) and gains (dB).
 
     ``lag`` is at the rigid-body crossover of the loop, ``slow_lag`` at 1 rad/s; ``second`` is the reduction of the
-    second peak. ``above`` is the change of gain at ten times the centre, ``unmatched`` the smallest with other poles of
-    Figure 3.
+    second peak. ``above`` is the magnitude of the gain at ten times the centre, ``unmatched`` the smallest with the
+    other pole frequencies of Figure 3.
     """
     section, crossover = design("baseline").notch[0], float(margins(evidence, {}, notched=False)[0, 0])
     slow_lag, lag = -np.angle(notch_response([section], np.array([1.0, crossover])))
@@ -262,9 +264,9 @@ def passed(evidence: Evidence) -> Numbers:
 
 
 def unit_circle(evidence: Evidence) -> Numbers:
-    """Return how far the discrete filter's zeros are from the unit circle, and the gain of undamped zeros.
+    """Return how far the zeros of the discrete filter are from the unit circle, and the benefit of undamped zeros.
 
-    ``ideal`` has undamped zeros, which reduce the first peak by ``gained`` (dB) more than ``ours``.
+    The distances are ``ours`` and, undamped, ``ideal``. Undamped zeros reduce the first peak by ``gained`` (dB) more.
     """
     ours = design("baseline").notch[0]
     ideal = replace(ours, zero_damping=0.0)
@@ -314,7 +316,7 @@ def with_notch(evidence: Evidence) -> Numbers:
 
 
 def margins(evidence: Evidence, corner: Corner, *, notched: bool) -> np.ndarray:
-    """Return frequency (rad/s) and phase margin (rad), (n, 2), at the crossovers of the elevator loop.
+    """Return frequency (rad/s) and phase margin (rad) at the n crossovers of the elevator loop, shape (n, 2).
 
     The first row, the slowest, is that of the rigid body. Margins of an unstable loop are negative. ``corner`` holds
     relative changes of the vehicle's parameters.
@@ -330,9 +332,9 @@ def margins(evidence: Evidence, corner: Corner, *, notched: bool) -> np.ndarray:
 
 
 def phase_margin(evidence: Evidence) -> Numbers:
-    """Return the gains (rad) in phase margin by the notch filter, with the loop broken at the elevator.
+    """Return by how much (rad) the notch filter raises phase margins, with the loop broken at the elevator.
 
-    ``gained``: of the smallest margin, by vehicle. ``rigid``: of the rigid body's margin, nominal vehicle.
+    ``gained``: the rise of the smallest margin, by vehicle. ``rigid``: that of the rigid body's, nominal vehicle.
     """
     pairs = [
         [margins(evidence, corner, notched=notched)[:, 1] for notched in (False, True)] for corner in evidence.over
@@ -352,7 +354,7 @@ def less_uncertainty(evidence: Evidence) -> Numbers:
 
 
 def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.ndarray]:
-    """Return the largest magnitude (flights), SI, of each channel of W in the flights of ``scenario``.
+    """Return, by channel of W, its largest magnitude (SI) in each flight of ``scenario``, shape (flights,).
 
     The channels are measured as in the design of W.
 
@@ -406,10 +408,10 @@ def stabilises(evidence: Evidence) -> Numbers:
 
 @cache
 def sets(evidence: Evidence) -> Numbers:
-    """Return half-widths (7 states) of sets relative to those of Z, the set under F' for the disturbances W.
+    """Return half-widths of sets, by state, relative to those of Z, the invariant set under F' for the disturbances W.
 
-    ``flown``: Z' as flown. ``measured``: the set under F' for W'; ``halved``: for W / 2. ``flown_scaled``: Z' as flown,
-    relative to tau Z.
+    ``measured``: the set under F' for W'; ``halved``: for W / 2. ``flown``: Z' of the shipped design, ``mean`` over its
+    states. ``flown_scaled``: the same Z', relative to tau Z.
     """
     flown, inputs, ones = design("adjustable"), inputs_of("adjustable"), np.ones(N_RIGID)
     complete, incomplete = (
@@ -438,7 +440,7 @@ def relaxed(evidence: Evidence) -> Numbers:
 
 
 def adjustable_step(evidence: Evidence) -> Numbers:
-    """Return tau, and the settling time of velocity in Case 1 with the adjustable design over the baseline's."""
+    """Return tau, and the settling time of velocity in Case 1 with the adjustable design, divided by the baseline's."""
     values = {**read_parameters(find_design("adjustable")), **load_scenario("case1").parameters()}
     tables = fly_over(Point(values, [{}])), evidence.corners("case1")
     adjustable, baseline = (float(table["velocity_settling_time"][0]) for table in tables)

@@ -87,7 +87,7 @@ class Finding:
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict: the claim holds in all readings, only in the leading ones, or not in these."""
+        """The verdict: the claim holds in all readings, in all leading ones only, or not even in all of these."""
         kept = [reading.holds for reading in self.readings]
         if not all(kept[: self.leading]):
             return Verdict.FAILS
@@ -173,7 +173,7 @@ class _Measured:
         ]
 
     def named(self, limit: float | str) -> float:
-        """Return the value of a limit, which is given as a number or as the name of a number or threshold."""
+        """Return the value of a limit, given as a number, or as the name of a threshold or of one of ``numbers``."""
         if isinstance(limit, str):
             return float(self.numbers[limit] if limit in self.numbers else THRESHOLDS[limit])
         return limit
@@ -181,8 +181,8 @@ class _Measured:
     def value(self, row: Row, vehicle: Vehicle) -> float:
         """Return the number (SI) that a row measures for a kind of vehicle: uncertain, nominal or worst.
 
-        The worst value over all vehicles is the smallest if the row has a lower threshold, else the largest, and then
-        infinite if a vehicle is lost. A row with ``beyond`` counts the vehicles whose value exceeds this limit instead.
+        The worst value over all vehicles is the smallest if the row has a lower threshold, else the largest, which is
+        infinite if a vehicle has no value. A row with ``beyond`` counts the vehicles whose value is larger or missing.
         """
         if vehicle == "uncertain":
             return float(self._of_flights(row, self.evidence.uncertain))
