@@ -72,7 +72,7 @@ class SampledLoop:
 
     @property
     def poles(self) -> np.ndarray:
-        """The poles (n) of the closed loop, converted to continuous time, rad/s, complex."""
+        """The n poles of the closed loop, complex, converted to continuous time (rad/s)."""
         closed = np.linalg.eigvals(self.A + self.B @ self.gain).astype(complex)
         return np.asarray(np.log(closed) / self.period)
 
@@ -82,7 +82,7 @@ class SampledLoop:
         return float(self.poles.real.max())
 
     def command_noise(self, noise: np.ndarray) -> np.ndarray:
-        """Return the standard deviations (2) of the command under white measurement ``noise`` (9 deviations), SI.
+        """Return the standard deviations (SI) of the inputs under white ``noise``, given as those of nine measurements.
 
         Raises:
             numpy.linalg.LinAlgError: The loop is unstable.
@@ -97,7 +97,7 @@ class SampledLoop:
         return np.asarray(np.sqrt(np.diag(self.gain @ P @ self.gain.T + direct @ direct.T)))
 
     def elevator_loop(self, frequencies: np.ndarray) -> np.ndarray:
-        """Return the response L (f) of the loop broken at the elevator, with the fuel loop closed; -1 is critical."""
+        """Return the complex response L of the loop broken at the elevator, the fuel loop closed; -1 is critical."""
         A = self.A + np.outer(self.B[:, 1 - ELEVATOR], self.gain[1 - ELEVATOR])
         poles, modes = np.linalg.eig(A)
         residues = (self.gain[ELEVATOR] @ modes) * np.linalg.solve(modes, self.B[:, ELEVATOR])
@@ -137,7 +137,7 @@ class Feedback:
         return SampledLoop(A, B, gain, self.period)
 
     def growths(self, vehicle: VehicleParameters, over: Corners) -> np.ndarray:
-        """Return the growth (1/s) by vehicle: the largest at both ends of the step, before and after the fault."""
+        """Return the growth (1/s) by vehicle: the largest of both ends of Case 1's step, before and after its fault."""
         return np.array(
             [
                 max(
@@ -192,7 +192,7 @@ def stability_limit(growth: Callable[[float], float], along: Sequence[float], to
 
 
 def phase_margins(frequencies: np.ndarray, response: np.ndarray) -> np.ndarray:
-    """Return frequency (rad/s) and phase margin (rad), (n, 2), at every crossing of unit gain by the response L (f).
+    """Return frequency (rad/s) and phase margin (rad) where the ``response`` L crosses unit gain, shape (n, 2).
 
     The phase margin is the magnitude of the angle to -1. The logarithm of L is interpolated linearly.
     """

@@ -54,14 +54,14 @@ def elastic_modes(coupling: Coupling) -> dict[str, Mode]:
 
 
 def pitch_rate_response(coupling: Coupling, frequencies: np.ndarray) -> np.ndarray:
-    """Return the response (f) of pitch rate to elevator, 1/s, in continuous time, at ``frequencies`` (f), rad/s."""
+    """Return the complex response of pitch rate to elevator (1/s), continuous time, at ``frequencies`` (rad/s)."""
     return frequency_response(*linearised(coupling), frequencies)[:, PITCH_RATE, ELEVATOR]
 
 
 def peaks(sections: Sequence[NotchSection]) -> dict[str, Peak]:
-    """Return the peak of each mode in the pitch rate filtered by ``sections``; -inf dB if no peak remains.
+    """Return each elastic mode's peak in the response of the filtered pitch rate to the elevator; -inf dB if none.
 
-    A peak is not exactly at the mode's natural frequency, because the rest of the response adds to it.
+    The coupling is paper-like. The rest of the response moves a peak away from the mode's natural frequency.
     """
     magnitude, _ = bode(pitch_rate_response("paper_like", FREQUENCIES) * notch_response(sections, FREQUENCIES))
     # A maximum over the window would not do: at the edge it may be on the flank of the other mode.
@@ -75,6 +75,6 @@ def peaks(sections: Sequence[NotchSection]) -> dict[str, Peak]:
 
 
 def peak_falls(sections: Sequence[NotchSection]) -> dict[str, float]:
-    """Return the reduction (dB) of each mode's peak, :func:`peaks`, by ``sections``; infinite if no peak remains."""
+    """Return by how much (dB) ``sections`` reduce each mode's peak in :func:`peaks`; infinite if no peak remains."""
     remaining = peaks(sections)
     return {name: peak.magnitude - remaining[name].magnitude for name, peak in peaks(()).items()}

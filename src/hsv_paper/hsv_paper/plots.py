@@ -1,4 +1,4 @@
-"""The style of all figures: the paper's panels, units and notation."""
+"""Style and helpers of the figures of this package: settings, panel letters, ft and deg, Bode diagrams, saving."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def bode_panels() -> tuple[Figure, Axes, Axes]:
 def draw_bode(
     magnitude: Axes, phase: Axes, frequencies: np.ndarray, curves: Iterable[tuple[np.ndarray, str, dict[str, Any]]]
 ) -> None:
-    """Draw curves, each a complex response (f), a label and a style, into a magnitude and a phase panel.
+    """Draw curves, each a complex response at ``frequencies`` (rad/s), a label and a style, into two panels.
 
     The phase is shifted by whole turns until it begins within half a turn of -270 deg. This is the phase of elevator to
     pitch rate between the slow modes and the elastic ones, so that all figures show the same branch.

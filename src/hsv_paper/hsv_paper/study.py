@@ -1,4 +1,4 @@
-"""The runner of all studies, of sensitivity and of physical limits: a study makes a figure, text and tables."""
+"""The common parts of all studies, of sensitivity and physical limits: a study makes a figure, text and tables."""
 
 from __future__ import annotations
 

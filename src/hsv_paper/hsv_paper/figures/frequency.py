@@ -33,7 +33,7 @@ _WITHOUT = {"color": plots.RED, "linestyle": "--"}
 
 
 def figure_02() -> Figure:
-    """Draw the Bode diagram, elevator to pitch rate, of the polytopic and the decoupled model between the samples."""
+    """Draw the Bode diagram, elevator to pitch rate, of the polytopic and decoupled models between the samples."""
     flown, frequencies = design("baseline"), np.logspace(-2.0, 2.0, 600)
     exact = zero_order_hold(*linearise(load_vehicle().decoupled, *BETWEEN), flown.period)
     polytopic = flown.polytope.at(*BETWEEN)
@@ -70,7 +70,7 @@ def figure_03() -> Figure:
 
 
 def figure_04() -> Figure:
-    """Draw all poles of the coupled model for both sets of coupling, with an enlargement near the origin."""
+    """Draw all poles of the coupled model, for paper-like and derived coupling, also enlarged near the origin."""
     figure = plots.new_figure(4.2)
     whole, near = figure.subplots(1, 2, width_ratios=(1.5, 1))
     for name, color, marker, offset, side in (
@@ -103,7 +103,7 @@ def figure_04() -> Figure:
 
 
 def figure_05() -> Figure:
-    """Draw the Bode diagram, elevator to pitch rate, near both modes, with and without the design's notch filter."""
+    """Draw the Bode diagram, elevator to pitch rate, near the elastic modes, with and without the notch filter."""
     section, frequencies = design("baseline").notch, np.logspace(0.7, 1.7, 3000)
     plain, filter_ = pitch_rate_response("paper_like", frequencies), notch_response(section, frequencies)
     figure, magnitude, phase = plots.bode_panels()
@@ -125,7 +125,7 @@ def figure_05() -> Figure:
 
 
 def figure_08() -> Figure:
-    """Draw the Bode diagram, elevator to filtered pitch rate, of the co-designed model and of the ECM.
+    """Draw the Bode diagram, elevator to filtered pitch rate, of the co-designed model and of the ECM (eq. 40).
 
     The ECM is drawn with its coupling and without.
     """

@@ -38,14 +38,14 @@ PLANES = (
 
 
 def errors_at(flight: FlightData, instants: Sequence[float]) -> np.ndarray:
-    """Return the errors e = x - x_r - x_n (n, 5) of the rigid-body states at ``instants`` (n), s after the fault."""
+    """Return the errors e = x - x_r - x_n of the rigid body, shape (n, 5), at n ``instants`` (s) after the fault."""
     assert flight.fault_start is not None
     steps = np.abs(flight.time[:, None] - flight.fault_start - np.asarray(instants)).argmin(axis=0)
     return (flight.history.state - flight.reference - flight.history.deviation)[steps, :N_RIGID]
 
 
 def figure_06() -> Figure:
-    """Draw three projections of the invariant set with the errors of both flights, whole and enlarged."""
+    """Draw three projections of the invariant set, whole and enlarged, and the errors with and without notch filter."""
     tube = tube_of("baseline")
     shown = (("Tube-MPC without notch", GREEN, "s", WITHOUT), ("Tube-MPC with notch", BLUE, "o", WITH))
     figure = new_figure(5.0)

@@ -33,7 +33,7 @@ BASELINE = ("case2_uncertain_baseline", "case2_baseline")
 
 
 class Panel(NamedTuple):
-    """A quantity over time: axis label in the paper's unit, SI unit, and the array and column of a flight.
+    """A quantity over time: axis label in the paper's unit, SI unit, and the array and column of a flight's history.
 
     ``shown`` is the range of the axis in the paper's unit; None fits the axis to the curves.
     """
@@ -46,7 +46,7 @@ class Panel(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """A controller: its scenario with uncertain parameters, then, if it is shown, the one with nominal parameters."""
+    """A controller and its scenarios: one, or first with uncertain and then with nominal parameters."""
 
     label: str
     color: str
@@ -87,7 +87,7 @@ def histories(
     reference: bool = False,
     apart: bool = False,
 ) -> Figure:
-    """Return a figure with one row per panel, over the whole flight and enlarged; all samples are drawn.
+    """Return a figure with one row per panel: the whole flight and, next to it, ``zoom``. All samples are drawn.
 
     Args:
         curves: Controllers to show, the last one on top.

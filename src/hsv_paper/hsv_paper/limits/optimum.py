@@ -34,7 +34,7 @@ _SIZE = N_STATES + N_INPUTS + 1
 
 @dataclass(frozen=True)
 class Point:
-    """The scalar s, states (N + 1, 9) and inputs (N, 2): a first guess, an iterate or an optimum.
+    """A first guess, an iterate or an optimum: the scalar s, the states (N + 1, 9) and the inputs (N, 2).
 
     multipliers: (N, 9) scaled sensitivities of the cost to the equations of the states, the costates.
     """
@@ -45,7 +45,7 @@ class Point:
     multipliers: np.ndarray
 
     def finer(self, factor: int) -> Point:
-        """Return the point with each period divided into ``factor``: states are interpolated, inputs repeated."""
+        """Return the point with each period divided into ``factor``: states are interpolated, the rest repeated."""
         n = len(self.input)
         fine = np.arange(n * factor + 1) / factor
         state = np.stack([np.interp(fine, np.arange(n + 1), column) for column in self.state.T], axis=1)
@@ -54,11 +54,11 @@ class Point:
 
 @dataclass(frozen=True)
 class Problem:
-    """A problem: the least scalar s, over s, the states at the ends of N periods, and the inputs held over the periods.
+    """The problem of the least scalar s. Unknowns: s, the states at the ends of N periods, the inputs held over each.
 
     Args:
-        period, period_slope: (N) each; the length (s) of a period is period + s period_slope.
-        substeps: (N) Runge-Kutta steps of each period.
+        period, period_slope: shape (N,) each; the length of a period in seconds is period + s period_slope.
+        substeps: Number of Runge-Kutta steps of each period, shape (N,).
         inputs, inputs_slope: (2, N, 2) lower and upper bounds of the inputs, inputs + s inputs_slope; if equal, fixed.
         states: (2, N + 1, 9) lower and upper bounds of the states; if equal, as at the beginning, fixed.
         at_rest: Whether the last state must be an equilibrium with the last input.
@@ -78,15 +78,15 @@ class Problem:
     cost: float = 1.0
 
     def periods(self, scalar: float) -> np.ndarray:
-        """Return the lengths (N), s, of the periods for a value of the scalar."""
+        """Return the lengths in seconds of the N periods for a value of the scalar."""
         return np.asarray(self.period + scalar * self.period_slope)
 
     def times(self, scalar: float) -> np.ndarray:
-        """Return the times (N + 1), s, of the states for a value of the scalar."""
+        """Return the times in seconds of the N + 1 states for a value of the scalar."""
         return np.concatenate(([0.0], np.cumsum(self.periods(scalar))))
 
     def defects(self, point: Point) -> np.ndarray:
-        """Return the scaled defects of the dynamics (9 N), followed, if ``at_rest``, by the state's final rates (9)."""
+        """Return the 9 N scaled defects of the dynamics, followed, if ``at_rest``, by the 9 scaled final rates."""
         end, _ = self.transitions(point)
         missing = [(end - point.state[1:]) / STATE_SCALE]
         if self.at_rest:
@@ -107,10 +107,11 @@ class Problem:
     def solve(self, first: Point, tolerance: float = 1e-6) -> Point:
         """Return the local optimum that the iteration reaches from ``first``.
 
-        It has converged when no step promises to reduce the merit by more than ``tolerance``.
+        It has converged when two successive steps promise to reduce the merit by less than ``tolerance``, and the
+        defects are below :data:`DEFECT`.
 
         Raises:
-            DesignError: The iteration does not converge.
+            DesignError: The iteration does not converge, or the solver fails.
         """
         # The merit has no penalty on bounds, because all steps keep to them. The first point must keep to them, too.
         inputs = np.clip(first.input, *(self.inputs + first.scalar * self.inputs_slope))
@@ -155,9 +156,9 @@ def curvatures(
     vehicle: VehicleParameters,
     weights: np.ndarray,
 ) -> np.ndarray:
-    """Return the second derivatives (N, 12, 12) of the states after N periods, summed with ``weights`` (N, 9).
+    """Return the second derivatives (N, 12, 12) of the N periods' final states, summed with ``weights`` (N, 9).
 
-    They are by state, input and period length, as differences of complex steps. Those by elastic states are zero.
+    They are by state, input and period length, as differences of complex steps; those by elastic states stay zero.
     """
     reach = {0: 1.0, 1: 1.0, 2: 1e-4, 3: 1e-4, 4: 1e-4, 9: 1e-3, 10: 1e-3, 11: 1e-5}
     curved = list(reach)
@@ -245,7 +246,7 @@ class _Local:
     def step(self, weight: float, missed: np.ndarray | None = None) -> tuple[Point, float]:
         """Return the next point for a proximal ``weight``, and the predicted decrease of the merit.
 
-        ``missed``: the defects at the last step with the same weight; given, the step is corrected for them.
+        ``missed``: None, or the defects after the last step with this weight, for which the step is then corrected.
 
         Raises:
             DesignError: The solver fails.

@@ -83,16 +83,16 @@ def straight(problem: Problem, time: float) -> Point:
 
 
 def recovery(vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizon: float, divide: int = 1) -> Problem:
-    """Return the problem of the least effectiveness s from which the vehicle reaches a trim in the envelope.
+    """Return the problem of the least effectiveness s with which the vehicle reaches a trim in the envelope.
 
-    The inputs of the problem are those that act on the vehicle. They are held for one period at first, for two from 1.5
-    s on, and for five from 3 s on.
+    The inputs of the problem are those that act on the vehicle. Each is held for one control period at first, for two
+    from 1.5 s on, and for five from 3 s on.
 
     Args:
         envelope: The vehicle whose envelope of commands must contain the final trim.
         delay: Time (s) for which the trim's command is kept.
         horizon: Time from the fault to the final trim (s).
-        divide: Number of parts into which each period is divided, for a finer mesh.
+        divide: Number of parts into which these intervals are divided, for a finer mesh.
     """
     before = trim(vehicle, *TARGET)
     held: list[int] = []

@@ -54,7 +54,7 @@ class Optimum:
 
 
 def fastest_transfer(vehicle: VehicleParameters, periods: int, *, settling: bool) -> Optimum:
-    """Return the fastest transfer, with inputs held over ``periods`` equal intervals until it ends."""
+    """Return the fastest transfer, with inputs held over ``periods`` equal intervals until it ends or settles."""
     first, half, whole = (problems.transfer(vehicle, n, settling=settling) for n in (COARSE, periods // 2, periods))
     coarse = first.solve(problems.straight(first, GUESS), 10.0 * TOLERANCE)
     coarser = half.solve(coarse.finer(periods // 2 // COARSE), TOLERANCE)
@@ -83,9 +83,9 @@ def fault_row(fault: Optimum, delay: float) -> dict[str, Any]:
 def corner_limits(
     vehicle: VehicleParameters, envelope: Vehicle, over: Sequence[Corner], delays: tuple[float, ...]
 ) -> np.ndarray:
-    """Return least values of effectiveness (vehicles, 2 + delays).
+    """Return the least effectiveness for which each column holds, shape (vehicles, 2 + delays).
 
-    Columns: a trim at the target exists, a trim in the envelope exists, the nose can be turned after each delay.
+    Columns: a trim at the target exists, a trim in the envelope exists, the nose can be turned down after each delay.
     """
     points = problems.envelope_points(envelope)
     rows = []
@@ -97,7 +97,7 @@ def corner_limits(
 
 
 def run(scope: Scope) -> Outcome:
-    """Solve both problems and compare; a coarse study has half as many periods and fewer corners."""
+    """Find the fastest transfers and the deepest faults; a coarse study has half as many periods and fewer corners."""
     whole = scope.coarseness <= 1.0
     envelope = load_vehicle()
     vehicle = envelope.coupled("paper_like")
@@ -151,9 +151,9 @@ def run(scope: Scope) -> Outcome:
 
 
 def settling_times(flight: Flight) -> np.ndarray:
-    """Return the times (2), s, from which altitude and velocity stay within 2 % of their change until the fault.
+    """Return the times (s) from which altitude and velocity, in this order, stay at the target until the fault.
 
-    The change is from the first state to the last reference, be it a step or a ramp. Infinite: not settled by then.
+    The target is the last reference, within 2 % of its distance from the first state. Infinite: not settled by then.
     """
     before = flight.time < (np.inf if flight.fault_start is None else flight.fault_start - 1e-9)
     target = flight.reference[-1, :2]

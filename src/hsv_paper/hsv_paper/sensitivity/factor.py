@@ -1,4 +1,4 @@
-"""Benefit and cost of the adjustable factor tau: designs of section 4 and their flights for several values of tau."""
+"""Benefit and cost of the adjustable factor tau: the paper's adjustable design and its flights, for several tau."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def is_certified(gains: ControlDesign, inputs: DesignInputs, tau: float) -> bool
 
 
 def _rows(gains: ControlDesign, inputs: DesignInputs, scope: Scope) -> list[dict[str, float]]:
-    """Return a table row for each tau, in the units of the page. The first tau is 1, to which others are relative."""
+    """Return a table row for each tau, in the units of the page. Relative columns refer to the first row, tau = 1."""
     one = _with(gains, 1.0)
     complete = measured_set(one, Region(one, inputs, 1.0), inputs, lambda *_: None)
     target, factors = inputs.nominal.target, FACTORS[:: scope.every]

@@ -54,7 +54,7 @@ INTEGRATION_STEP = 0.01
 
 
 def coupling(scope: Scope) -> Outcome:
-    """Fly and linearise every controller for couplings kappa from 0, the decoupled model, upwards."""
+    """Fly every controller and compute its linear loop, for couplings kappa from 0, the decoupled model, upwards."""
     kappas = scope.grid(COUPLING_SCALES[0], COUPLING_SCALES[-1], 0.05)
 
     def point(controller: Controller, kappa: float) -> Point:
@@ -91,7 +91,7 @@ def coupling(scope: Scope) -> Outcome:
 
 
 def sampling(scope: Scope) -> Outcome:
-    """Design the baseline at each sampling period, linearise it over the coupling, and fly Case 1."""
+    """Design the baseline at each sampling period, compute its linear loop over the coupling, and fly Case 1."""
     kappas = scope.grid(COUPLING_SCALES[0], COUPLING_SCALES[-1], 0.05)
     designs = {period: _design_at(period, scope) for period in PERIODS}
 
@@ -247,7 +247,7 @@ def mark_couplings(axes: Sequence[Axes], growths: Sequence[Axes]) -> None:
 
 
 def coupling_limits(loop: Feedback, over: Corners) -> dict[str, str]:
-    """Return table cells with the largest kappa of a stable linear loop: nominal vehicle, and worst of ``over``."""
+    """Return table cells with the kappa up to which the linear loop is stable: nominal vehicle, worst of ``over``."""
     limits = {"nominal": loop.critical_coupling(), "worst": loop.critical_coupling(over)}
     beyond = f"≥ {COUPLING_SCALES[-1]:g}"
     return {f"stable up to κ, {which}": beyond if k is None else f"{k:.2f}" for which, k in limits.items()}

@@ -55,7 +55,7 @@ def elevator(bandwidth: float, delay: float = 0.0) -> Hardware:
 
 
 def growth(case: Controller, hardware: Hardware, over: Corners = NOMINAL) -> float:
-    """Return the largest growth (1/s) of a case: of both ends of the step, both effectivenesses, all vehicles."""
+    """Return the largest growth (1/s) of all vehicles, at both ends of Case 1's step, before and after the fault."""
     return replace(case.loop, hardware=hardware).growth(case.vehicle, over)
 
 
@@ -65,9 +65,9 @@ def tolerated_delay(case: Controller, hardware: Hardware, over: Corners = NOMINA
 
 
 def rms(case: Controller, hardware: Hardware, sensors: str) -> float:
-    """Return the rms elevator command (rad) due to the noise of a set of sensors, at the worse end of the step.
+    """Return the rms elevator command (rad) due to the noise of a set of sensors, at the worse end of Case 1's step.
 
-    It is NaN if the loop is unstable.
+    It is NaN if the loop is unstable at either end.
     """
     channels = SENSOR_SETS[sensors].channels
     noise = np.array([channels.get(name, {}).get("noise", 0.0) for name in STATE_NAMES])
@@ -95,7 +95,7 @@ def stability(case: Controller, over: Corners) -> dict[str, Any]:
 
 
 def tolerances(case: Controller, over: Corners) -> dict[str, Any]:
-    """Return table cells with the delays that a loop tolerates, and its response to sensor noise with 50 rad/s."""
+    """Return table cells: tolerated delays, and the response to sensor noise with an elevator of 50 rad/s."""
     cells: dict[str, Any] = {"case": case.label}
     for name in ("ideal", "50 rad/s"):
         for which, vehicles in (("nominal", NOMINAL), ("worst", over)):

@@ -1,4 +1,4 @@
-"""The permitted frequencies of the notch filter, and its required depth."""
+"""The centre frequencies at which the notch filter stabilises the loop, and the depth that it needs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SETS = (
 
 
 def run(scope: Scope) -> Outcome:
-    """Compute the linear loop over centre and depth of the notch and fly over the centre, for both couplings."""
+    """Compute the linear loop over centre and depth of the notch, and flights over its centre, for both couplings."""
     own = design("baseline").notch[0]
     centres = scope.grid(8.0, 26.0, 0.5)
     depths = np.geomspace(0.005, own.pole_damping, scope.count(17, 3))
@@ -90,10 +90,10 @@ def run(scope: Scope) -> Outcome:
 
 
 def stable_range(coupled: Controller, over: Corners, centres: np.ndarray, depths: np.ndarray) -> dict[str, str]:
-    """Return table cells with the range in which the loops around all vehicles ``over`` are stable.
+    """Return table cells: ranges of centre and zero damping in which the loops of all vehicles ``over`` are stable.
 
-    While the centre (rad/s) varies, the damping of the zeros is the baseline's, and vice versa. The limits are
-    bracketed in ``centres`` and ``depths``.
+    The centre (rad/s) varies at the baseline's zero damping, and the zero damping, upwards, at the baseline's centre.
+    The limits are bracketed in ``centres`` and ``depths``, values of the zero damping.
     """
     own = design("baseline").notch[0]
     around = np.union1d(centres, own.zero_frequency)
@@ -122,7 +122,7 @@ def stable_range(coupled: Controller, over: Corners, centres: np.ndarray, depths
 
 
 def _growths(coupled: Controller, centre: float, zero_damping: float, over: Corners) -> np.ndarray:
-    """Return the growths (1/s), by vehicle, with the baseline's notch moved to a ``centre`` (rad/s)."""
+    """Return the growths (1/s) by vehicle with the baseline's notch at another ``centre`` (rad/s) and zero damping."""
     section = NotchSection(centre, zero_damping, centre, design("baseline").notch[0].pole_damping)
     return replace(coupled.loop, notch=(section,)).growths(coupled.vehicle, over)
 

@@ -36,7 +36,7 @@ LOSSES = "(a) Share of the flights that are not lost (solid), and of those that 
 
 @dataclass(frozen=True)
 class Controller:
-    """A scenario with changed parameters, and its label and colour in the plots."""
+    """A scenario with a design and changed parameters, and its label and colour in the plots."""
 
     label: str
     scenario: str
@@ -88,7 +88,7 @@ def sweep(
     values: Sequence[float],
     point: Callable[[Controller, float], Point],
 ) -> dict[Controller, Columns]:
-    """Fly every controller at all values and return its columns; ``point`` gives the flights of a value."""
+    """Fly every controller at all ``values`` and return the columns of each; ``point`` gives the flights at a value."""
     results = {}
     for controller in controllers:
         tables = []
@@ -102,7 +102,7 @@ def sweep(
 def columns_of(tables: Sequence[Table]) -> Columns:
     """Return the columns (SI) of one controller from the tables of its flights, one table per point.
 
-    A metric that a lost flight does not define is NaN, for the nominal vehicle and for the worst.
+    The metrics of a lost flight are NaN, and if any flight of a point is lost, the worst metrics are, too.
     """
     rows = []
     for table in tables:
@@ -117,7 +117,7 @@ def columns_of(tables: Sequence[Table]) -> Columns:
 
 
 def widths(count: int) -> np.ndarray:
-    """Return line widths for curves drawn in this order. Later ones are thinner, so that no curve hides another."""
+    """Return line widths for curves in drawing order. Later ones are thinner, so that no curve hides another."""
     return 0.8 + 0.3 * np.arange(count)[::-1]
 
 
@@ -131,7 +131,7 @@ def draw_metric(axis: Axes, x: np.ndarray, results: Mapping[Controller, Columns]
 
 
 def draw_losses(figure: Figure, x: np.ndarray, results: Mapping[Controller, Columns], label: str) -> np.ndarray:
-    """Draw and return three panels over ``x``: flights not lost or saturated, attitude excursion, altitude error.
+    """Draw and return three panels over ``x``: losses and saturation, attitude excursion, altitude error at the end.
 
     Args:
         x: Values along the sweep.
@@ -163,7 +163,7 @@ def legend(figure: Figure, *, shares: bool) -> None:
 
 
 def lost_where(x: np.ndarray, columns: Columns, digits: int = 2, *, rising: bool = True) -> dict[str, str]:
-    """Return table cells with the values between which flights begin to saturate and to be lost.
+    """Return table cells with the values between which saturation, losses and the loss of the nominal vehicle begin.
 
     Args:
         x: Values along the sweep, increasing.

@@ -34,7 +34,7 @@ ATTITUDE = "post_fault_attitude_from_nominal_worst"
 
 @dataclass(frozen=True)
 class Group:
-    """Design inputs that are varied together: fields ``names`` of the table ``table``, with a label and a colour."""
+    """Design inputs that are varied together: the fields ``names`` of ``table``, with a label and a colour."""
 
     label: str
     color: str
@@ -98,7 +98,7 @@ def varied(law: str, group: Group, factor: float) -> ControlDesign:
 
 
 def run(scope: Scope) -> Outcome:
-    """Redesign F and K for each group and factor, and compute the linear loops and the flights of Case 1."""
+    """Vary weights of F and K and bounds of K by group; compute linear loops (F) and, for :data:`FLOWN`, flights."""
 
     def flown(law: str, flown: Controller) -> Results:
         fixed = load_scenario(flown.scenario).parameters()
