@@ -1,4 +1,4 @@
-"""The inputs of an offline design, checked before it is computed: a TOML file with units, or an SI table."""
+"""The inputs of an offline design, checked before use: a TOML file with units, or a certificate's table in SI."""
 
 from __future__ import annotations
 

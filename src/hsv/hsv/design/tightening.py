@@ -81,7 +81,7 @@ def plan_bounds(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray
 
     Args:
         bounds: The tightened bounds.
-        lowest: Smallest u_n + u_r of either input and smallest nominal pitch acceleration in the certified plans, SI.
+        lowest: Smallest u_n + u_r by input, then smallest nominal pitch acceleration, of the certified plans, SI.
         highest: Their largest values.
     """
     shift = _KEPT_OFF * (highest - lowest)
