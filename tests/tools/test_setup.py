@@ -137,7 +137,7 @@ def test_what_the_user_has_set_stays(name):
     mine = shell(name, script, HOME="/tmp", ROS_AUTOMATIC_DISCOVERY_RANGE="SUBNET", HSV_DESIGN_PATH="/mine")
     assert mine.stdout == "SUBNET /mine none\n"
     # Without a home directory, nodes write their logs to a folder of the checkout.
-    assert shell(name, f"source '{ROOT}/env.sh'; echo $ROS_LOG_DIR").stdout == f"{ROOT}/ros_ws/log/nodes\n"
+    assert shell(name, f"source '{ROOT}/env.sh'; echo $ROS_LOG_DIR", HOME="").stdout == f"{ROOT}/ros_ws/log/nodes\n"
 
 
 @is_set_up
