@@ -53,10 +53,7 @@ setup(
             "pages/plotly/*",
         ]
     },
-    data_files=[
-        ("share/ament_index/resource_index/packages", ["resource/hsv"]),
-        ("share/hsv", ["package.xml"]),
-    ],
+    data_files=[("share/ament_index/resource_index/packages", ["resource/hsv"]), ("share/hsv", ["package.xml"])],
     cffi_modules=["hsv/core/build.py:ffibuilder"],
     # The extension uses Python's stable interface, so one wheel serves all versions from this one on.
     options={"bdist_wheel": {"py_limited_api": "cp311"}},

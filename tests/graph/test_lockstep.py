@@ -43,14 +43,6 @@ def short_case2(folder):
     return path
 
 
-def flown(processes, scenario, name, *words):
-    # On a busy machine a node may be silent for longer than the default time limit.
-    command = ("hsv", "run", scenario, "--no-report", "--step-timeout", "30", "--bag", processes.folder / name)
-    done = processes.run(*command, *words)
-    assert done.returncode == 0, done.stdout
-    return Bag(processes.folder / name)
-
-
 def in_process(scenario):
     return fly(assemble_flight(load_scenario(str(scenario))))
 
@@ -58,7 +50,7 @@ def in_process(scenario):
 @pytest.fixture(scope="module")
 def case1(shared_processes):
     """Return the bag of Case 1, shortened to 5 s."""
-    return flown(shared_processes, short_scenario(shared_processes.folder), "case1")
+    return shared_processes.fly(short_scenario(shared_processes.folder), "case1")
 
 
 def test_graph_equals_in_process_bit_for_bit(case1, tmp_path):
@@ -108,14 +100,14 @@ def test_composed_and_started_paused_equals_separate_processes_in_every_byte(sha
 )
 def test_laws_and_hardware_fly_as_in_process(processes, make, words):
     scenario = make(processes.folder)
-    bag = flown(processes, scenario, "flown", *words)
+    bag = processes.fly(scenario, "flown", *words)
     assert flight_fingerprint(bag) == in_process(scenario).fingerprint
 
 
 @pytest.mark.long
 def test_an_estimated_flight_is_that_of_the_library_and_tells_its_equipment(processes):
     scenario = scenario_file(processes.folder, "everything estimated")
-    bag = flown(processes, scenario, "flown")
+    bag = processes.fly(scenario, "flown")
     flight = in_process(scenario)
     assert flight_fingerprint(bag) == flight.fingerprint
     assert [run.seed for _, run in bag.decode("/hsv/run")] == [SHORT["seed"]]
@@ -134,7 +126,7 @@ def test_the_node_that_estimates_the_elevator_says_what_it_found(processes):
     # Longer than 10 s, the shortest flight that hsv replay accepts.
     scenario = shortened(processes.folder, "case1", 11, 3, effectiveness=0.5)
     scenario.write_text(f"{scenario.read_text()}\n[effectiveness]\nenabled = true\n")
-    bag = flown(processes, scenario, "flown")
+    bag = processes.fly(scenario, "flown")
     assert flight_fingerprint(bag) == in_process(scenario).fingerprint
     assert processes.run("hsv", "replay", bag.folder).returncode == 0
     said = [
@@ -151,7 +143,7 @@ def test_the_node_that_estimates_the_elevator_says_what_it_found(processes):
 @pytest.mark.long
 def test_qp_flies_as_in_process_and_leaving_the_tube_is_told(processes):
     scenario = shortened(processes.folder, "case1_qp", 4, 2, effectiveness=0.6)
-    bag = flown(processes, scenario, "left", "--composed")
+    bag = processes.fly(scenario, "left", "--composed")
     assert flight_fingerprint(bag) == in_process(scenario).fingerprint
     status = bag.columns("/hsv/tube_status")
     outside = status["status"] == TubeStatusCode.OUTSIDE
@@ -187,7 +179,7 @@ def test_the_bag_takes_a_vehicle_in_a_file_along(processes):
     mine, scenario = processes.folder / "mine.toml", processes.folder / "flight.toml"
     mine.write_text('extends = "parker"\n[rigid_body]\nmass = { value = "4600 kg" }\n')
     scenario.write_text('extends = "case1"\nvehicle = "mine.toml"\nduration = "12 s"\nfault = []\n[limits]\n')
-    bag = flown(processes, scenario, "bag", "--composed")
+    bag = processes.fly(scenario, "bag", "--composed")
     alone = in_process(scenario).fingerprint
     mine.unlink()
     scenario.unlink()

@@ -60,14 +60,6 @@ def scenario(folder, example, more="", duration=11.0):
     return path
 
 
-def flown(processes, path, name, *words):
-    # On a busy machine a node may be silent for longer than the default time limit.
-    command = ("hsv", "run", path, "--no-report", "--step-timeout", "30", "--bag", processes.folder / name)
-    done = processes.run(*command, *words)
-    assert done.returncode == 0, done.stdout
-    return Bag(processes.folder / name)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("place", ["hsv_lqr:Lqr", "lqr_in_c:LqrInC"])
 def test_a_class_and_a_function_in_c_fly_as_in_process(processes, place):
@@ -76,7 +68,7 @@ def test_a_class_and_a_function_in_c_fly_as_in_process(processes, place):
     assert simulated.returncode == 0, simulated.stdout
     [fingerprint] = [word for word in simulated.stdout.split() if word.startswith("v1:")]
     for words in ((), ("--composed",)):
-        bag = flown(processes, path, f"flown{''.join(words)}", *words)
+        bag = processes.fly(path, f"flown{''.join(words)}", *words)
         assert f"{flight_fingerprint(bag)}" == fingerprint
         assert "tube" not in " ".join(bag.topics) and bag.custom_data["controller"] == place
     for words in (("--rerun",), ("--over-dds", "--node", "controller")):
@@ -87,7 +79,7 @@ def test_a_class_and_a_function_in_c_fly_as_in_process(processes, place):
 @pytest.mark.long
 def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes):
     path = scenario(processes.folder, "node")
-    bags = [flown(processes, path, "started")]
+    bags = [processes.fly(path, "started")]
     # The controller is started late; all other nodes wait for it.
     run = processes.start(
         *("hsv", "run", path, "--external", "--composed", "--no-report", "--step-timeout", "30"),
@@ -97,7 +89,7 @@ def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes):
     regulator = processes.start("ros2", "run", "hsv_example_node", "regulator", "--ros-args", "-r", "__node:=any_name")
     said = output_of(run)
     assert run.returncode == 0, said
-    bags += [Bag(processes.folder / "late"), flown(processes, path, "next", "--external")]
+    bags += [Bag(processes.folder / "late"), processes.fly(path, "next", "--external")]
     assert regulator.poll() is None
     assert len({flight_fingerprint(bag) for bag in bags}) == 1
     for words in ((), ("--rerun",)):

@@ -53,6 +53,7 @@ class Browser:
     def open(self, page):
         """Open a page from a file and return the seconds until every plot is drawn."""
         self.console()
+        self.driver.get("about:blank")  # a page at the same address, but for its settings, would not be loaded anew
         start = time.monotonic()
         self.driver.get(page.as_uri())
         self.settle()

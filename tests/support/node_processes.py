@@ -71,6 +71,14 @@ class Processes:
         output = output_of(popen)
         return subprocess.CompletedProcess(popen.args, popen.returncode, output)
 
+    def fly(self, scenario, name, *words):
+        """Fly a scenario by ``hsv run`` and return its bag ``name``."""
+        # On a busy machine a node may be silent for longer than the default time limit.
+        command = ("hsv", "run", scenario, "--no-report", "--step-timeout", "30", "--bag", self.folder / name)
+        done = self.run(*command, *words)
+        assert done.returncode == 0, done.stdout
+        return Bag(self.folder / name)
+
     def stop(self):
         """Stop the processes that still run."""
         for number in (signal.SIGINT, signal.SIGKILL):

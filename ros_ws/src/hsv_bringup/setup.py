@@ -26,6 +26,6 @@ setup(
             "player = hsv_bringup.player:main",
             "ring = hsv_bringup.ring:main",
             "peer_emulator = hsv_bringup.peer_emulator:main",
-        ],
+        ]
     },
 )

@@ -22,6 +22,6 @@ setup(
             "nominal_trajectory = hsv_ctrl.nominal_trajectory:main",
             "robust_mpc = hsv_ctrl.tube_mpc:robust_main",
             "tube_mpc = hsv_ctrl.tube_mpc:main",
-        ],
+        ]
     },
 )

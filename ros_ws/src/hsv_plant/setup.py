@@ -16,9 +16,6 @@ setup(
     extras_require={"test": ["pytest"]},
     zip_safe=False,
     entry_points={
-        "console_scripts": [
-            "plant = hsv_plant.plant:main",
-            "fault_injector = hsv_plant.fault_injector:main",
-        ],
+        "console_scripts": ["plant = hsv_plant.plant:main", "fault_injector = hsv_plant.fault_injector:main"]
     },
 )

@@ -118,10 +118,7 @@ def test_a_lost_scheduler_is_a_failed_run_that_goes_on_later(planned, cluster, o
         if done:
             cluster.close()
 
-    with (
-        make_executor(0, cluster.scheduler_address) as workers,
-        pytest.raises(RunError, match="the scheduler is lost"),
-    ):
+    with make_executor(0, cluster.scheduler_address) as workers, pytest.raises(RunError, match="the scheduler is lost"):
         run_campaign(campaign, store, workers, progress=lose)
     with store.opened() as finished:
         assert finished

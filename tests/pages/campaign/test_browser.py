@@ -20,20 +20,7 @@ def page(results, tmp_path_factory):
     return page
 
 
-@pytest.fixture
-def opened(browser, page):
-    browser.driver.get("about:blank")
-    browser.open(page)
-    return browser
-
-
-@pytest.fixture
-def show(browser, page):
-    return lambda: browser.open(page)
-
-
-class TestPage(PageChecks):
-    """The checks of all pages."""
+TestPage = PageChecks
 
 
 def ends(browser, name, axis):

@@ -119,8 +119,7 @@ def show(browser, endless):
     return lambda: look(browser, *endless)
 
 
-class TestPage(PageChecks):
-    """The checks of all pages."""
+TestPage = PageChecks
 
 
 def test_on_a_phone_controls_are_below_the_flight_and_inject_is_apart_from_pause(browser, endless, screen):

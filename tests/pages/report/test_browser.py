@@ -27,19 +27,7 @@ def page(flights, tmp_path_factory):
     return page
 
 
-@pytest.fixture
-def opened(browser, page):
-    browser.open(page)
-    return browser
-
-
-@pytest.fixture
-def show(browser, page):
-    return lambda: browser.open(page)
-
-
-class TestPage(PageChecks):
-    """The checks of all pages."""
+TestPage = PageChecks
 
 
 def recorded(bag, curve):

@@ -22,13 +22,7 @@ def page(tmp_path_factory):
     return write_results(ResilienceResults.read(campaign, store), folder / "out", "hsv resilience")[0]
 
 
-@pytest.fixture
-def show(browser, page):
-    return lambda: browser.open(page)
-
-
-class TestPage(PageChecks):
-    """The checks of all pages."""
+TestPage = PageChecks
 
 
 @pytest.mark.usefixtures("screen")

@@ -54,15 +54,7 @@ UNIT_SYSTEMS = {
     UnitSystem.si: "SI",
     UnitSystem.paper: "ft, ft/s, deg, slug^0.5 ft",
 }
-HALF_WIDTHS = {
-    "h": "m",
-    "V": "m/s",
-    "alpha": "rad",
-    "theta": "rad",
-    "q": "rad/s",
-    "FZ fuel": "1",
-    "FZ elevator": "rad",
-}
+HALF_WIDTHS = {"h": "m", "V": "m/s", "alpha": "rad", "theta": "rad", "q": "rad/s", "FZ fuel": "1", "FZ elevator": "rad"}
 """Headings of a table of invariant sets, with SI units: half-widths of the rigid states and of the feedback F Z."""
 
 

@@ -102,12 +102,7 @@ def estimator_data(
     if iterations >= _MAX_ITERATIONS or not np.isfinite(gain).all():
         raise DesignError(f"estimator: no steady gain after {iterations} iterations, expected other noise")
     return Struct(
-        "hsv_estimator",
-        gain=gain,
-        start=start.state.copy(),
-        vehicle=vehicle_struct(vehicle),
-        period=period,
-        substeps=2,
+        "hsv_estimator", gain=gain, start=start.state.copy(), vehicle=vehicle_struct(vehicle), period=period, substeps=2
     )
 
 

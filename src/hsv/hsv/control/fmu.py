@@ -23,13 +23,7 @@ import numpy as np
 from hsv.base.errors import ParameterError, QuantityError, RunError
 from hsv.base.parameters import Parameter, validate
 from hsv.base.units import parse_quantity
-from hsv.control.controller import (
-    CONTROLLER_INPUTS,
-    CONTROLLER_OUTPUTS,
-    FOREIGN_FAILURES,
-    STEP_FUNCTION,
-    failure_words,
-)
+from hsv.control.controller import CONTROLLER_INPUTS, CONTROLLER_OUTPUTS, FOREIGN_FAILURES, STEP_FUNCTION, failure_words
 from hsv.control.library import CBlock, LibraryClass, LibraryController
 from hsv.model.plant import PLANT_PARAMETERS
 from hsv.model.signals import ESTIMATE, MEASUREMENT, SignalType, numbers_of

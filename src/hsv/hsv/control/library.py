@@ -338,13 +338,7 @@ class LibraryController(ExternalController):
     """A controller in a shared library or FMU, whose function a child process calls."""
 
     def __init__(
-        self,
-        name: str,
-        path: Path,
-        symbol: str,
-        state_size: int,
-        parameters: np.ndarray,
-        vehicle: VehicleParameters,
+        self, name: str, path: Path, symbol: str, state_size: int, parameters: np.ndarray, vehicle: VehicleParameters
     ) -> None:
         super().__init__(name, None, vehicle)
         self.path, self.symbol, self.parameters = path, symbol, parameters

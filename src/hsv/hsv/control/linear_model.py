@@ -14,14 +14,7 @@ from hsv.base.units import UnitSystem, in_system, unit_in
 from hsv.control.notch_filter import continuous, default_sections, series
 from hsv.model.dynamics import MODELS, jacobian
 from hsv.model.lpv.linearisation import Filter, Mode, extended_jacobian, extended_state, modes
-from hsv.model.signals import (
-    INPUT_NAMES,
-    INPUT_UNITS,
-    N_RIGID,
-    N_STATES,
-    STATE_NAMES,
-    STATE_UNITS,
-)
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_RIGID, N_STATES, STATE_NAMES, STATE_UNITS
 from hsv.model.trim import trim_at
 from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
 

@@ -207,10 +207,7 @@ def nominal_gain(
         # K = Y G^-1; with G = Q these are (33), (34) and (35). X of (35) is set to its bound without loss.
         G = slack[0] if slack else Q
         inner = G + G.T - Q
-        blocks = [
-            np.block([[np.ones((1, 1)), x[None, :]], [x[:, None], Q]]),
-            np.block([[np.eye(m), Y], [Y.T, inner]]),
-        ]
+        blocks = [np.block([[np.ones((1, 1)), x[None, :]], [x[:, None], Q]]), np.block([[np.eye(m), Y], [Y.T, inner]])]
         for A_i, B_i in zip(A, B, strict=True):
             S = A_i @ G + B_i @ Y
             rows = [

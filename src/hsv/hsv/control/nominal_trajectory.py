@@ -122,13 +122,7 @@ class NominalTrajectory:
         )
         status = chosen.status if in_envelope else chosen.status | NominalStatus.OUTSIDE_ENVELOPE
         return NominalResult(
-            reference,
-            data.input[row],
-            deviation,
-            chosen.input,
-            chosen.gain,
-            chosen.gain_index,
-            status,
+            reference, data.input[row], deviation, chosen.input, chosen.gain, chosen.gain_index, status
         )
 
 

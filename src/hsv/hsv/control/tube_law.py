@@ -30,12 +30,7 @@ from hsv.control.effectiveness import (
     effectiveness_in,
 )
 from hsv.control.nominal_law import level
-from hsv.control.notch_filter import (
-    FLOWN_NOTCH_PARAMETERS,
-    NotchSection,
-    discretise,
-    flown_sections,
-)
+from hsv.control.notch_filter import FLOWN_NOTCH_PARAMETERS, NotchSection, discretise, flown_sections
 from hsv.core import Struct, doubles, dtype, lib, records, vector
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES

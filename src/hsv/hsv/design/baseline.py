@@ -202,11 +202,7 @@ def _all_states(gain: np.ndarray) -> np.ndarray:
 
 
 def _report(
-    inputs: DesignInputs,
-    design: ControlDesign,
-    model: DesignModel,
-    feedback: FeedbackGain,
-    nominal: list[NominalGain],
+    inputs: DesignInputs, design: ControlDesign, model: DesignModel, feedback: FeedbackGain, nominal: list[NominalGain]
 ) -> dict[str, Any]:
     A, B = design.polytope.A, design.polytope.B
     return {

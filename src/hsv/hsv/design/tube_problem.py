@@ -59,13 +59,7 @@ def tube_problem(design: ControlDesign, vehicle: Vehicle, disturbance: Disturban
     gain = design.feedback_gain[:, :N_RIGID]
     systems = [
         error_system(
-            polytope.A,
-            polytope.B,
-            gain * factor,
-            model.notch,
-            model.columns,
-            design.actuator_sets,
-            design.period,
+            polytope.A, polytope.B, gain * factor, model.notch, model.columns, design.actuator_sets, design.period
         )
         for factor in bounding_factors(design)
     ]

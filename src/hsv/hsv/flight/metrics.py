@@ -81,9 +81,7 @@ METRICS = {
         Group.tracking,
     ),
     "elastic_rate_1_decay_time": Metric(
-        "s",
-        "time after the fault from which |rate| stays within 5 % of its peak",
-        Group.modes,
+        "s", "time after the fault from which |rate| stays within 5 % of its peak", Group.modes
     ),
     "elastic_rate_2_decay_time": Metric("s", "the same for the second mode", Group.modes),
     "elastic_decay_time": Metric("s", "the slower of the two", Group.modes),

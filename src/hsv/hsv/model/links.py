@@ -54,10 +54,7 @@ def _parameters(link: str) -> tuple[Parameter, ...]:
         ),
         Parameter(f"{where}.corruption", 0.0, "probability that a bit of a payload is flipped", "", 0.0, 1.0),
         Parameter(
-            f"{where}.checksum",
-            False,
-            "true: a corrupted payload is detected and lost",
-            needs=f"{where}.corruption",
+            f"{where}.checksum", False, "true: a corrupted payload is detected and lost", needs=f"{where}.corruption"
         ),
     )
 

@@ -349,7 +349,7 @@ def less_uncertainty(evidence: Evidence) -> Numbers:
     over = [corner for corner in fraction(load_vehicle().uncertainty) if corner in evidence.over]
     a, b = (largest_disturbances(scenario, over) for scenario in ("case1", "case1_no_notch"))
     return {channel: a[channel].max() / b[channel].max() for channel in ("pitch_acceleration", "acceleration")} | {
-        "pitch_nominal": a["pitch_acceleration"][0] / b["pitch_acceleration"][0],
+        "pitch_nominal": a["pitch_acceleration"][0] / b["pitch_acceleration"][0]
     }
 
 
@@ -390,12 +390,7 @@ def conforms(evidence: Evidence) -> Numbers:
         for system in (codesigned_model(inputs), extended_model(inputs, "paper_like"))
     )
     decibel, degree = bode_difference(model, ecm)
-    return {
-        "magnitude": decibel.max(),
-        "phase": degree.max(),
-        "low_magnitude": decibel[low].max(),
-        "rigid": RIGID,
-    }
+    return {"magnitude": decibel.max(), "phase": degree.max(), "low_magnitude": decibel[low].max(), "rigid": RIGID}
 
 
 def stabilises(evidence: Evidence) -> Numbers:

@@ -13,14 +13,7 @@ from hsv.model.lpv.linearisation import bode, frequency_response, linearise, zer
 from hsv.model.signals import PITCH_RATE
 from hsv.model.vehicle import load_vehicle
 from hsv_paper import plots
-from hsv_paper.designs import (
-    BETWEEN,
-    CODESIGN_FREQUENCIES,
-    codesigned_model,
-    design,
-    extended_model,
-    inputs_of,
-)
+from hsv_paper.designs import BETWEEN, CODESIGN_FREQUENCIES, codesigned_model, design, extended_model, inputs_of
 from hsv_paper.linear_loop import ELEVATOR
 from hsv_paper.modes import elastic_modes, linearised, pitch_rate_response
 

@@ -212,11 +212,7 @@ def ramp(scope: Scope) -> Outcome:
             )
             for which in ("nominal", "worst")
         }
-        return {
-            "controller": controller.label,
-            "ramp, s": rounded(lengths[index]),
-            **errors,
-        }
+        return {"controller": controller.label, "ramp, s": rounded(lengths[index]), **errors}
 
     return Outcome(
         figure,

@@ -19,10 +19,7 @@ from hsv_paper.plots import BLUE, DOTTED_GREY, RED, letter, new_figure, plain_lo
 from hsv_paper.sensitivity.sweep import Controller, sweep
 from hsv_paper.study import Outcome, Scope, in_words, rounded
 
-SETS = (
-    Controller("paper-like coupling", "case1", BLUE),
-    Controller("derived coupling", "case1_derived", RED),
-)
+SETS = (Controller("paper-like coupling", "case1", BLUE), Controller("derived coupling", "case1_derived", RED))
 """Both couplings are flown with the baseline's gains and its filter, moved to another centre or depth."""
 
 

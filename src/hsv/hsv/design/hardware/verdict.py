@@ -208,11 +208,7 @@ def _lag_of_the_plan(subject: CertifiedDesign, design: ControlDesign) -> tuple[n
 
 
 def verdict(
-    name: str,
-    design: ControlDesign,
-    subject: CertifiedDesign,
-    models: Sequence[Model] = (),
-    lag: Lag = None,
+    name: str, design: ControlDesign, subject: CertifiedDesign, models: Sequence[Model] = (), lag: Lag = None
 ) -> Verdict:
     """Return the verdict on whether ``design`` remains certified with ``models`` of hardware and air.
 

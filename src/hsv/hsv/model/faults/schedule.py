@@ -32,10 +32,7 @@ _NOT_YET = -2.0
 
 
 def fault_rows(
-    sides: Sequence[str],
-    scheduled: Sequence[tuple[Fault, int, int]],
-    period: float,
-    earlier: Struct | None = None,
+    sides: Sequence[str], scheduled: Sequence[tuple[Fault, int, int]], period: float, earlier: Struct | None = None
 ) -> Struct:
     """Return the faults of the given ``sides`` as an ``hsv_faults``, in the order in which the core applies them.
 

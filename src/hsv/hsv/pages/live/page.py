@@ -25,11 +25,7 @@ def live_page(hub: Hub, port: int) -> str:
     return render(
         "live.html.j2",
         plots=plots,
-        described={
-            "runs": [{"label": "flight", "end": 1.0, "faults": []}],
-            "airframe": geometry(),
-            "kinds": _kinds(),
-        },
+        described={"runs": [{"label": "flight", "end": 1.0, "faults": []}], "airframe": geometry(), "kinds": _kinds()},
         title=hub.status()["title"] or "Flight",
         sockets=" ".join(origin.replace("http", "ws", 1) for origin in origins(port)),
         units=UnitSystem.metric,
