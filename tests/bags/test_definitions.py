@@ -11,21 +11,15 @@ def test_text_is_root_then_dependencies_once():
     text = definition("hsv_msgs/msg/NominalState")
     root, *others = text.split(f"\n{SEPARATOR}\n")
     assert root == (MESSAGES / "NominalState.msg").read_text()
-    assert [other.splitlines()[0] for other in others] == [
-        "MSG: std_msgs/Header",
-        "MSG: hsv_msgs/LongitudinalState",
-        "MSG: hsv_msgs/InputVector",
-        "MSG: builtin_interfaces/Time",
-    ]
+    expected = ["std_msgs/Header", "hsv_msgs/LongitudinalState", "hsv_msgs/InputVector", "builtin_interfaces/Time"]
+    assert [other.splitlines()[0] for other in others] == [f"MSG: {name}" for name in expected]
     assert len(SEPARATOR) == 80
 
 
 def test_hash_is_that_of_the_type(store):
     assert type_hash("hsv_msgs/msg/TubeStatus") == store.hash_rihs01("hsv_msgs/msg/TubeStatus")
-    # Hash as published by ROS 2 Jazzy.
-    assert type_hash("rosgraph_msgs/msg/Clock") == (
-        "RIHS01_692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564"
-    )
+    published = "RIHS01_692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564"  # by ROS 2 Jazzy
+    assert type_hash("rosgraph_msgs/msg/Clock") == published
 
 
 @pytest.mark.parametrize("function", [definition, type_hash])

@@ -35,7 +35,6 @@ def test_a_campaign_by_the_command_and_one_flight_again(campaign, hsv, tmp_path)
     shown = hsv("montecarlo", "summary", str(result), "--units", "paper", "--no-page").out
     assert "12 of 12" in shown and "worst flights" in shown
     printed = hsv("montecarlo", "replay", str(result), "--flight", "7", "--units", "paper").out
-    # Shares are in percent in all tables.
     assert re.search(r"^altitude overshoot +\S+ +%\s*$", printed, re.MULTILINE)
     assert re.search(r"^sample  mass [+-]\S+ %, ", printed, re.MULTILINE)
     assert re.search(r"^altitude overshoot .* %\s*$", shown, re.MULTILINE)

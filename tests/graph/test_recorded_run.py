@@ -89,7 +89,7 @@ def test_player_plays_the_recorded_bytes(shared_processes, bag):
         words = [sys.executable, "-c", SUBSCRIBE, bag, ",".join([*topics, "/clock"])]
         subscriber = shared_processes.start(*words, output=output)
         wait_until(lambda: "waits for a player" in log.read_text(), [subscriber.pid])
-    # A node without the bench's settings of Fast DDS announces itself every 3 s only.
+    # The delay is above 3 s, after which a node without the bench's settings of Fast DDS announces itself again.
     words = ["--rate", "4", "--delay", "5", "--topics", *topics, "/hsv/run", "/rosout"]
     played = shared_processes.run("ros2", "run", "hsv_bringup", "player", bag, *words)
     assert played.returncode == 0, played.stdout

@@ -1,5 +1,3 @@
-"""Pages in a browser: every module has a fixture ``page``, the path of its page."""
-
 import pytest
 
 
