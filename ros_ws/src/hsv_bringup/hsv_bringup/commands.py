@@ -75,7 +75,7 @@ def _command(client: GraphClient, options: SimpleNamespace) -> None:
         return [log.msg.removeprefix(rejected) for log in logged if log.msg.startswith(rejected)]
 
     def ends() -> list[float]:
-        """Return the end times (s) of the published references that execute this command."""
+        """Return the times (s) at which the references published for this command reach its target."""
         return [
             m.times[-1] + m.blends[-1]
             for m in published

@@ -24,13 +24,14 @@ _Subscription = tuple[Callable[..., Any], Any, bool, Callable[[Any], Any]]
 
 
 class FlowExecutor(SingleThreadedExecutor):
-    """An executor that sweeps over the subscriptions in the order of the nodes and waits only if there are no messages.
+    """An executor that asks each subscription in turn for a message, node by node, and waits only if none has any.
 
-    Latched announcements, except recorded ones, are left to the wait set of the base class; they are rare.
+    If the nodes are in the order of the data flow, one sweep over the subscriptions is one step of the loop: a message
+    published in the same process has arrived when its subscription is asked. If it has not (with another middleware),
+    the executor waits for it with the wait set of the base class.
 
-    If the nodes are in the order of the data flow, one sweep is one step of the loop without waiting: a message
-    published in the same process has arrived when its subscription is swept. If it has not (with another middleware),
-    the executor waits for it with the wait set.
+    Latched subscriptions are not swept, because their messages are rare; the wait set finds these. Raw ones, such as
+    the recorder's, are swept, so that a message is recorded as it arrives.
     """
 
     def __init__(self) -> None:
@@ -50,7 +51,10 @@ class FlowExecutor(SingleThreadedExecutor):
         return bool(super().add_node(node))
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Sweep while messages arrive, up to ``SWEEPS`` times; then run another callback. Wait only if none arrived."""
+        """Sweep while messages arrive, up to ``SWEEPS`` times; then let the base class run a callback, if any is due.
+
+        It waits up to ``timeout_sec`` for a callback only if the first sweep found no message.
+        """
         sweeps = 0
         while sweeps < SWEEPS and self._take(self._flowing, 1):
             sweeps += 1

@@ -64,7 +64,7 @@ class PeerEmulatorNode(LockstepNode):
         self._standstill = Standstill()
 
     def _join(self) -> bool:
-        """Announce a run; to a plant, which announces its own, announce all peers as ready. Return True for a plant."""
+        """Announce a run, or, if a plant is under test, prepare to announce all peers as ready to it and return True."""
         if self._is_plant:
             self._announcer = self.create_publisher(Ready, description.READY, LATCHED)
             self.create_subscription(Run, description.RUN, self._on_run, LATCHED)

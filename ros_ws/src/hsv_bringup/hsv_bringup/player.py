@@ -78,7 +78,7 @@ class PlayerNode(ProcessNode):
         return self._begins + played - time.monotonic()
 
     def _end(self) -> None:
-        """Finish when all subscribers have received everything; DDS drops subscribers that are gone or hang."""
+        """Finish if all subscribers have received everything, else log the slow topics; DDS drops hung subscribers."""
         slow = [t for t, p in self._outputs.items() if not p.wait_for_all_acked(Duration(seconds=0.25))]
         if not slow:
             self.finish(0)
@@ -88,7 +88,7 @@ class PlayerNode(ProcessNode):
 
 
 def _instants(bag: Bag, topics: Sequence[str]) -> list[tuple[int, list[tuple[str, bytes]]]]:
-    """Return each instant (ns) and its messages (topic, bytes), in the order in which a step is recorded."""
+    """Return each instant (ns) and its messages (topic, bytes): step topics last, in their order of recording."""
     gathered: dict[int, list[tuple[str, bytes]]] = {}
     order = [bag.name_of(role) for role in TOPICS]
     for topic in sorted(topics, key=lambda name: order.index(name) if name in order else -1):
@@ -98,7 +98,7 @@ def _instants(bag: Bag, topics: Sequence[str]) -> list[tuple[int, list[tuple[str
 
 
 def _relative(bag: Bag, topic: str) -> str:
-    """Return the name of a topic relative to the namespace of its bag; topics outside it keep their names."""
+    """Return a topic's name relative to the bag's namespace; one outside it, or global like ``/rosout``, is kept."""
     own = bag.namespace.rstrip("/") + "/"
     role = next((role for role, name in bag.roles.items() if name == topic), "")
     return topic if role.startswith("/") or not topic.startswith(own) else topic.removeprefix(own)

@@ -114,7 +114,7 @@ class RecorderNode(PeerNode):
         self._begin_bag()
 
     def start_run(self, run: Run) -> None:
-        """Prepare to record a new run; a run that replaces one that was reset gets a new bag."""
+        """Prepare to record a new run, after a reset in a new bag; fail if the bag has steps of another run."""
         if self._run is not None and not self.over and len(self.publishers_of(RUN)) == 1:
             self._keep_reset_run()
         elif self._complete >= 0:
@@ -210,7 +210,7 @@ class RecorderNode(PeerNode):
             self._held.append((topic, data))
 
     def _is_of_this_run(self, topic: str, data: bytes) -> bool:
-        """Return whether a message belongs to the current run, and not to one that is not announced here yet."""
+        """Return whether a message belongs to the announced run, not to one whose announcement is still to arrive."""
         if topic == READY:
             return self._run is not None and deserialize_message(data, Ready).run_id == self._run.run_id
         if topic != REFERENCE:

@@ -169,7 +169,7 @@ def refuse(problem: str, code: int = 2) -> None:
 
 
 def as_arguments(text: str) -> str:
-    """Return ``text`` with options of hsv replaced by launch arguments."""
+    """Return an error ``text`` of hsv with option names (``--live-port``) as launch arguments (``live_port``)."""
     for name in ARGUMENTS:
         text = text.replace("--" + name.replace("_", "-"), name).replace(name.replace("_", "-") + " =", name + " =")
     return text

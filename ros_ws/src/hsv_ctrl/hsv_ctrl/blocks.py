@@ -30,7 +30,7 @@ class ControllerNode(BlockNode):
     """A node that steps the controller that the parameter ``controller`` names, such as a custom class.
 
     Raises:
-        ParameterError: The name is unknown or that of a controller with its own node, or another parameter is wrong.
+        ParameterError: ``controller`` is unknown or has a node of its own, or another parameter is wrong.
     """
 
     def __init__(self) -> None:

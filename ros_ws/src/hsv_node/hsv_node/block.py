@@ -22,7 +22,7 @@ class BlockNode(PeerNode):
     """A node that steps its block of the loop when all messages of a step have arrived, and publishes the results."""
 
     component: Any
-    """The component that the block steps; set by the subclass."""
+    """The object that computes the steps of the block, such as a notch filter; set by the subclass."""
 
     def __init__(self, role: NodeDescription, task: str) -> None:
         super().__init__(role, task)
@@ -42,7 +42,7 @@ class BlockNode(PeerNode):
             self.create_step_subscription(topic, partial(self.on_message, topic))
 
     def start_run(self, run: Run) -> None:
-        """Reset the component for a new run and discard the messages of the previous one."""
+        """Reset the node's :attr:`component` for a new run and discard the messages of the previous run."""
         self._received.clear()
         self._step_times = array("d")
         self.component.reset()
@@ -105,7 +105,7 @@ class BlockNode(PeerNode):
         self.stepped(signals)
 
     def measured(self) -> dict[str, str]:
-        """Return statistics of the wall times (ms) of the component's steps in this run, as texts by name."""
+        """Return statistics of the wall time (ms) that a step has taken to compute in this run, as texts by name."""
         return {f"step_time_{name}": f"{value:.3f}" for name, value in step_statistics(self._step_times).items()}
 
     def _due(self, step: int) -> Sequence[str]:

@@ -147,7 +147,7 @@ class LockstepNode(ProcessNode):
         return full_name(*found) if found else None
 
     def log_waiting(self, missing: Sequence[str], decides: bool = False) -> None:
-        """Log ``missing`` after 2 s, then every 10 s; after 10 s as a warning if this node ``decides`` the start."""
+        """Log that this node waits for ``missing``: after 2 s, then every 10 s (as warning if it ``decides`` the start)."""
         now = time.monotonic()
         if now < self._next_log:
             return
@@ -197,7 +197,7 @@ class LockstepNode(ProcessNode):
         return {}
 
     def _watching(self, seen: Sequence[TopicEndpointInfo], topic: str, linked: Mapping[str, str]) -> int:
-        """Return how many endpoints in ``seen`` belong to viewers: matched, but of nodes that are not in ``linked``."""
+        """Return how many endpoints in ``seen`` can match ``topic`` but belong to viewers, nodes not in ``linked``."""
         strangers = [e for e in seen if full_name(e.node_name, e.node_namespace) not in linked.values()]
         pairs = [(STEP, e.qos_profile) if topic in self._outputs else (e.qos_profile, STEP) for e in strangers]
         return sum(
@@ -213,7 +213,7 @@ class LockstepNode(ProcessNode):
 
 
 class PeerNode(LockstepNode):
-    """A node other than the plant, which announces that it is ready for each run of the plant.
+    """Any node of the graph but the plant: when the plant announces a run, the node announces that it is ready.
 
     The plant announces the end of the run; if it disappears without doing so, the run counts as broken off.
     """
@@ -230,9 +230,9 @@ class PeerNode(LockstepNode):
         self.create_subscription(VehicleState, description.LAST_STATE, self._on_last_state, LATCHED)
 
     def hear_runs(self, callback: Callable[[Any], None], raw: bool = False) -> None:
-        """Subscribe to the plant's announcements of runs. Call it after subscribing to everything to be received first.
+        """Subscribe to the plant's announcements of runs; with ``raw``, ``callback`` is called with their bytes.
 
-        With ``raw``, ``callback`` is called with the bytes of the message.
+        Call this after all other subscriptions whose earlier messages must be received before the announcement.
         """
         links = SubscriptionEventCallbacks(matched=self._on_plant)
         self._runs = self.create_subscription(Run, description.RUN, callback, LATCHED, event_callbacks=links, raw=raw)

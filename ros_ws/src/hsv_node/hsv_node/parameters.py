@@ -79,10 +79,10 @@ def declare_vehicle(node: Node) -> None:
 
 
 def declare_design(node: Node, extra: tuple[Parameter, ...] = ()) -> tuple[dict[str, Any], ControlDesign | None]:
-    """Declare ``extra`` and the parameters of a design on ``node``; return all values and the design in them.
+    """Declare ``extra`` and the parameters of a design on ``node``; return all values by name, and the design.
 
     Unless ``design.name`` or ``design.hash`` is given, the defaults are those of the shipped baseline design. The
-    design is None if its name is ``none``. A warning is logged if its parameters do not have its hash.
+    design is None if ``design.name`` is ``none``. A warning is logged if its parameters do not match ``design.hash``.
     """
     from hsv.control.design import DESIGN_PARAMETERS, design_of, find_design, read_parameters
 
