@@ -147,7 +147,7 @@ class LockstepNode(ProcessNode):
         return full_name(*found) if found else None
 
     def log_waiting(self, missing: Sequence[str], decides: bool = False) -> None:
-        """Log that this node waits for ``missing``: after 2 s, then every 10 s (as warning if it ``decides`` the start)."""
+        """Log ``missing`` after 2 s, then every 10 s; from 10 s on as a warning if this node ``decides`` when to start."""
         now = time.monotonic()
         if now < self._next_log:
             return

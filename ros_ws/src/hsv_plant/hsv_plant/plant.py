@@ -250,7 +250,7 @@ class PlantNode(LockstepNode):
         return min(max(self._delay(), 0.0), 0.25) if due else 0.25
 
     def stopped(self, signal_number: int) -> int:
-        """Return the exit code after a signal (0 after Ctrl-C), and keep the signal's name for the log of :meth:`close`."""
+        """Return the exit code after a signal (0 after Ctrl-C), and keep the signal's name for :meth:`close` to log."""
         self._broken_off = signal.Signals(signal_number).name
         return super().stopped(signal_number)
 

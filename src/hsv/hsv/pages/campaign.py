@@ -123,7 +123,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
 
 
 def sentence(results: Results) -> str:
-    """Return the verdict: the number of flights within all limits, and the limit that the fewest flights keep."""
+    """Return the verdict: how many flights keep all limits, which limit is violated most often, how many are lost."""
     ended, *limited = judged = shares(results)
     lost = ended.flights - ended.within
     ending = f"{lost} of {ended.flights} flights did not come to their end" if lost else "All flights came to their end"
@@ -137,7 +137,7 @@ def sentence(results: Results) -> str:
 
 
 def most_failed(judged: Sequence[Share]) -> Share | None:
-    """Return the limit that the fewest flights keep, or None if all flights keep all limits."""
+    """Return the limit that the fewest flights keep, or None if every flight keeps every limit there is."""
     over = min((share for share in judged if share.limit is not None), key=lambda share: share.within, default=None)
     return over if over is not None and over.within < over.flights else None
 
@@ -155,7 +155,7 @@ def _sorted(results: Results, failed: Share, numbers: Numbers) -> Picture:
 
 
 def _grouped(shown: Sequence[Distribution]) -> dict[str, list[Distribution]]:
-    """Return the distributions by group: the groups of metrics, then :data:`RUN`."""
+    """Return the distributions by group: metrics by their groups, then end time and tube level under :data:`RUN`."""
     groups: dict[str, list[Distribution]] = {group: [] for group in (*Group, RUN)}
     for distribution in shown:
         groups[METRICS[distribution.name].group if distribution.name in METRICS else RUN].append(distribution)
@@ -163,7 +163,7 @@ def _grouped(shown: Sequence[Distribution]) -> dict[str, list[Distribution]]:
 
 
 def _outcome(name: str, value: float, digits: int = 3) -> Markup:
-    """Return the value (SI) of an outcome as HTML in all systems of units."""
+    """Return the ``value`` (SI) of the metric, end time or tube level ``name`` as HTML in all systems of units."""
     return quantity(value, OUTCOMES[name], digits, share=is_share(name))
 
 
@@ -241,7 +241,7 @@ def _envelopes(results: Results, flights: Mapping[str, Flight], numbers: Numbers
 
 
 def _histogram(results: Results, shown: Distribution, numbers: Numbers) -> Plot:
-    """Return the histogram of a metric with the limits inside the range of the data."""
+    """Return the histogram of a metric, end time or tube level, with the limits inside the range of the data."""
     counts, edges = histogram(results.column(shown.name))
     x, y = numbers.add(0.5 * (edges[:-1] + edges[1:])), numbers.add(counts)
     note = Markup("median {}, 95 % below {}, largest {}").format(

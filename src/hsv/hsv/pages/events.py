@@ -1,4 +1,4 @@
-"""Events of a flight: faults, limited commands, errors outside the tube, warnings, changed parameters."""
+"""Events of a flight: faults, limited commands, times outside the tube, warnings, failures, changed parameters."""
 
 from __future__ import annotations
 

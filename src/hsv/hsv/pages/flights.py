@@ -24,7 +24,7 @@ from hsv.pages.panels import AIR_PANELS, MEASUREMENT_ERRORS, PANELS, Kind, Panel
 
 @dataclass(frozen=True)
 class DrawnCurve:
-    """A curve of one flight in SI: y at all n steps, shape (n,), or a constant bound at first and last, shape (2,)."""
+    """A curve of a flight: y (SI) at all n steps, shape (n,); of a constant bound only first and last, shape (2,)."""
 
     kind: Kind
     label: str
@@ -51,7 +51,7 @@ class FlightCurves:
         return self.time if len(curve.y) == len(self.time) else self.time[[0, -1]]
 
     def actual(self, name: str) -> np.ndarray | None:
-        """Return the values of the actual curve of the panel ``name``, or None if there is none."""
+        """Return the values of the first curve of kind ``actual`` in the panel ``name``, or None if there is none."""
         return next((curve.y for curve in self.curves.get(name, ()) if curve.kind is Kind.actual), None)
 
 

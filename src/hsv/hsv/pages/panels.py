@@ -27,7 +27,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve: the sum of ``fields`` of a topic, or of one ``column`` of each; a leading ``-`` subtracts a field."""
+    """A curve of a topic: the sum of ``fields``, or of one ``column`` of each field; a leading ``-`` subtracts."""
 
     kind: Kind
     label: str

@@ -17,9 +17,9 @@ SPACING = 0.5
 def geometry() -> dict[str, Any]:
     """Return the geometry that the class ``SideView`` of ``vehicle.js`` draws, ready for JSON.
 
-    Points are ``[x, z, mode, shape, slope]``: x and z in body axes (m), the index of the elastic coordinate that bends
-    the vehicle there, and deflection (kg^-0.5) and slope (kg^-0.5/m) for a coordinate of 1 kg^0.5 m. Points of the
-    elevator's outline are ``[x, z]``, relative to the hinge (m).
+    Points are ``[x, z, mode, shape, slope]``: x and z in body axes (m), the index of the elastic coordinate (kg^0.5 m)
+    that bends the vehicle there, and, per unit of it, the deflection (kg^-0.5) and its slope along x (kg^-0.5/m).
+    Points of the elevator's outline are ``[x, z]``, relative to the hinge (m).
     """
     frame = airframe()
     chord, thickness = frame.elevator_chord, frame.elevator_thickness

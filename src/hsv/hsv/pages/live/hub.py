@@ -108,10 +108,11 @@ class Hub:
             self._update(self._status_of(messages))
 
     def history(self, generation: int, first: int) -> tuple[int, int, np.ndarray]:
-        """Return generation, first index and rows: from ``first`` on if the history still has ``generation``, else all.
+        """Return the generation of the history, the index of the first returned row, and the returned rows.
 
-        The generation changes when the history restarts or is decimated. A row has the time (s) and the values (SI) of
-        the curves in :data:`hsv.pages.panels.LIVE_CURVES`; the rows are a float32 array, shape (n, 1 + curves).
+        The generation changes when the history restarts or is decimated. The rows are those from ``first`` on if
+        ``generation`` is still the current one, otherwise all. They are a float32 array, shape (n, 1 + curves): the
+        time (s) and the values (SI) of the curves in :data:`hsv.pages.panels.LIVE_CURVES`.
         """
         with self._lock:
             first = first if generation == self._generation else 0
@@ -128,7 +129,7 @@ class Hub:
         return self._latest[STATE][-1][0] if self._latest[STATE] else 0
 
     def end(self, status: int, step: int) -> None:
-        """Record the end of the run with the last ``status`` and ``step``; status running means broken off."""
+        """Record the end of the run at ``step``; a run whose last ``status`` is still ``RUNNING`` was broken off."""
         how = {FlightStatus.FINISHED: "finished", FlightStatus.DIVERGED: "diverged"}
         self.update(ending={"how": how.get(FlightStatus(status), "broken off"), "time": round(step * self._period, 9)})
 

@@ -123,7 +123,7 @@ class PageServer:
         )
 
     def _respond(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer requests for the page and the layout, and refuse requests from pages of other origins."""
+        """Answer requests for page and layout, and refuse pages of other origins; return None to accept a WebSocket."""
         origin, allowed = request.headers.get("Origin"), origins(self.port)
         socket = request.path == SOCKET and "Upgrade" in request.headers
         if origin not in allowed and (origin is not None or socket):
@@ -155,7 +155,7 @@ class PageServer:
             sender.cancel()
 
     async def _send(self, connection: ServerConnection) -> None:
-        """Send changes of the hub as fast as the client reads, and the remaining ones when the server stops."""
+        """Send the hub's changes every ``PERIOD``, later to a slow client, and the last ones when the server stops."""
         known, count, version, ended = 0, 0, -1, False
         with suppress(ConnectionClosed):
             while not ended:
