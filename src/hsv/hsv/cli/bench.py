@@ -238,7 +238,7 @@ def against_imports(repeats: int) -> list[Figure]:
 
 
 def corners(repeats: int, workers: int) -> list[Figure]:
-    """Measure the wall time of the 1024 corners of Case 1 against as many flights of the C loop, on as many workers."""
+    """Measure the wall time of the 1024 corners of Case 1 against 1024 flights of the C loop, on the same workers."""
     campaign = plan("case1", method="corners")
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder, make_executor(workers) as flying:
 

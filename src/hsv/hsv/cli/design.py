@@ -145,7 +145,7 @@ def _described(model: LinearModel, units: UnitSystem) -> dict[str, Any]:
 
 
 def _damping(mode: Mode) -> float | None:
-    """Return the damping ratio, None for a pole at the origin, whose computed sign is a rounding error."""
+    """Return the damping ratio; None for a pole at the origin, where its sign would be that of a rounding error."""
     return mode.damping_ratio if round(mode.natural_frequency, 9) else None
 
 
@@ -248,7 +248,7 @@ def design(
 
 
 def _half_widths(half_width: np.ndarray | None, feedback: np.ndarray | None, *size: float | None) -> list[float] | None:
-    """Return the half-widths of a set in the rigid states and inputs, then its size if given; None without a set."""
+    """Return the half-widths of a set, rigid states then inputs, and its size if given; None if any is unknown."""
     if half_width is None or feedback is None or None in size:
         return None
     return [*half_width[:5], *feedback, *(value for value in size if value is not None)]
@@ -357,9 +357,9 @@ def certify(
     """Check whether a design remains certified with given hardware and air, and with which margin.
 
     Each model is added to the disturbances of the certificate separately, and then all together. A new invariant set is
-    computed, and the nominal trajectory must fit into the input bounds that remain. For actuators, the last line tells
-    whether their limits are reached in that set. For a scenario, everything that the certificate does not cover is
-    listed. The exit code is 1 if the design is not certified.
+    computed, and the nominal trajectory must fit into the input bounds that remain. For actuators, a line of its own
+    tells whether their limits are reached in that set, if it exists. For a scenario, everything that the certificate
+    does not cover is listed. The exit code is 1 if the design is not certified.
 
     Example: hsv certify offline_design/realistic.yaml --sensors fine --turbulence "2 ft/s"
     """

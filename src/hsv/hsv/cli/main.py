@@ -59,7 +59,7 @@ UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 
 
 class _StrictCommand(TyperCommand):
-    """A command that refuses empty options, and options given twice, of which typer would silently take the last."""
+    """A command that refuses empty texts and repeated options that take one value, where typer would use the last."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         values, _, given = self.make_parser(ctx).parse_args(args=[*args])

@@ -66,7 +66,10 @@ class Factor(Distribution):
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign: everything that its flights depend on. Equal campaigns give equal results, byte for byte."""
+    """A campaign: everything that its flights depend on, except the code of a controller in Python.
+
+    With the same code, equal campaigns give equal results, byte for byte.
+    """
 
     scenario_name: str
     scenario_text: str
@@ -90,7 +93,7 @@ class Campaign:
 
     @cached_property
     def scenario(self) -> Scenario:
-        """The scenario with every distribution at its mean and without variation by factors."""
+        """The scenario with every distribution at its mean and without other variation."""
         return scenario_at_means(self.table, self.scenario_name)[0]
 
     @cached_property
@@ -127,8 +130,8 @@ class Campaign:
     def draw(self, flights: range) -> tuple[np.ndarray, np.ndarray]:
         """Return the samples, shape (flights, factors), in the factors' units, and their seeds, shape (flights,).
 
-        Every uniform sample has its own seed, so that it can be drawn alone. With the other methods, all samples are
-        drawn from the campaign's seed.
+        Every uniform sample has its own seed, so that it can be drawn alone. With the other methods, the seed of every
+        sample is the campaign's; corners do not depend on it.
         """
         d, seeds = len(self.factors), np.full(len(flights), self.seed, np.uint64)
         if self.method == "uniform":
@@ -231,7 +234,7 @@ def plan(
         scenario_name: Name of a shipped scenario, or path of a TOML file.
         method: One of :data:`METHODS`; ``"corners"`` flies all combinations of the factors' least and largest values.
         samples: Number of flights; ignored for corners.
-        seed: Seed from which all samples are drawn.
+        seed: Seed from which samples are drawn; the seeds of the flights depend on it, too.
         scale: Factor on the bounds of the uncertain parameters (section 5.1 of the paper); with 0 they do not vary.
         commit: Git commit of the program.
         factors: Least and largest value of other fields or of uncertain parameters, by name, as in a scenario file.
@@ -289,7 +292,8 @@ def _factors(scenario: Scenario, drawn: Mapping[str, Distribution], scale: float
 def _check_ends(campaign: Campaign) -> None:
     """Raise an error if the scenario does not admit the least or largest values of the factors.
 
-    Tried are all least values, all largest values, and each of these alone with the other factors at middle values.
+    Three kinds of samples are tried: all factors at their least values, all at their largest, and one factor at its
+    least or largest value while the others are at middle values.
     """
     low, high, mean = ([getattr(f, end) for f in campaign.factors] for end in ("low", "high", "middle"))
     for ends in (low, high):
@@ -299,9 +303,9 @@ def _check_ends(campaign: Campaign) -> None:
 
 
 def _commands_to_same_goals(table: dict[str, Any], name: str, starts: Mapping[str, float]) -> list[dict[str, Any]]:
-    """Return the scenario's commands, with the change at t = 0 replaced so that ``starts`` lead to the same targets.
+    """Return the scenario's commands with a new change at t = 0, from the varied initial values to the same targets.
 
-    ``starts`` has the varied initial values by name: ``altitude`` (m), ``velocity`` (m/s), or one of them.
+    ``starts`` has the varied initial values by name: ``altitude`` (m), ``velocity`` (m/s), or only one of them.
     """
     scenario, _ = scenario_at_means(table, name)
     steps = [command for command in scenario.command if command.end == 0.0]

@@ -1,4 +1,4 @@
-"""Envelopes of the signals of all flights, updated during a campaign; the time histories themselves are not stored."""
+"""Envelopes of the signals of all flights without a crash, updated during a campaign; time histories are not stored."""
 
 from __future__ import annotations
 

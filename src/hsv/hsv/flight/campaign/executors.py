@@ -135,7 +135,7 @@ class _PoolExecutor(Executor, ABC):
 
     @abstractmethod
     def _obstacle(self) -> str:
-        """Return the reason why no result can come, which ends a message; empty if the batches may just take long."""
+        """Return why results may never come, as the end of a message; empty if the batches may just take long."""
 
 
 class ProcessExecutor(_PoolExecutor):

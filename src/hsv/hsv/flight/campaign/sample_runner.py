@@ -51,7 +51,7 @@ FlownSample = tuple[Flight, float | None] | ControllerError
 
 
 class SampleRunner:
-    """Flies any flights of one campaign, in any order; a flight always has the same bits."""
+    """Flies any flights of one campaign, in any order; their bits do not depend on the order."""
 
     def __init__(self, campaign: Campaign) -> None:
         self.campaign = campaign
@@ -96,7 +96,7 @@ class SampleRunner:
                 yield from map(self._fly_alone, components)
 
     def fly_unchanged(self) -> Flight:
-        """Fly the scenario without variation by the factors."""
+        """Fly the scenario with every distribution at its mean and without other variation."""
         return fly(self._variants.unchanged)
 
     def level(self, flight: FlightData) -> float | None:
@@ -104,7 +104,7 @@ class SampleRunner:
         return self._levels.worst(flight)
 
     def outcome(self, flown: FlownSample) -> Outcome:
-        """Return the results of a flight by column: how it ended, :data:`OUTCOMES` and fingerprint, or the crash."""
+        """Return a flight's results by column: how it ended and, unless it crashed, :data:`OUTCOMES` and fingerprint."""
         if isinstance(flown, ControllerError):
             return {"diverged": False, "crashed": str(flown)}
         flight, level = flown

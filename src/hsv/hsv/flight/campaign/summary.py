@@ -34,7 +34,7 @@ TUBE_LIMIT = 1.0
 
 @dataclass(frozen=True)
 class Share:
-    """How many flights finish within ``limit`` (SI), or finish at all if it is None: ``within`` of ``flights``."""
+    """``within`` of ``flights``: how many flights finish and keep ``limit`` (SI), or finish if ``limit`` is None."""
 
     name: str
     limit: float | None
@@ -53,8 +53,8 @@ class Share:
 class WorstFlight:
     """One of the worst flights: ``ratio`` is the largest ratio of a metric to its limit, ``limit`` names this metric.
 
-    If the flight did not finish, ``ratio`` is infinite and ``limit`` is ``crashed`` or ``diverged``. ``sample`` is in
-    SI units, by factor.
+    If the flight did not finish, ``limit`` is ``crashed`` or ``diverged``, and ``ratio`` is infinite, as for an
+    undefined metric. Without limits, ``ratio`` is 0 and ``limit`` is empty. ``sample`` is in SI units, by factor.
     """
 
     flight: int
@@ -67,12 +67,12 @@ class Results:
     """The results of a campaign, read from its file; only :attr:`sample_runner` loads a controller."""
 
     def __init__(self, path: Path, *, trust: bool = False) -> None:
-        """Read a result file; with ``trust``, code that the file names may run. Errors as for :func:`read_result`."""
+        """Read a result file; ``trust`` permits loading code that is named in it. Errors as for :func:`read_result`."""
         self.path = path
         self.trust = trust
         self.campaign: Campaign
         self.envelope: Envelope
-        """The envelope of all flights."""
+        """The envelope of all flights whose controller did not crash."""
         self.campaign, self.envelope = read_result(path)
 
     @property
@@ -193,7 +193,7 @@ def clopper_pearson(count: int, n: int, confidence: float = CONFIDENCE) -> tuple
 
 
 def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
-    """Return the ``number`` worst flights: crashed, then diverged ones by time, then others by ratio to a limit."""
+    """Return the ``number`` worst flights: crashed, then diverged (earliest first), then largest ratio to a limit."""
     stated = {name: limit for name, limit in limits(results).items() if limit > 0.0}
     diverged, crashed, end = results.column("diverged"), results.crashed, results.column("end_time")
     ratios = np.zeros((len(diverged), len(stated) or 1))
@@ -215,7 +215,7 @@ def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
 
 @dataclass(frozen=True)
 class Distribution:
-    """Statistics of one of :data:`OUTCOMES`, in its SI ``unit``, over the ``flights`` flights that define it."""
+    """Statistics of one of :data:`OUTCOMES`, in SI units; ``flights`` is the number of flights in which it is finite."""
 
     name: str
     unit: str

@@ -31,7 +31,7 @@ class FlightVariants:
     """Builds the components of variants of one flight, all with the same design."""
 
     def __init__(self, scenario: Scenario, design: Mapping[str, Any], library: str | None = None) -> None:
-        """Assemble the flight of a scenario with the parameters of a design, by name.
+        """Assemble the flight of a scenario; ``design`` has all parameters of the controller's design, by name.
 
         ``library`` is the expected SHA-256 of the controller's shared library, empty without one; None skips the check.
         """
@@ -68,8 +68,8 @@ class FlightVariants:
     def perturbed(self, perturbation: Mapping[str, float], seed: int) -> Components | None:
         """Return the components of a variant that differs in the vehicle's parameters and the seed only.
 
-        ``perturbation`` has the relative changes by parameter. Return None if one of them is not admissible; to build
-        the variant from its scenario then raises an error with the reason.
+        ``perturbation`` has the relative changes by parameter. Return None if one of them is not admissible; the
+        caller can then build the variant from its scenario, which raises an error with the reason.
         """
         if not all(_CHANGES[name].admits(change) for name, change in perturbation.items()):
             return None

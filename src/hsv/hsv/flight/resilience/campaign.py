@@ -30,7 +30,7 @@ _EVERY = 8
 
 @dataclass(frozen=True)
 class Subject:
-    """A controller under test: its scenario, the vehicles it flies, and all else that its flights depend on."""
+    """A controller under test: its scenario, its vehicles, and all else, except code, that its flights depend on."""
 
     name: str
     text: str

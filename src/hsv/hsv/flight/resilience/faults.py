@@ -25,7 +25,7 @@ class Moment(StrEnum):
 
     @property
     def share(self) -> float:
-        """Share of the scenario's duration at which the fault starts: 30 s and 100 s of Case 1's 200 s."""
+        """Start of the fault as a share of the scenario's duration; in Case 1, the two moments are 30 s and 100 s."""
         return 0.15 if self is Moment.during else 0.5
 
 
@@ -65,7 +65,7 @@ class TriedFault:
 
     @property
     def resolution(self) -> float:
-        """Resolution of the bisection in severity: :data:`RESOLUTION`, or a change by 1 of an integer, if larger."""
+        """Resolution of the bisection in severity: :data:`RESOLUTION`, but at least a change of an integer by 1."""
         return max(RESOLUTION, 1.0 / abs(self.worst - self.harmless) if self.whole else 0.0)
 
     def value(self, severity: float) -> float:

@@ -128,7 +128,7 @@ def distances(flight: FlightData, without: FlightData, start: float) -> tuple[fl
 def boundary(
     survives: Callable[[float], bool], known: dict[float, bool], resolution: float, at: Callable[[float], float]
 ) -> Boundary:
-    """Return a survived and a lost severity by bisection, 1 and None if all are survived, None and 0 if even 0 is lost.
+    """Return a survived and a lost severity by bisection; (1, None) if none is lost, (None, 0) if even 0 is lost.
 
     Args:
         survives: Flies with a severity, and returns whether the flight survives.

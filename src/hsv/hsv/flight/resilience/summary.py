@@ -99,13 +99,13 @@ class Cell:
 
 
 def _rank(flight: FlownFault) -> tuple[float, float]:
-    """Return a sort key, worst flights first: crashed, then lost by time, then survived by attitude deviation."""
+    """Return a sort key: crashed flights, then lost (earliest first), then survived (largest deviation first)."""
     return (1.0, -(flight.attitude or 0.0)) if flight.survived else (0.0, flight.time_to_loss or 0.0)
 
 
 @dataclass(frozen=True)
 class Square:
-    """The results of one controller with one fault, by time of occurrence: cells, ordered by severity, and boundary."""
+    """Results of one controller with one fault: cells (ordered by severity) and boundary by time of occurrence."""
 
     fault: str
     subject: Subject
@@ -176,7 +176,7 @@ def boundaries_in_words(fault: TriedFault, boundaries: Mapping[Moment, Boundary]
 
 
 def parameter_words(name: str) -> str:
-    """Return a description of the severity of the fault ``name``: the three values, the range, fixed parameters."""
+    """Return a text on the fault ``name``: severity parameter, its three values and range, fixed parameters."""
     fault = TRIED[name]
     fixed = "".join(f", {key.replace('_', ' ')} {value}" for key, value in fault.fixed.items())
     tried = f"{fault.in_words(*fault.values)} ({fault.harmless:g} to {fault.in_words(fault.worst)}){fixed}"
