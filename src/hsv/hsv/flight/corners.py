@@ -32,10 +32,11 @@ def corners(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, f
 
 
 def fraction(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, float]]:
-    """Return the nominal vehicle, then a quarter of the corners, or all if there are fewer than ten parameters.
+    """Return the nominal vehicle, then a quarter of the corners of ``share`` times the ``bounds``, in a fixed order.
 
-    The order is fixed. The quarter is a regular fraction of resolution VI: two of ten signs are products of five
-    others. Any three parameters therefore still occur in all combinations of their signs.
+    With fewer than ten parameters, all corners are returned. The quarter is a regular fraction of resolution VI: the
+    signs of the ninth and tenth parameters are each the product of five others. Any three parameters therefore still
+    occur in all combinations of their signs.
     """
     names = list(bounds)
     nominal, *rows = corners(bounds, share)

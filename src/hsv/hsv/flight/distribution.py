@@ -104,8 +104,8 @@ def read_distribution(given: Mapping[str, Any], unit: str, field: str, *, whole:
     """Return the distribution in the inline table ``given`` for a scenario's ``field``, whose numbers are in ``unit``.
 
     Raises:
-        QuantityError: The kind is unknown, or the values are not two quantities in ``unit`` or are in the wrong order,
-            or the deviation is not positive; with ``whole`` also if the kind is normal or the values are not integers.
+        QuantityError: The kind is unknown, the values are not two quantities in ``unit``, the least value is not below
+            the largest, or the deviation is not positive. With ``whole``, only ``uniform`` with integers is accepted.
     """
     forms = " or ".join(f"{{ {kind} = {pair} }}" for kind, pair in KINDS.items())
     if len(given) != 1 or next(iter(given)) not in KINDS:

@@ -53,10 +53,10 @@ def fingerprint(flown: np.ndarray) -> str:
 
 
 def as_published(found: str | None, scenario: Scenario | None, design_hash: str) -> bool | None:
-    """Return whether ``found``, the fingerprint of a flight, is a published one, no matter of which scenario.
+    """Return True if ``found``, the fingerprint of a flight, is published, for whichever scenario; else False or None.
 
-    False: another fingerprint is published for ``scenario`` with the design whose digest is ``design_hash``. None: none
-    is published for them, or the flight has no fingerprint.
+    False: a different fingerprint is published for this ``scenario`` with the design whose digest is ``design_hash``.
+    None: no fingerprint is published for the two, or the flight has none.
     """
     if any(found == entry["fingerprint"] for entry in _table().values()):
         return True

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def _along(name: str, meaning: str) -> property:
-    """Return a property of :class:`Flight`: the array ``name`` of its reference, with one row per step."""
+    """Return a property of :class:`Flight`: the array ``name`` of its reference trajectory, with one row per step."""
     return property(lambda flight: getattr(flight.trajectory.along(len(flight.history.signals)), name), doc=meaning)
 
 

@@ -26,7 +26,7 @@ class GovernedScenario:
 
 
 def governed(name: str, blend: float) -> GovernedScenario:
-    """Return the scenario ``name`` (or path) with governed commands; each corner's blend lasts twice ``blend`` (s).
+    """Return the scenario ``name`` (or path) with governed commands; ``blend`` (s): half-width of the corners' blends.
 
     Raises:
         ScenarioError: There is no such scenario, or it cannot be flown.

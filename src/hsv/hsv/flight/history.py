@@ -41,7 +41,7 @@ class History(_Matrices):
 
     @classmethod
     def of(cls, **signals: np.ndarray) -> History:
-        """Return a history of ``signals`` (n + 1 rows each) by name; others are NaN, but ``estimate`` is ``state``."""
+        """Return a history of the given ``signals``, n + 1 rows each; others are NaN, but ``estimate`` is ``state``."""
         history = cls.empty(len(next(iter(signals.values()))), estimated=False)
         history.signals[:] = history.auxiliary[:] = np.nan
         for name, values in signals.items():
@@ -50,7 +50,10 @@ class History(_Matrices):
 
     @classmethod
     def over(cls, memory: np.ndarray, rows: int, *, estimated: bool = True) -> History:
-        """Return a history of ``rows`` steps whose matrices lie one after the other on the last axis of ``memory``."""
+        """Return a history of ``rows`` steps in ``memory``, whose last axis holds the flattened matrices in succession.
+
+        Further axes of ``memory`` come first in each matrix; ``estimated``: as for :meth:`empty`.
+        """
         matrices, start = [], 0
         for width in (SIGNAL_COLUMNS, AUXILIARY_COLUMNS, N_STATES)[: 3 if estimated else 2]:
             stop = start + rows * width
@@ -74,7 +77,7 @@ class History(_Matrices):
 
     @property
     def estimate(self) -> np.ndarray:
-        """The state that the controller receives (n + 1, 9): measured, or estimated if an estimator is enabled."""
+        """The state that the controller receives, measured or, with an estimator, estimated; shape (n + 1, 9)."""
         return self.state if self.estimated is None else self.estimated
 
     def columns(self) -> dict[str, np.ndarray]:
@@ -87,7 +90,7 @@ class History(_Matrices):
         return History(self.signals.copy(), self.auxiliary.copy(), estimated)
 
     def cut(self, rows: int) -> History:
-        """Return the first ``rows`` steps."""
+        """Return the history of the first ``rows`` steps, in the same memory."""
         estimated = None if self.estimated is None else self.estimated[:rows]
         return History(self.signals[:rows], self.auxiliary[:rows], estimated)
 

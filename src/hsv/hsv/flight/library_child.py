@@ -48,7 +48,7 @@ class LoadedLibrary:
         yield self._memory.numbers(numbers)
 
     def request(self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, **_: Any) -> Any:
-        """Return the result of the method ``name`` with ``arguments`` and the keywords ``kept``; ignore all others."""
+        """Return the result of the method ``name`` with ``arguments`` and the keywords in ``kept``; drop all others."""
         return getattr(self, name)(*arguments, **(kept or {}))
 
     def describe(self, symbol: str) -> CBlock:
@@ -76,7 +76,7 @@ class LoadedLibrary:
 
     @contextmanager
     def _reason(self) -> Iterator[None]:
-        """Replace the return code in the message of an error raised in this context by the FMU's failure, if any."""
+        """In messages of errors raised in this context, replace an FMU's return code by the reason of its failure."""
         try:
             yield
         except RunError as error:

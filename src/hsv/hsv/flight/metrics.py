@@ -150,7 +150,7 @@ class FlightData:
 
     @property
     def saturated(self) -> np.ndarray:
-        """Whether each of the two inputs was limited, by step, shape (n + 1, 2)."""
+        """Whether the command of each input was saturated, by step, shape (n + 1, 2)."""
         return self._evaluated[1]
 
     @cached_property
@@ -162,7 +162,7 @@ class FlightData:
 def _metrics(flight: FlightData) -> dict[str, float]:
     """Return the metrics of a flight, SI, by name, in the order of :data:`METRICS`.
 
-    Metrics of a step response, a fault or elastic modes are omitted if the flight has none.
+    Metrics that the flight does not define are omitted, such as those of a fault in a flight without one.
     """
     values: dict[str, float] = {}
     time, curves = flight.time, flight.curves

@@ -27,13 +27,13 @@ _WIDEST = 32
 def random_sequences(
     A: np.ndarray, columns: np.ndarray, centre: np.ndarray, Q: np.ndarray, sequences: int, steps: int, seed: int
 ) -> dict[str, Any]:
-    """Return the largest levels that random sequences reach, in total and by start and kind; 1 is the boundary.
+    """Return the largest levels that random sequences reach, overall and by start and kind; 1 is the boundary.
 
-    The result also has ``sequences``, ``steps`` and ``seed``, which give the same bits on any number of threads.
+    The result repeats ``sequences``, ``steps`` and ``seed``. Its bits do not depend on the number of threads.
 
     Args:
         A: (r, n, n) closed loops at the vertices, between which the sequences switch.
-        columns: (r, n, d + 1) effects of d disturbances, each 1 or -1, and a constant 1 on e - ``centre`` in one step.
+        columns: (r, n, d + 1) change of e - ``centre`` in a step by each of d disturbances at 1; last, a constant.
         centre: (n) centre of the ellipsoid.
         Q: (n, n) its matrix; the level of an error e is (e - centre)' Q^-1 (e - centre).
         sequences: Number of sequences.

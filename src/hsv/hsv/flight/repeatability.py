@@ -63,9 +63,9 @@ def findings(scenario: Scenario) -> Iterator[Finding]:
 
 
 def from_copied_state(parts: Components, flight: Flight) -> str:
-    """Step the controller along a ``flight`` again, and from the middle of the flight on also a copy of it.
+    """Step the controller along a ``flight`` again and, from the middle of the flight on, a copy of the controller too.
 
-    Return the first step with another unsaturated input, or a failure, in words; empty if there is none.
+    Return in words the first step whose unsaturated input differs from the flight's, or a failure; empty: neither.
     """
     h, steps = flight.history, len(flight.time)
     steppers = {"the controller": parts.controller}

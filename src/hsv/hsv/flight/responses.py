@@ -32,7 +32,7 @@ def lag_response(
         notch: Notch filter.
         actuators: Sampled actuators.
         scheduled: (k, 2) altitude (m) and velocity (m/s) of the flight.
-        lag: (k, 2) mean positions in each step of actuators driven by the plan u_r + u_n, less the plan.
+        lag: (k, 2) lag of actuators driven by the plan u_r + u_n: their mean positions in each step, minus the plan.
     """
     a, s, data = len(actuators.A), 2 * len(notch.D), polytope.data()
     errors, feedback = np.empty((len(lag), N_RIGID + s + a)), np.empty((len(lag), N_INPUTS))

@@ -162,7 +162,7 @@ def scenario_text(name: str) -> str:
     The text includes the extended scenarios, and the vehicle unless it is shipped. Paths of libraries are absolute.
 
     Raises:
-        ScenarioError: Scenario, file or vehicle does not exist or cannot be read, or a path leads out of its folder.
+        ScenarioError: A scenario or vehicle cannot be found or read, or a library lies outside the scenario's folder.
     """
     text = _own_text(name)
     own = scenario_table(text, name)
@@ -174,9 +174,9 @@ def scenario_text(name: str) -> str:
 
 
 def _located(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return the ``table`` of the scenario file ``name`` with the vehicle's path relative to the working directory.
+    """Return the ``table`` of the scenario file ``name`` with the paths in it resolved from the file's folder.
 
-    The path of a library becomes absolute. A vehicle that is named here replaces an inherited vehicle definition.
+    The path of a library becomes absolute. A vehicle's name also cancels a vehicle definition in extended scenarios.
     """
     folder = Path(name).parent if is_path(name) else Path()
     controller, vehicle = table.get("controller"), table.get("vehicle", {})
@@ -289,7 +289,7 @@ def with_controller(text: str, controller: str, name: str) -> str:
 
 
 def parse_scenario(text: str, name: str) -> Scenario:
-    """Return the scenario in ``text``, as :func:`scenario_text` returns it; errors as in :func:`load_scenario`."""
+    """Return the scenario in a complete TOML ``text`` of :func:`scenario_text`; errors as in :func:`load_scenario`."""
     scenario, drawn = scenario_at_means(scenario_table(text, name), name)
     if drawn:
         field = next(iter(drawn))
@@ -386,9 +386,10 @@ def _check(scenario: Scenario, tables: Collection[str]) -> None:
 
 
 def _check_starts(scenario: Scenario) -> None:
-    """Refuse late starts of events, simultaneous changes of tau, and faults that do not end after their start.
+    """Refuse events that start too late, simultaneous changes of tau, and faults that stop at or before their start.
 
-    An event must start at 0 s or before the flight's end; a ramp or a fault may end after the flight.
+    Commands, changes of tau, faults and gusts must start before the flight's end, but may last beyond it. A start at
+    0 s is always accepted.
     """
     changes = [change.start for change in scenario.tube.change]
     starts = {

@@ -33,10 +33,11 @@ class FlightGroup:
 
     @staticmethod
     def takes(components: Sequence[Components], rows: int | None = None) -> bool:
-        """Return whether the flights of ``components``, two to :func:`hsv.core.lanes`, can be flown side by side.
+        """Return whether the flights of ``components`` can be simulated side by side, each in a lane of its own.
 
-        Nominal law and controller must be the core's own. Only vehicle, seed, initial state, faults, reference, gains,
-        and the numbers of sensors, links and air may differ. Histories of ``rows`` steps each must not be too large.
+        There must be 2 to :func:`hsv.core.lanes` flights, each with a nominal law and a controller of the core. They
+        may differ only in vehicle, seed, initial state, faults, reference, gains, and the numbers of sensors, links and
+        air. The histories of all lanes, ``rows`` steps each (default: the whole flight), must not exceed 64 MiB.
         """
         of_the_core = all(each.controller.in_core and each.nominal_trajectory.law.in_core for each in components)
         if not 1 < len(components) <= lanes() or not of_the_core:
@@ -75,9 +76,9 @@ class TubeLevels:
             self.set = Struct("hsv_tube_set", notch=notch.data, shape=tube.shape, centre=tube.centre)
 
     def worst(self, flight: FlightData) -> float | None:
-        """Return the largest level (e - c)' P (e - c) of the tube error e in the flight, None if no set applies to it.
+        """Return the largest level of the tube error in the flight, None if no set applies to the flight.
 
-        The set has the centre c and the shape P.
+        The level is (e - c)' P (e - c) for the tube error e and the invariant set with centre c and matrix P.
         """
         if not self.set:
             return None

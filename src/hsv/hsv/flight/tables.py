@@ -149,7 +149,7 @@ def _ends_and_mean(text: object, unit: str, info: ValidationInfo) -> tuple[tuple
 
 
 def _coupling(given: object, info: ValidationInfo) -> str:
-    """Return the checked name of a set of inertial coupling of the vehicle, or of a multiple of the derived set."""
+    """Return the canonical name of the chosen inertial coupling: a set of the vehicle, or a multiple of ``derived``."""
     vehicle = _reading(info).vehicle
     if isinstance(given, dict):
         (least, _), given = _ends_and_mean(given, "1", info)
@@ -229,7 +229,7 @@ class TauChangeTable(Table):
 
 
 class TubeTable(Table):
-    """The tube factor tau (default: the design's) and its changes; one value, or one for each of five rigid states."""
+    """The tube factor tau, one value or one for each rigid state (default: the design's), and its changes in flight."""
 
     tau: Numbers = ()
     change: tuple[TauChangeTable, ...] = ()

@@ -69,12 +69,13 @@ class Disturbances(NamedTuple):
 
 
 def disturbances(subject: Subject, flight: Flight) -> Disturbances:
-    """Return the disturbances in a flight (eq. 13 to 18), and its error in the tube (eq. 22).
+    """Return the disturbances in a flight (eq. 13 to 18), its tube error (eq. 22) and the response to actuator lag.
 
     The disturbance is Delta(k) = x(k+1) - [x_r(k+1) + d_r(k)] - A(p) (x - x_r) - B(p) (u - u_r), where p is the
-    altitude and velocity of step k. Its part B_e(p) times the lost elevator deflection is due to the fault; B_e is the
-    elevator's column of B. The rest is represented by three accelerations, constant over a period, and the residuals of
-    altitude and pitch angle. With actuators, u and the lost deflection are mean positions over a period.
+    altitude and velocity of step k. The fault contributes the lost elevator deflection times the elevator's column of
+    B(p). The rigid part of the rest is expressed by three accelerations, constant over a period, and by the residuals
+    of altitude and pitch angle. With actuators, u and the lost deflection in Delta are mean positions over a period.
+    Another channel is the change of the nominal pitch rate by the notch filter, 0 if the design filters that rate.
     """
     design, vehicle, h = subject.design, subject.vehicle, flight.history
     notch, plan = discretise(design.notch, design.period), flight.plan
@@ -158,7 +159,7 @@ def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
 
 
 def share_of(inputs: Mapping[str, Any]) -> float:
-    """Return the share of fault and parameter bounds that W' covers (eq. 47): the largest tau, 1 if not adjustable."""
+    """Return the share of fault and parameter bounds that the set W' holds (eq. 47): largest tau, 1 if tau is fixed."""
     return float(max(inputs["adjustable"]["tau"])) if inputs.get("adjustable") else 1.0
 
 
