@@ -104,7 +104,7 @@ class SampleRunner:
         return self._levels.worst(flight)
 
     def outcome(self, flown: FlownSample) -> Outcome:
-        """Return a flight's results by column: how it ended and, unless it crashed, :data:`OUTCOMES` and fingerprint."""
+        """Return a flight's results by column: how it ended, and :data:`OUTCOMES` and fingerprint if no crash."""
         if isinstance(flown, ControllerError):
             return {"diverged": False, "crashed": str(flown)}
         flight, level = flown

@@ -215,7 +215,7 @@ def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
 
 @dataclass(frozen=True)
 class Distribution:
-    """Statistics of one of :data:`OUTCOMES`, in SI units; ``flights`` is the number of flights in which it is finite."""
+    """Statistics (SI) of one of :data:`OUTCOMES`; ``flights`` is the number of flights in which it is finite."""
 
     name: str
     unit: str
