@@ -147,7 +147,7 @@ class LockstepNode(ProcessNode):
         return full_name(*found) if found else None
 
     def log_waiting(self, missing: Sequence[str], decides: bool = False) -> None:
-        """Log ``missing`` after 2 s, then every 10 s; from 10 s on as a warning if this node ``decides`` when to start."""
+        """Log ``missing`` after 2 s, then every 10 s; from 10 s on as a warning if this node ``decides`` the start."""
         now = time.monotonic()
         if now < self._next_log:
             return

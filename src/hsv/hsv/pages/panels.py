@@ -27,7 +27,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve of a topic: the sum of ``fields``, or of one ``column`` of each field; a leading ``-`` subtracts."""
+    """A curve: the sum of a topic's ``fields``, or of one ``column`` of each; ``-`` before a field subtracts it."""
 
     kind: Kind
     label: str
