@@ -48,10 +48,10 @@ class Columns(dict[str, NDArray[Any]]):
 
 
 def read_at_once(types: Typesdict, message_type: str, messages: Sequence[bytes]) -> Read | None:
-    """Return a function that reads a field of all ``messages`` (at least one, CDR) together, if they share a layout.
+    """Return a function that reads one field of all ``messages`` (at least one, CDR) at once, if they share a layout.
 
-    Return None if the messages differ in layout, are big-endian, are not valid, or have texts or messages in a list.
-    Such messages must be read with :func:`read_one_by_one`.
+    Return None if a message is invalid, is big-endian, has another layout than the first, or contains wide text or a
+    non-empty list of texts or messages. Such messages must be read with :func:`read_one_by_one`.
     """
     try:
         structure = Structure(types, message_type, messages[0])
@@ -110,7 +110,7 @@ def _objects(values: Sequence[Any] | NDArray[Any]) -> NDArray[Any]:
 
 @contextmanager
 def expecting_fields(source: object) -> Iterator[None]:
-    """Convert errors of a message with a missing field or an invalid signal to RecordingErrors that name ``source``."""
+    """Raise a RecordingError that names ``source`` if a message lacks a field, has an invalid signal or is invalid."""
     try:
         yield
     except AttributeError as error:

@@ -31,7 +31,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Result of comparing two recordings of a topic; ``first`` is None if all messages agree within tolerance."""
+    """Comparison of two recordings of a topic; its ``first`` difference is None if they agree within tolerance."""
 
     topic: str
     expected_count: int

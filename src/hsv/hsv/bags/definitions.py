@@ -149,7 +149,7 @@ def installed_types(message_type: str) -> Typestore:
 
 
 def deserialized(types: Typestore, message: bytes, message_type: str) -> Any:
-    """Return ``message`` (CDR) deserialized, without surplus bytes at its end; a SerdeError says that it is invalid."""
+    """Return ``message`` (CDR) deserialized, ignoring surplus bytes at its end; raise a SerdeError if it is invalid."""
     try:
         return types.deserialize_cdr(message, message_type)
     except SerdeError:
@@ -190,8 +190,8 @@ def definition(message_type: str) -> str:
 
     Returns:
         The text of the type, then for each dependency a line of 80 ``=``, a line ``MSG: package/Type`` and its text.
-        The name is without ``msg``, as in rosbag2, because Foxglove and Lichtblick look types up by the names in the
-        fields.
+        As in rosbag2, the names in the ``MSG:`` lines lack ``msg``, because Foxglove and Lichtblick look a type up
+        under the name that the definition of a field uses for it.
 
     Raises:
         RecordingError: The type or one of its dependencies is not installed or cannot be read.

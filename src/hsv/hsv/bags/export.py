@@ -39,10 +39,11 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
     """Write ``topics``, given by name or role; return the written files.
 
     CSV and Parquet: the folder ``target`` contains one file per topic, such as ``hsv_state.csv`` for ``/hsv/state``,
-    with one column per number, such as ``filter_state[0] [kg^0.5 m/s]``, and texts or JSON for other fields. npz: one
+    with one column per number, such as ``elastic_rate_1 [kg^0.5 m/s]``; other fields become texts or JSON. npz: one
     file with one array per field, such as ``hsv_state.elastic_rate_1 [kg^0.5 m/s]``. mat: one file with one structure
     per topic, such as ``hsv_state``, with a field ``elastic_rate_1`` and its unit in
-    ``hsv_state.units.elastic_rate_1``. The first column or field of a topic is the simulated ``time [s]``.
+    ``hsv_state.units.elastic_rate_1``. The first column or field of a topic is the simulated ``time`` (s). Warnings
+    about an incomplete bag are added as a file or array, :data:`INCOMPLETE`.
 
     Raises:
         RecordingError: A topic is missing, or the target exists or cannot be written.
@@ -129,7 +130,10 @@ def _fields(bag: Bag, topic: str) -> dict[str, tuple[NDArray[Any], str]]:
 
 
 def table(columns: Mapping[str, NDArray[Any]], units: Mapping[str, Units]) -> dict[str, NDArray[Any]]:
-    """Return one column per number or other field, its unit in its name; short sequences are padded with NaN.
+    """Return a table of messages, {name with unit: column}, with a column for each number and for each other field.
+
+    A sequence of numbers has as many columns as its longest value; shorter values are padded with NaN. Fields that are
+    neither numbers nor texts become JSON.
 
     Args:
         columns: Fields of messages from :mod:`hsv.bags.columns`.

@@ -30,7 +30,7 @@ compressed to about a quarter."""
 
 
 def locked(stream: IO[bytes], *, shared: bool = False) -> bool:
-    """Lock an open file until it is closed; return whether it succeeded. A recorder holds such a lock.
+    """Try to lock an open file until it is closed; return whether it is locked. A recorder locks its file in this way.
 
     On a file system without locks every attempt succeeds. Several processes can hold a ``shared`` lock.
     """
@@ -53,10 +53,10 @@ def find_files(path: Path) -> tuple[list[Path], list[str]]:
     """Return the files of a bag in their order, and the names of its missing files.
 
     Args:
-        path: A bag directory, or one of its files.
+        path: A bag directory, or one of its files, which is then returned alone.
 
     Raises:
-        RecordingError: There is no file, or the directory contains the files of several bags.
+        RecordingError: There is no MCAP file, the bag is in sqlite3, or the directory contains files of several bags.
     """
     if path.suffix == ".db3" or (path.is_dir() and any(path.glob("*.db3"))):
         raise RecordingError(
@@ -102,8 +102,8 @@ class Unpacker:
     The total size of the unpacked data is limited, because a few compressed bytes can stand for gigabytes.
 
     Raises:
-        RecordingError: The file cannot be read, or it unpacks to more than :data:`MAX_UNPACKED` bytes and
-            :data:`MAX_RATIO` times its size.
+        RecordingError: The file cannot be read, or it unpacks to more than :data:`MAX_UNPACKED` bytes and also
+            to more than :data:`MAX_RATIO` times its size.
     """
 
     def __init__(self, path: Path) -> None:
@@ -117,9 +117,9 @@ class Unpacker:
         """Contents of the file, as far as it can be unpacked."""
 
     def unpacked(self, data: bytes, compression: str | None = None) -> tuple[bytes, bool]:
-        """Return the decompressed ``data``, up to the first damage, and whether they are complete.
+        """Return ``data``, decompressed up to the first damage, and whether they were decompressed completely.
 
-        ``compression`` is zstd, lz4 or empty for none; None: recognised by the first bytes.
+        ``compression`` is ``zstd``, ``lz4``, or empty for data that are not compressed; None: inferred from them.
         """
         match COMPRESSIONS.get(data[:_MAGIC], "") if compression is None else compression:
             case "zstd":

@@ -105,7 +105,7 @@ def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def held(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the steps in which a link (measurement, command) held old data, as {link: mask of shape (n,)}, if any."""
+    """Return, by link (measurement, command), the steps at which it held old data, if any, as masks of shape (n,)."""
     ends = {}
     if MEASUREMENT in topics:
         ends["measurement"] = state_columns(topics[STATE]), state_columns(topics[MEASUREMENT], "state.")
@@ -133,13 +133,13 @@ def effectors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def moving_air(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the fields of :data:`CALM_AIR` that ever differ from it, by name, shape (n,), as in :func:`effectors`."""
+    """Return, by name, the air's fields that ever differ from :data:`CALM_AIR`, by period as in :func:`effectors`."""
     air = {name: _over_the_period(topics, name) for name in CALM_AIR}
     return {name: y for name, y in air.items() if (np.isfinite(y) & (y != CALM_AIR[name])).any()}
 
 
 def _over_the_period(topics: Mapping[str, Columns], field: str) -> np.ndarray:
-    """Return a field of the forces by period, shape (n,), as in :func:`effectors`; empty if there is no such field."""
+    """Return a field of /hsv/forces by period, shape (n,), as in :func:`effectors`; empty if ``topics`` lack it."""
     if FORCES not in topics or field not in topics[FORCES]:
         return np.empty(0)
     forces = topics[FORCES]

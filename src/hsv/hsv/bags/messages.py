@@ -65,7 +65,7 @@ class Structure:
             ``header.stamp.sec`` or ``state.altitude``. A text includes its closing zero.
         lengths: Offset and value of the length of every text and sequence, by path.
         size: Size of :attr:`dtype`, bytes.
-        complete: Whether dtype covers the message; if not, it ends before a list of messages or texts, or wide text.
+        complete: Whether dtype has all fields; else it ends before wide text or a non-empty list of texts or messages.
     """
 
     def __init__(self, store: Typesdict, message_type: str, message: bytes) -> None:
@@ -110,8 +110,9 @@ class Structure:
     def select(self, chosen: Mapping[str, tuple[str, int]]) -> np.dtype[Any]:
         """Return a structured type of the same size with only the ``chosen`` fields: {new name: (path, size)}.
 
-        The size is 1 for a number, :data:`VARYING` for a sequence of numbers, and n for n consecutive numbers (path: of
-        the first, or of the nested message). A MessageError names a field that the definition lacks.
+        The size is 1 for a number, :data:`VARYING` for a sequence of numbers, and n for n consecutive numbers; their
+        path is that of the first, or of the nested message that contains them. A MessageError names a field that the
+        definition lacks.
         """
         names, formats, offsets = list(self._places), [], []
         for path, size in chosen.values():
@@ -200,7 +201,7 @@ class StepMessages:
     """Conversion of the signals of a step to and from the messages of one topic."""
 
     def __init__(self, topic: str, store: Typestore | None = None) -> None:
-        """Prepare for a step ``topic`` (role); ``store`` has its definitions, by default the installed ones."""
+        """Prepare for a step ``topic``, given by its role; ``store`` has its definitions, default: installed ones."""
         self.type = TOPICS[topic]
         self._store = store or installed_types(self.type)
         carried = CARRIED.get(topic, {})
@@ -227,7 +228,10 @@ class StepMessages:
         return int(self._numbers(message)[2])
 
     def unpack(self, message: bytes, signals: Signals) -> None:
-        """Set the ``signals`` needed by blocks from a message, or raise a MessageError or SignalError and set none."""
+        """Write stamp, step and the values that blocks need from a message into ``signals``.
+
+        If the message is invalid, raise a MessageError or SignalError and leave ``signals`` unchanged.
+        """
         seconds, nanoseconds, step, *values = self._numbers(message)
         found = dict(zip(self._needed, values, strict=True))
         if self._has_faults:

@@ -38,7 +38,7 @@ class ParameterSections:
         return cls(shared, {name.removeprefix("/"): flat for name, flat in sections.items()})
 
     def of(self, node: str) -> dict[str, Any]:
-        """Return a node's parameters by name: all shared ones, also those that the node does not have, and its own."""
+        """Return the values for a node by name: all shared ones, even of parameters it lacks, overridden by its own."""
         return self.shared | self.own.get(node, {})
 
     def only(self, names: Iterable[str]) -> Self:

@@ -64,7 +64,7 @@ class Bag:
     raise a RecordingError if the topic is not in the bag, or a message does not fit its definition.
 
     Args:
-        path: A bag directory, or a file in it.
+        path: A bag directory, or a file in it to read alone.
 
     Raises:
         RecordingError: The bag does not exist, is not an MCAP file, cannot be read, or is not of this project.
@@ -212,7 +212,7 @@ class Bag:
 
     @cached_property
     def _clock(self) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:
-        """Log times of the messages on step topics, ascending, and the latest stamp up to each; ns, shapes (n,)."""
+        """Log times of all messages on step topics, ascending, and the latest stamp so far at each; ns, shapes (n,)."""
         steps = sorted(self._step_topics)
         received = np.concatenate([np.array([], np.uint64), *map(self._log_times, steps)])
         stamps = np.concatenate([np.array([], np.int64), *(self.times(topic) for topic in steps)])

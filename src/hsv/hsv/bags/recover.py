@@ -35,7 +35,7 @@ def recover(path: Path | str, target: Path | None = None) -> Recovery:
     The new bag has one file with summary and indexes, and metadata.yaml. A complete bag is not copied.
 
     Args:
-        path: A bag directory, or a file in it.
+        path: A bag directory, or a file in it to recover alone.
         target: The new bag directory; default: the original's name with ``_recovered``, in the same folder.
 
     Raises:

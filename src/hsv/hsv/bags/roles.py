@@ -28,8 +28,9 @@ def naming(names: Mapping[str, str], namespace: str) -> dict[str, str]:
 def roles(topics: Mapping[str, str], custom_data: Mapping[str, str], source: str) -> dict[str, str]:
     """Return the names of a bag's topics by role, given their types by name; ``source`` is for error messages.
 
-    If the bag does not record the names, a topic is identified by the end of its name and its type, and a remapped
-    topic by its type alone if no other topic has it. A wrong type and topics of two graphs are refused.
+    A role has the topic that the bag's custom data name for it, or else the one with the default name in the graph's
+    namespace. If most step topics are found in this way, a role still without a topic gets the only remaining one of
+    its type, if there is exactly one. Refuse a wrong type, and topics of two graphs if no namespace is recorded.
     """
     remapped = _remapped(custom_data)
     found = {role: name for role, name in remapped.items() if name in topics}
@@ -50,7 +51,7 @@ def roles(topics: Mapping[str, str], custom_data: Mapping[str, str], source: str
 
 
 def namespace_of(names: Mapping[str, str]) -> str:
-    """Return the namespace of most topics, given their ``names`` by role."""
+    """Return the namespace of most of a bag's topics, given their ``names`` by role; default: ``/``."""
     spaces = [
         name.removesuffix(f"/{role}") or ROOT
         for role, name in names.items()

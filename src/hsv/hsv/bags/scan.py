@@ -41,10 +41,10 @@ class Scan:
         self._data = memoryview(file.data)
 
     def records(self) -> Iterator[kinds.McapRecord]:
-        """Yield the intact records, for a chunk those inside; list damaged data in ``damages`` and go on.
+        """Yield the intact records, and instead of a chunk its records; list damaged data in ``damages`` and go on.
 
-        Indexes of messages, statistics and the ends of data and file are evaluated, not yielded. A chunk that repeats
-        another, and a record cut off at the end, as left by a killed writer, are skipped and not listed.
+        Message indexes, statistics, the record that ends the data, and the footer are evaluated, not yielded. A chunk
+        that repeats another, and a record cut off at the file's end by a killed writer, are skipped and not listed.
         """
         data, position, chunks = self._data, len(MCAP0_MAGIC), set[int]()
         if not MCAP0_MAGIC.startswith(bytes(data[:position])):
@@ -90,7 +90,7 @@ class Scan:
     def _unpacked(self, chunk: kinds.Chunk) -> tuple[list[kinds.McapRecord], str]:
         """Return the records of a chunk, and a description of its damage, empty if it is intact.
 
-        A chunk that cannot be decompressed or has a wrong checksum has no records, another those before the damage.
+        There are no records if decompression fails or the checksum is wrong; after other damage, those before it.
         """
         if chunk.compression not in ("", *COMPRESSIONS.values()):
             return [], f"a chunk (unsupported compression type {chunk.compression}, expected zstd, lz4 or none)"
@@ -105,7 +105,7 @@ class Scan:
 
 
 def _record(data: memoryview, position: int) -> tuple[kinds.McapRecord | None, int]:
-    """Return the record at ``position`` (None: private or damaged) and the offset of its end (0: damaged)."""
+    """Return the record at ``position`` and its end's offset: (None, end) if of private kind, (None, 0) if damaged."""
     start = position + _FRAME.size
     opcode, length = _FRAME.unpack_from(data, position) if start <= len(data) else (0, 0)
     end = start + length

@@ -76,7 +76,7 @@ def _channels(writer: Writer, bag: Bag) -> dict[str, int]:
 
 
 def _pictures(bag: Bag, exaggeration: float | None) -> list[Message]:
-    """Return the messages to add in order of time: the scene, and the frames of the vehicle."""
+    """Return the messages that a viewer file adds, sorted by time: the scene, then the frames of the vehicle."""
     columns = joined(bag, list(dict.fromkeys((STATE, ACTUATOR, *equipment_topics(bag)))))
     stamps = columns[STATE]["header.stamp"].tolist()
     inputs = dict(zip(INPUT_NAMES, input_columns(columns[ACTUATOR]).T, strict=True))

@@ -122,7 +122,7 @@ class Launcher:
             arguments: ROS arguments of every node.
             on_step: Called with the number of every step that the plant reports.
             on_line: Called with a node's name and a text: an output line that reports no step, or a warning.
-            wait_timeout: Time (s, at least HUNG_AFTER) for which a process may idle if no other node would end the run.
+            wait_timeout: Idle time (s, at least HUNG_AFTER) at which a process fails the run; in flight, only the last.
             namespace: Namespace of all nodes.
         """
         self._nodes = list(nodes)
@@ -191,7 +191,7 @@ class Launcher:
             time.sleep(_LOOK)
 
     def _await_first_words(self, process: _Process) -> None:
-        """Wait until the viewer has reported its addresses or failed, so that it sees the flight from the start."""
+        """Wait until the viewer has reported its addresses, ended or hung; it then sees the flight from its start."""
         while not process.words and process.popen.poll() is None and process.idle() < HUNG_AFTER:
             time.sleep(_LOOK)
 
@@ -275,7 +275,7 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
 
 
 def _ending(process: _Process, code: int) -> str:
-    """Return how a process ended as text, with its last fatal log line or else its last line that is not ``[INFO]``."""
+    """Return text on a process's end: the signal, or the exit code with its last ``[FATAL]`` or non-``[INFO]`` line."""
     if process.reader:
         process.reader.join(1.0)
     if code < 0:

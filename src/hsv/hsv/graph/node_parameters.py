@@ -65,7 +65,7 @@ _TRUTH = {"true": True, "false": False}
 
 
 def find(name: str) -> tuple[NodeDescription, Parameter]:
-    """Return a parameter that may change in flight, by its full name or the last part of it, with its node."""
+    """Return (node, parameter) for the ``name`` of a parameter that may change in flight: full name or last part."""
     found = [entry for full, entry in SETTABLE.items() if name in (full, full.rpartition(".")[2])]
     if len(found) != 1:
         names = ", ".join(SETTABLE) + did_you_mean(name, SETTABLE)

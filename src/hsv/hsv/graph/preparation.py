@@ -170,7 +170,7 @@ def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:
 
 
 def provenance(controller: str, name: str, design_hash: str, seed: int) -> dict[str, str]:
-    """Return the origin of a flight as custom data of its bag: commit, controller, design with ``name``, seed, time."""
+    """Return the origin of a flight as custom data of its bag: commit, controller, design, seed and starting time."""
     library = library_digest(controller)
     return {
         "commit": commit(),

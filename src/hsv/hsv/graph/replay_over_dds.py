@@ -47,7 +47,7 @@ def replay_all(
 
 
 def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progress) -> Iterator[ProcessComparison]:
-    """Repeat the run of the whole graph; compare every node of the loop, but no external controller, with ``bag``."""
+    """Run the whole graph again; yield a comparison with ``bag`` for each node of the loop, except an external one."""
     require(bag, step_topics(controller))
     with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
         repeated = Path(folder, "rerun")

@@ -120,7 +120,7 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
 
 
 def _attached(bag: Bag, name: str) -> ParameterSections:
-    """Return attached parameters without those of the execution; a vehicle file's path becomes the vehicle's name."""
+    """Return the attached parameters that affect the flight; a vehicle file's path becomes the vehicle's name."""
     sections = ParameterSections.parse(bag.text(name), f"{bag.path}: {name}")
     for flat in (sections.shared, *sections.own.values()):
         if "vehicle.name" in flat:

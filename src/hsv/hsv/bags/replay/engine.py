@@ -44,7 +44,7 @@ _TOLERANCES = {
 
 @dataclass(frozen=True)
 class Process:
-    """A process under test: its node, and the absolute and relative tolerance of the comparison with its reason."""
+    """A process under test: its node, and the tolerance (absolute and relative) of its outputs, with the reason."""
 
     node: NodeDescription
     tolerance: float
@@ -210,7 +210,7 @@ def require(bag: Bag, topics: Iterable[str]) -> None:
 
 
 def compare_process(bag: Bag, process: Process, tracks: Mapping[str, Track]) -> ProcessComparison:
-    """Compare the outputs of ``process`` with those in ``bag``; if the run was broken off, only its complete steps."""
+    """Compare the ``tracks`` of ``process`` with those in ``bag``; only complete steps if the run was broken off."""
     limit = complete_steps(bag) if broken_off(bag) else None
     compared = []
     for topic in process.node.publishes:
