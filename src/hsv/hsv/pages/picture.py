@@ -80,7 +80,7 @@ def _drawing(plot: Plot, numbers: Numbers, end: float, kinds: Sequence[str]) -> 
 
 
 def _path(across: np.ndarray, down: np.ndarray) -> str:
-    """Return SVG path data through the finite points, simplified where the line shifts by less than about 0.1 units."""
+    """Return SVG path data through the finite points, simplified to within about 0.1 view-box units."""
     drawn = Path(np.column_stack((across, down))).cleaned(remove_nans=True, simplify=True)
     pens, points = {Path.MOVETO: "M", Path.LINETO: "L"}, np.asarray(drawn.vertices)
     codes = np.asarray(drawn.codes).tolist()
