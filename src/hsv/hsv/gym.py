@@ -10,9 +10,9 @@ values of a outside [-1, 1] are admitted. The reward of a step is, with the true
 
     T / (1 + ((h - h_r) / 100 m)^2 + ((V - V_r) / 20 m/s)^2 + |a|^2),
 
-where T is the control period. The sum over an episode is thus at most its duration in seconds. An episode has one step
-for every command of a flight, including the command at the last state; this last step returns the last state again. The
-episode terminates when the returned state is outside the range of the model, and is truncated at the end of the flight.
+where T is the control period. The sum over an episode is thus at most T times its number of steps. An episode has one
+step for every command of a flight, including that at the last state; this last step returns the last state again, and
+the episode is then terminated if this state is outside the range of the model, otherwise truncated.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ class ParameterError(HsvError, ValueError):
 
 
 def one_of(known: Iterable[str], name: str, also: str = "") -> str:
-    """Return "one of ..." for a message about an unknown ``name``: the known names, ``also``, and the nearest name."""
+    """Return "one of ", the ``known`` names, the text ``also``, and a hint if a known name resembles ``name``."""
     return f"one of {', '.join(known := [*known])}{also}{did_you_mean(name, known)}"
 
 

@@ -1,4 +1,4 @@
-"""Parameters: each component has one table of them, with which nodes declare parameters and files are checked."""
+"""Parameters: each component has one table of them, from which nodes declare them and by which files are checked."""
 
 from __future__ import annotations
 

@@ -44,9 +44,9 @@ def uninterrupted(function: Callable[P, R]) -> Callable[P, R]:
 def interrupt(number: int, frame: FrameType | None) -> None:
     """Handle a signal: raise ``KeyboardInterrupt`` at once, or after the current import or uninterrupted function.
 
-    Imports are not interrupted, because that of a compiled module would fail with another error, and callbacks of the
-    import system swallow the exception. Instead, a timer, which survives an ``exec`` of another program, calls this
-    function again after ``_LATER``.
+    An interrupted import of a compiled module would fail with another error, and callbacks of the import system swallow
+    the exception. A timer therefore calls this function again after ``_LATER``. It survives an ``exec``, so the signal
+    is not lost even if another program is about to replace this one.
 
     Raises:
         KeyboardInterrupt: Unless it must be postponed.
@@ -82,7 +82,7 @@ def ignore_ctrl_c_at_end() -> None:
     """Ignore Ctrl-C while Python shuts down, so that it does not change the exit code of the process.
 
     At shutdown Python restores the default effect of signals and then needs some tens of milliseconds to unload
-    compiled libraries; a pending timer may expire in that time.
+    compiled libraries; a timer that :func:`interrupt` has set may expire in that time.
     """
     for number in (signal.SIGINT, signal.SIGALRM):
         atexit.register(signal.signal, number, signal.SIG_IGN)

@@ -102,7 +102,7 @@ def unit_system(name: str) -> UnitSystem:
 
 
 def unit_in(system: UnitSystem, unit: str) -> str:
-    """Return the unit that ``system`` shows for the SI ``unit``; divisors of quotients outside its table stay in SI."""
+    """Return the unit that ``system`` shows for the SI ``unit``; a quotient not in its table keeps its SI divisor."""
     if system is UnitSystem.si:
         return unit
     own = PAPER_UNITS if system is UnitSystem.paper else METRIC_UNITS
@@ -137,12 +137,12 @@ def readable(value: float, unit: str, system: UnitSystem = UnitSystem.metric) ->
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """Return ``value`` as text with ``digits`` significant digits, but with its whole integer part up to 999999."""
+    """Return ``value`` as text with ``digits`` significant digits, or as an integer of up to 6 digits if longer."""
     return f"{value:.0f}" if float(f"1e{digits - 1}") <= abs(value) < 999999.5 else f"{value:.{digits}g}"
 
 
 def in_words(value: float, unit: str, system: UnitSystem) -> str:
-    """Return ``value``, given in the SI ``unit``, as text with three significant digits and its unit in ``system``."""
+    """Return ``value``, given in the SI ``unit``, as text (:func:`significant`) with its unit in ``system``."""
     number, name = in_system(value, unit, system)
     return significant(number) + ("" if name in ("", "1") else f" {name}")
 
@@ -192,8 +192,8 @@ def has_unit(text: object) -> bool:
 def in_unit_of(values: Sequence[float], unit: str, text: object) -> tuple[list[float], str]:
     """Return ``values``, given in the SI ``unit``, in the unit of the quantity ``text``.
 
-    The second result is the name of that unit after a space. If ``text`` has no unit, values and ``unit`` remain; the
-    name is empty for ``"1"``.
+    The second result is the name of that unit after a space. If ``text`` has no unit, the values stay in the SI
+    ``unit``, whose name is then the second result, empty for ``"1"``.
     """
     found = _QUANTITY.fullmatch(text.strip()) if isinstance(text, str) else None
     own = (found["unit"] or "") if found else ""
@@ -316,7 +316,7 @@ def _squared(unit: str) -> Square:
 
 
 def _composed(unit: str) -> tuple[Fraction, dict[str, int]]:
-    """Return the square (see ``Square``) of a product or quotient of units; a KeyError names one not in ``_KNOWN``."""
+    """Return factor and exponents of ``unit`` squared (see ``Square``); raise a KeyError if ``_KNOWN`` lacks a part."""
     if unit in _KNOWN:
         return _KNOWN[unit]
     if product := re.fullmatch(r"(.*)([*/ ])([^*/ ]+)", unit):

@@ -44,7 +44,7 @@ _ELEMENTS = {"double": np.dtype(float), "int64_t": np.dtype(np.int64), "uint8_t"
 
 
 class _Dimension(NamedTuple):
-    """A dimension: a fixed ``size``, or the value of the field ``counts`` (at most ``greatest``) plus ``more``."""
+    """The length of an array axis: fixed (``size``), or the field ``counts`` (at most ``greatest``) plus ``more``."""
 
     text: str
     size: int | None
@@ -289,7 +289,7 @@ def _contiguous(value: np.ndarray, required: np.dtype[Any]) -> np.ndarray:
 
 
 def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: dict[str, int]) -> None:
-    """Add to ``counts`` the lengths in the shape ``found``; raise a ValueError if it differs from ``declared``."""
+    """Add to ``counts`` the fields given by the shape ``found``; raise a ValueError if it is not as ``declared``."""
     fits = len(found) == len(declared)
     for size, dimension in zip(found, declared, strict=False):
         count = size - dimension.more
@@ -305,7 +305,7 @@ def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: d
 class Callback:
     """A Python function that the core can call as a step function of ``hsv_block.h``, as long as this object lives.
 
-    ``error`` is the exception that the function raised, or None; ``times`` are the durations (s) of calls without one.
+    ``error`` is the exception that the function raised, or None; ``times`` are the durations (s) of its other calls.
     """
 
     def __init__(self, function: Callable[[int, Any, Any], None]) -> None:

@@ -78,5 +78,5 @@ def atmosphere_data(values: Mapping[str, object], period: float) -> Struct:
 
 
 def atmosphere_state(data: Struct) -> np.ndarray:
-    """Return the state, shape (4 + gusts,), of turbulence, density and gusts: zeros; step 0 draws the random ones."""
+    """Return the state before step 0, shape (4 + gusts,): zeros; step 0 draws those of turbulence and density."""
     return np.zeros(_MEMORY + len(data.gust_start))

@@ -84,10 +84,11 @@ def plant_faults(scheduled: Sequence[ScheduledFault], period: float, before: Str
 
 
 class PlantResult(NamedTuple):
-    """The state x of a step, shape (9,), its measurement, shape (9,), and the forces, effectors and air in that state.
+    """The true state of a step and its measurement, shape (9,) each, with forces, effectors and air.
 
-    ``forces``: lift (N), drag (N), thrust (N), pitching moment (N m), dynamic pressure (Pa). As last held before the
-    step: ``effector``, fuel and elevator; ``air``, wind forward and up (m/s) and density relative to the model's.
+    ``effector`` has fuel and elevator, ``air`` the wind forward and up (m/s) and the density relative to the model's,
+    as last held before the step. ``forces`` follow from the state and these: lift (N), drag (N), thrust (N), pitching
+    moment (N m) and dynamic pressure (Pa).
     """
 
     step: int

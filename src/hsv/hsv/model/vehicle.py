@@ -151,7 +151,10 @@ class Vehicle:
         return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
 
     def condition(self, altitude: float | str, velocity: float | str) -> tuple[float | str, float | str]:
-        """Return altitude and velocity; if empty, the published trim's, or the envelope centre's if that is outside."""
+        """Return the altitude and the velocity; an empty one is replaced by that of the published trim.
+
+        If the published trim is outside the envelope, the centre of the envelope is used instead.
+        """
         published_altitude = parse_quantity(PUBLISHED_ALTITUDE, "m", "altitude")
         published_velocity = parse_quantity(PUBLISHED_VELOCITY, "m/s", "velocity")
         (h_low, h_high), (v_low, v_high) = self.altitude_range, self.velocity_range
@@ -191,7 +194,7 @@ class Vehicle:
         return self.decoupled._replace(inertial_coupling_1=psi_1, inertial_coupling_2=psi_2)
 
     def coupling_scale(self, coupling: str) -> float:
-        """Return kappa of a set of inertial coupling: its psi_1 as a multiple of the derived set's."""
+        """Return the strength kappa of a set of inertial coupling: its coefficient psi_1 over the derived set's."""
         return self.couplings[coupling][0] / self.couplings[DERIVED][0]
 
     def check_envelope(self, table: Iterable[Parameter], values: Mapping[str, Any]) -> None:

@@ -124,7 +124,7 @@ class FaultInjector:
         return link_state(self.link, N_INPUTS, self._before)
 
     def rows(self, sides: Sequence[str], earlier: Struct | None = None) -> Struct:
-        """Return the known faults on ``sides``, see :func:`fault_rows`; those in ``earlier`` keep their memory."""
+        """Return the faults on ``sides``, scheduled or injected, for the core; arguments as for :func:`fault_rows`."""
         return fault_rows(sides, self.known, self.period, earlier)
 
     def parameters(self) -> dict[str, list[str] | list[float]]:

@@ -45,10 +45,11 @@ def actuator_system(actuators: Sequence[ActuatorSet]) -> tuple[np.ndarray, np.nd
 
 
 def sampled_actuators(actuators: Sequence[ActuatorSet], period: float) -> Struct:
-    """Return ``actuators`` (see :func:`actuator_system`) sampled at ``period`` (s) with held commands c.
+    """Return A, B, C, D of ``actuators`` in discrete time, with commands held over a ``period`` (s).
 
-    Their states at the next sample are A a + B c, exactly. C a + D c is the mean position over the period; a vehicle
-    that is slow compared with the period responds to this mean, so it can be the input of the polytopic model.
+    From the states a (see :func:`actuator_system`) and commands c, A a + B c are exactly the states one period later.
+    C a + D c are the mean positions over the period. A vehicle that is slow compared with the period responds to these
+    means, so they can be the inputs of the polytopic model.
     """
     A, B, C, D = actuator_system(actuators)
     # Integrators of the positions give their means.
@@ -64,7 +65,7 @@ def respond(actuators: Struct, commands: np.ndarray) -> tuple[np.ndarray, np.nda
 
     Args:
         actuators: Sampled actuators, initially at rest.
-        commands: (k, 2) deviations from the commands at rest.
+        commands: Deviations from the commands at rest, shape (k, 2).
     """
     states, means = np.empty((len(commands), len(actuators.A))), np.empty((len(commands), N_INPUTS))
     arrays = (doubles(vector(each)) for each in (commands, states, means))
@@ -75,7 +76,7 @@ def respond(actuators: Struct, commands: np.ndarray) -> tuple[np.ndarray, np.nda
 def held_behind(
     A: np.ndarray, B: np.ndarray, period: float, actuators: Sequence[ActuatorSet] = (), delay: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return A and B in discrete time of dx/dt = A x + B p, for actuator positions p that follow held commands.
+    """Discretise dx/dt = A x + B p, in which the actuator positions p follow held commands; return the new A and B.
 
     Args:
         A: (n, n) state matrix, continuous time.
@@ -85,8 +86,8 @@ def held_behind(
         delay: Delay of all commands (s), which may exceed the period.
 
     Returns:
-        A (n + a + d, n + a + d) and B (n + a + d, 2) for n states of x, a states of the actuators and d numbers
-        of delayed commands, the newest command first.
+        Discrete-time A (n + a + d, n + a + d) and, for the commands, B (n + a + d, 2). The states are the n of x, the
+        a of the actuators and d numbers of delayed commands, the newest command first.
     """
     from scipy.linalg import expm  # see hsv.model.lpv.linearisation
 

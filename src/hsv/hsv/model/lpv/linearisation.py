@@ -35,7 +35,7 @@ def zero_order_hold(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.nda
 
 
 class Filter(NamedTuple):
-    """A continuous-time filter of the pitch rate (paper eq. 39): A (k, k), B (k), C (k) and a non-zero D."""
+    """A continuous-time filter of the pitch rate (paper eq. 39): A (k, k), B (k,), C (k,) and a non-zero D."""
 
     A: np.ndarray
     B: np.ndarray
@@ -44,11 +44,11 @@ class Filter(NamedTuple):
 
 
 def extended_derivative(x: np.ndarray, u: np.ndarray, p: VehicleParameters, notch: Filter, printed: bool) -> np.ndarray:
-    """Return the derivative (9 + k) of the extended state, that of vehicle and filter (paper eq. 40).
+    """Return the time derivative, shape (9 + k,), of the extended state, vehicle and filter (paper eq. 40).
 
     Args:
-        x: (9 + k) extended state with the filtered pitch rate, real or complex.
-        u: (2) inputs, real or complex.
+        x: Extended state, shape (9 + k,), with the filtered pitch rate in place of the true one, real or complex.
+        u: Inputs, shape (2,), real or complex.
         p: Vehicle.
         notch: Filter with k states.
         printed: True: the filtered pitch rate moves the vehicle, as the paper prints it; False: the true one does.
@@ -92,7 +92,7 @@ def extended_jacobian(
 
 
 def extended_state(x: np.ndarray, notch: Filter) -> np.ndarray:
-    """Return the extended state (9 + k) of a vehicle state ``x`` (9) with the filter in equilibrium (paper eq. 41)."""
+    """Return the extended state, shape (9 + k,), of a vehicle state ``x`` if the filter is in equilibrium (eq. 41)."""
     rest = np.linalg.solve(-notch.A, notch.B * x[PITCH_RATE])
     extended = np.concatenate((x, rest))
     extended[PITCH_RATE] = notch.C @ rest + notch.D * x[PITCH_RATE]
@@ -147,8 +147,8 @@ def sample(
 
     Args:
         model: Continuous-time A (n, n) and B (n, m) at an altitude (m) and a velocity (m/s).
-        altitudes: (n_h) m.
-        velocities: (n_v) m/s.
+        altitudes: Altitudes (m), shape (n_h,).
+        velocities: Velocities (m/s), shape (n_v,).
         period: Sampling period (s).
     """
     rows = [
@@ -180,16 +180,16 @@ def modes(A: np.ndarray) -> list[Mode]:
 def frequency_response(
     A: np.ndarray, B: np.ndarray, frequencies: np.ndarray, period: float | None = None
 ) -> np.ndarray:
-    """Return the complex frequency response (f, n, m) of all states to all inputs.
+    """Return the complex frequency response, shape (f, n, m), of all states to all inputs.
 
     Args:
         A: (n, n) state matrix.
         B: (n, m) input matrix.
-        frequencies: (f) rad/s.
+        frequencies: Frequencies (rad/s), shape (f,).
         period: Sampling period (s) of a discrete-time model, ``None`` for a continuous one.
 
     Raises:
-        DesignError: A frequency at or above the Nyquist frequency of a discrete-time model.
+        DesignError: A frequency is at or above the Nyquist frequency of a discrete-time model.
     """
     if period is not None and np.max(frequencies) >= math.pi / period:
         nyquist = math.pi / period

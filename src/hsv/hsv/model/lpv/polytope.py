@@ -20,12 +20,12 @@ def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: st
     """Return the vertices' weights as functions of one scheduling variable, as an ``hsv_axis``.
 
     Args:
-        breakpoints: (s) increasing values of the scheduling variable, SI.
-        samples: (s, r) weights of the r vertices at the breakpoints; rows sum to one.
+        breakpoints: Increasing values of the scheduling variable (SI), shape (s,).
+        samples: Weights of the r vertices at the breakpoints, shape (s, r); rows sum to one.
         interpolation: ``"linear"`` (a grid of vertices) or ``"cubic"`` (tensor-product weights).
 
     Raises:
-        DesignError: Wrong shapes, breakpoints that do not increase, or an unknown interpolation.
+        DesignError: The shapes are wrong, the breakpoints do not increase, or the interpolation is unknown.
     """
     breakpoints = np.ascontiguousarray(breakpoints, float)
     samples = np.asarray(samples, float)
@@ -46,10 +46,10 @@ def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: st
 
 
 def _spline(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the coefficients (4, s - 1, r) of the not-a-knot cubic splines through ``y`` (s, r) at ``x`` (s).
+    """Return the coefficients, shape (4, s - 1, r), of not-a-knot cubic splines through s points, highest power first.
 
-    Two points give a line, three a parabola; with four and more points the third derivative is continuous at the
-    second and at the second last point (de Boor, A Practical Guide to Splines, ch. IV).
+    Spline i has the values ``y[:, i]`` at ``x``. Two points give a line, three a parabola; with more, the third
+    derivative is continuous at the second and the second last (de Boor, A Practical Guide to Splines, ch. IV).
     """
     n = len(x)
     step = np.diff(x)

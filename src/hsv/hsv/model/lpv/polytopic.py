@@ -39,9 +39,10 @@ _FREQUENCIES = np.logspace(-2.0, 2.0, 200)
 class PolytopicModel:
     """A polytopic model of a vehicle, and ``exact``, the continuous-time model that it approximates.
 
-    ``polytope`` has the nine states. ``whole`` is the model as it was computed: with a filter, the filtered pitch rate
-    replaces the true one, and the states of the filter follow the nine. ``samples``, for altitude and for velocity:
-    k breakpoints, and weights (k, v) of v vertices. ``singular_values``: those of :func:`tensor_product`, or empty.
+    ``whole`` has the states of ``exact``: the nine, or with a filter the nine with the filtered pitch rate instead of
+    the true one, then the filter's states. ``polytope`` is its part with the nine states and the true pitch rate;
+    without a filter, it is ``whole``. ``samples``, for altitude and for velocity: k breakpoints, and weights (k, v) of
+    v vertices. ``singular_values``: those of :func:`tensor_product`, or empty.
     """
 
     vehicle: Vehicle
@@ -54,14 +55,15 @@ class PolytopicModel:
     singular_values: Sequence[np.ndarray]
 
     def accuracy(self, judged: Polytope, scales: tuple[np.ndarray, np.ndarray]) -> dict[str, float]:
-        """Return the largest deviations of ``judged`` from the linearised vehicle, and errors of its weights, by name.
+        """Compare ``judged`` with ``exact``, sampled, over the envelope; return its largest errors, by name.
 
-        The error of the scaled [A - I, B] is relative to its Frobenius norm. Bode plots from all inputs to all states
-        are compared at the point of the largest error and on a coarser grid that covers the envelope.
+        The relative error at a point is the Frobenius norm of the error of [A, B] over that of [A - I, B], both scaled.
+        Bode plots from all inputs to all states are compared where it is largest and on a coarser grid. The result also
+        has the number of points, the smallest weight, and the largest deviation of a sum of weights from one.
 
         Args:
-            judged: Polytopic model, ``polytope`` or one with the same states.
-            scales: Scales of the states (n) and of the inputs (m), SI.
+            judged: Polytopic model with the states of ``whole``.
+            scales: Scales (SI) of the states, shape (n,), and of the inputs, shape (m,).
         """
 
         def exact(altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
@@ -116,11 +118,11 @@ def polytopic_model(
         notch: Filter that is part of the model, or None.
         period: Sampling period (s).
         counts: Numbers of samples in altitude and in velocity.
-        scales: Scales of the states (n) and of the inputs (m), SI: errors of these sizes count as equal.
+        scales: Scales (SI) of states, shape (n,), and inputs, shape (m,): errors of these sizes count as equal.
         tensor: Tolerance and functions of :func:`tensor_product`; None: the samples are the vertices.
 
     Raises:
-        DesignError: There are too few samples for the tolerance, unknown functions, or no hull was found.
+        DesignError: There are too few samples for the tolerance, the functions are unknown, or no hull was found.
         TrimError: There is no equilibrium at a sample.
     """
     exact: Linearised = partial(linearise, vehicle.decoupled)

@@ -13,7 +13,7 @@ FUNCTIONS = ("singular", "polynomial")
 
 
 Samples = tuple[np.ndarray, np.ndarray]
-"""Breakpoints (s) and weights (s, r) of a scheduling variable, with cubic splines between them."""
+"""Breakpoints, shape (s,), and weights, shape (s, r), of a scheduling variable; cubic splines join the weights."""
 
 
 def tensor_product(
@@ -26,10 +26,10 @@ def tensor_product(
     tolerance: float,
     functions: str = "singular",
 ) -> tuple[Polytope, tuple[Samples, Samples], list[np.ndarray]]:
-    """Return a polytopic model of discrete-time samples on a grid (paper eq. 11) with a tight hull.
+    """Return a polytopic model, with few vertices and a tight hull, of discrete-time samples on a grid (paper eq. 11).
 
-    Then return, each for altitude and for velocity, the samples of the weights, and the singular values of the samples
-    unfolded along this variable, relative to the largest.
+    The other two results are pairs, for altitude and for velocity: breakpoints with weights; and singular values,
+    relative to the largest, of the matrix whose rows are the samples at one altitude, or at one velocity.
 
     The higher-order singular value decomposition is applied to the scaled [A - I, B]; with A in place of A - I the
     ranks would depend on the sampling period.
@@ -37,10 +37,10 @@ def tensor_product(
     Args:
         A: (n_h, n_v, n, n) discrete-time state matrices, SI.
         B: (n_h, n_v, n, m) input matrices, SI.
-        altitudes: (n_h) m, increasing.
-        velocities: (n_v) m/s, increasing.
-        state_scale: (n) scales of the states, SI.
-        input_scale: (m) scales of the inputs, SI.
+        altitudes: Increasing altitudes (m), shape (n_h,).
+        velocities: Increasing velocities (m/s), shape (n_v,).
+        state_scale: Scales of the states (SI), shape (n,).
+        input_scale: Scales of the inputs (SI), shape (m,).
         tolerance: Singular values below this share of the largest are discarded; the rank r is the number of the rest.
         functions: Basis of the model in each variable: the constant and r - 1 ``"singular"`` functions, which have the
             smallest total error, or ``"polynomial"`` functions up to degree r - 1, which at a low rank distribute the
@@ -94,11 +94,11 @@ def hull_weights(breakpoints: np.ndarray, functions: np.ndarray) -> np.ndarray:
     deterministic.
 
     Args:
-        breakpoints: (s) increasing values of the scheduling variable.
-        functions: (s, r - 1) functions of the variable, independent of each other and of the constant.
+        breakpoints: Increasing values of the scheduling variable, shape (s,).
+        functions: Values, shape (s, r - 1), of functions that are independent of each other and of the constant.
 
     Returns:
-        (s, r) weights at the breakpoints; vertices are ordered by the position of the peak of their weight.
+        Weights at the breakpoints, shape (s, r); vertices are ordered by the breakpoint at which their weight peaks.
 
     Raises:
         DesignError: The functions and the constant are dependent, or the optimisation ended without a result.
@@ -129,13 +129,13 @@ def smallest_weight(breakpoints: np.ndarray, weights: np.ndarray) -> float:
 
 
 def relaxed(weights: np.ndarray, least: float) -> np.ndarray:
-    """Return the weights (s, r); if the smallest, ``least``, is negative, enlarge their simplex until it is zero."""
+    """Return the weights (s, r); if their minimum ``least`` is negative, their simplex is enlarged to make it zero."""
     excess = max(0.0, -least)
     return np.asarray((weights + excess) / (1.0 + weights.shape[1] * excess))
 
 
 def _start(basis: np.ndarray) -> np.ndarray:
-    """Return Q (r, r), see :func:`_smallest_simplex`, of a simplex through r points, enlarged to enclose the curve."""
+    """Return a first Q (r, r) for :func:`_smallest_simplex`: through r points of ``basis``, enlarged to enclose all."""
     s, r = basis.shape
     chosen = np.round(0.5 * (1.0 - np.cos(np.pi * np.arange(r) / (r - 1))) * (s - 1)).astype(int)
     if np.linalg.matrix_rank(basis[chosen]) < r:
