@@ -120,7 +120,7 @@ def linearise(vehicle: VehicleParameters, altitude: float, velocity: float) -> t
         velocity: Velocity of the trim, m/s.
 
     Raises:
-        TrimError: There is no equilibrium at this altitude and velocity.
+        TrimError: There is no equilibrium at this altitude and velocity within the input limits.
     """
     rigid = vehicle.decoupled()
     equilibrium = trim(rigid, altitude, velocity)
@@ -168,7 +168,7 @@ class Mode:
 
 
 def modes(A: np.ndarray) -> list[Mode]:
-    """Return the modes of ``A`` (n, n), fastest first; an unstable real pole has the damping ratio -1."""
+    """Return the modes of ``A`` (n, n), highest frequency first; an unstable real pole has the damping ratio -1."""
     found = []
     for pole in np.linalg.eigvals(A).tolist():
         if pole.imag >= 0.0:

@@ -105,7 +105,10 @@ class Polytope:
             raise DesignError(f"vertices A {self.A.shape}, B {self.B.shape}: expected {r} matrices of matching size")
 
     def data(self) -> Struct:
-        """Return the model as an ``hsv_polytope``, whose rows are padded with zeros to a multiple of :data:`BLOCK`."""
+        """Return the model as an ``hsv_polytope``, without entries that are zero at every vertex.
+
+        The other entries of each vertex are padded with zeros to a multiple of :data:`BLOCK`.
+        """
         n, m = self.B.shape[1:]
         S = np.concatenate((self.A, self.B), axis=2).reshape(len(self.A), -1)
         entries = np.flatnonzero(S.any(axis=0))

@@ -122,8 +122,8 @@ def polytopic_model(
         tensor: Tolerance and functions of :func:`tensor_product`; None: the samples are the vertices.
 
     Raises:
-        DesignError: There are too few samples for the tolerance, the functions are unknown, or no hull was found.
-        TrimError: There is no equilibrium at a sample.
+        DesignError: There are too few samples, the functions are unknown, or no hull was found.
+        TrimError: There is no equilibrium within the input limits at a sample.
     """
     exact: Linearised = partial(linearise, vehicle.decoupled)
     if notch:
