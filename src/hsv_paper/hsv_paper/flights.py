@@ -99,7 +99,7 @@ def flight_measures(flight: FlightData) -> dict[str, float]:
 
 
 def _settling_time(time: np.ndarray, states: np.ndarray) -> float:
-    """Return the last time (s) at which one of the ``states`` (n, m) is unsettled (:data:`SETTLED`), otherwise 0."""
+    """Return the last time (s) at which a state is not :data:`SETTLED`, or else 0; ``states`` has shape (n, m)."""
     distance = np.abs(states - states[-1])
     moving = np.flatnonzero(np.any(distance > SETTLED * distance.max(axis=0), axis=1))
     return float(time[moving[-1]]) if len(moving) else 0.0

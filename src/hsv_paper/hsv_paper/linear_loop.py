@@ -82,7 +82,7 @@ class SampledLoop:
         return float(self.poles.real.max())
 
     def command_noise(self, noise: np.ndarray) -> np.ndarray:
-        """Return the standard deviations (SI) of the inputs under white ``noise``, given as those of nine measurements.
+        """Return the standard deviations (SI) of the inputs due to white measurement noise with those in ``noise``.
 
         Raises:
             numpy.linalg.LinAlgError: The loop is unstable.
@@ -137,7 +137,7 @@ class Feedback:
         return SampledLoop(A, B, gain, self.period)
 
     def growths(self, vehicle: VehicleParameters, over: Corners) -> np.ndarray:
-        """Return the growth (1/s) by vehicle: the largest of both ends of Case 1's step, before and after its fault."""
+        """Return the growth (1/s) by vehicle: the largest at Case 1's start and target, before and after its fault."""
         return np.array(
             [
                 max(
@@ -172,11 +172,11 @@ def _held(
 
 
 def crossings(growth: Callable[[float], float], along: Sequence[float], tolerance: float = 1e-6) -> Iterator[float]:
-    """Yield the values of the scalar at which ``growth`` changes its sign.
+    """Yield, in the order of ``along``, the scalars at which ``growth`` changes its sign.
 
     Args:
         growth: Largest real part (1/s) of a loop's poles as a function of a scalar, such as kappa.
-        along: Values of the scalar, increasing or decreasing, dense enough to bracket every change of sign.
+        along: Values of the scalar, increasing or decreasing, so dense that no two crossings lie between neighbours.
         tolerance: Tolerance of a crossing, as a fraction of the interval that it lies in.
     """
     stable = growth(along[0]) < 0.0
@@ -187,7 +187,10 @@ def crossings(growth: Callable[[float], float], along: Sequence[float], toleranc
 
 
 def stability_limit(growth: Callable[[float], float], along: Sequence[float], tolerance: float = 1e-6) -> float | None:
-    """Return the first of the :func:`crossings`; ``along[0]`` if unstable there; None if there is no crossing."""
+    """Return the scalar at which a loop becomes unstable: the first of the :func:`crossings`.
+
+    It takes the same arguments. ``along[0]`` if the loop is unstable there; None if there is no crossing.
+    """
     return float(along[0]) if growth(along[0]) >= 0.0 else next(crossings(growth, along, tolerance), None)
 
 

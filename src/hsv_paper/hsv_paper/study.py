@@ -43,7 +43,7 @@ class Scope:
 
     @property
     def every(self) -> int:
-        """Stride in lists of values: only one of so many values is used."""
+        """Stride in lists of values: with a stride of n, every n-th value is used."""
         return max(1, round(self.coarseness))
 
     @cached_property

@@ -54,7 +54,7 @@ class Evidence:
         self.behind = cache(self._behind)
 
     def _behind(self, elevator: str) -> Evidence:
-        """Return evidence with this elevator: this object if ideal, else a new one that flies at most 32 corners."""
+        """Return this object if ``elevator`` is ideal, else new evidence with it that flies at most 33 vehicles."""
         if elevator == IDEAL:
             return self
         over = [corner for corner in screening_corners(load_vehicle().uncertainty) if corner in self.over]
@@ -92,7 +92,7 @@ class Evidence:
     ) -> np.ndarray:
         """Return the growth (1/s), by vehicle, of the sampled loop with ``factor`` times F of the design ``name``.
 
-        It is the largest real part of all poles, at both ends of Case 1's step, before and after the fault.
+        It is the largest real part of all poles, at Case 1's start and target, before and after its fault.
         """
         self._progress(f"poles, {coupling} coupling", 0, 1)
         loop = Feedback(factor * design(name).feedback_gain, notch, design(name).period, self.hardware)
@@ -100,7 +100,7 @@ class Evidence:
 
 
 def certified(entry: str) -> np.ndarray:
-    """Return the numbers, shape (n,), at ``design:path.to.entry`` in a certificate, from all items of a list."""
+    """Return the numbers, shape (n,), at ``design:path.to.entry`` of a certificate; a list gives all its items."""
     name, _, path = entry.partition(":")
     found = [certificate(name)]
     for key in path.split("."):

@@ -1,8 +1,8 @@
 """Functions that return numbers for the claims, in the order of the paper.
 
 Other numbers of the claims come directly from certificates and measures of flights. A claim names its function in
-``claims.yaml``. Each function returns numbers (SI) and words by name. An array has one element per vehicle, the nominal
-one first; those of :func:`sets` have one per state.
+``claims.yaml``. Such a function returns numbers (SI, dB or a stated unit) and words by name. An array has one element
+per vehicle, the nominal one first; those of :func:`sets` have one per state.
 """
 
 from __future__ import annotations
@@ -67,9 +67,9 @@ def vertices(evidence: Evidence) -> Numbers:
 
 
 def coupling(evidence: Evidence) -> Numbers:
-    """Return how much the coupling shifts the elastic modes (relative) and changes the pitch-rate response (dB).
+    """Return the largest changes due to coupling: of an elastic mode's frequency (relative) and of the pitch rate (dB).
 
-    ``almost`` is the largest relative shift that counts as none: a tenth of the relative distance of the two modes.
+    ``almost`` is the largest frequency change that counts as none: a tenth of the relative distance of the two modes.
     """
     vehicle = load_vehicle().decoupled
     structural = {"first": vehicle.natural_frequency_1, "second": vehicle.natural_frequency_2}
@@ -86,13 +86,13 @@ def coupling(evidence: Evidence) -> Numbers:
 
 
 def _rise() -> np.ndarray:
-    """Return the rise (dB) from elevator to pitch rate due to paper-like coupling, at :data:`modes.FREQUENCIES`."""
+    """Return by how much (dB) paper-like coupling raises the pitch-rate response, at :data:`modes.FREQUENCIES`."""
     coupled, alone = (bode(modes.pitch_rate_response(name, modes.FREQUENCIES))[0] for name in ("paper_like", 0.0))
     return coupled - alone
 
 
 def disturbance(evidence: Evidence) -> Numbers:
-    """Return how many flights were compared with W and, for the derived coupling, with a share of it, and the share."""
+    """Return the numbers of flights compared with W, and with ``share`` times W (derived coupling), and the share."""
     other = certificate("baseline_derived")
     return {
         "flights": certificate("baseline")["tube"]["flights"]["flights"],
@@ -110,8 +110,8 @@ def box(evidence: Evidence) -> Numbers:
     Below 1, it would prove that the paper's invariant box (eq. 25 to eq. 28) exists. The box is Z = {|e| <= z}; w_i are
     the half-widths of the disturbance at vertex i. By the Farkas lemma (the paper's Lemma 2), condition (eq. 27) is
     |A_i + B_i F| z + w_i <= z at every vertex. If |A_i + B_i F| has a spectral radius of at least one at some vertex,
-    no z exists: its left Perron vector y gives y'z + y'w_i <= y'z. The absolute value hides the signs that make
-    integrators and oscillating pairs stable.
+    no z exists for w_i > 0: with the matrix's left Perron vector y, y'z + y'w_i <= y'z would follow. The absolute value
+    hides the signs that make integrators and oscillating pairs stable.
     """
     flown = design("baseline")
     largest = np.abs(flown.polytope.A + flown.polytope.B @ flown.feedback_gain).max(axis=0)
@@ -119,7 +119,7 @@ def box(evidence: Evidence) -> Numbers:
 
 
 def symmetric(evidence: Evidence) -> Numbers:
-    """Return the largest ratio of centre to half-width: of a channel of W, with its name, and of a state of Z."""
+    """Return the largest ratio of centre to half-width over W's channels, with that channel, and over the states of Z."""
     tube = tube_of("baseline")
     channels = certificate("baseline")["tube"]["disturbance"]["channels"]
     off = {name: abs(b["upper"] + b["lower"]) / (b["upper"] - b["lower"]) for name, b in channels.items()}
@@ -129,12 +129,12 @@ def symmetric(evidence: Evidence) -> Numbers:
 
 
 def certified_attitude(evidence: Evidence) -> Numbers:
-    """Return the half-width (rad) of the invariant set in the attitude: the larger one of its two angles."""
+    """Return the larger half-width (rad) of the invariant set in angle of attack and pitch angle."""
     return {"attitude": float(tube_of("baseline").half_width[2:4].max())}
 
 
 def input_set(evidence: Evidence) -> Numbers:
-    """Return the widths of the tightened input set U ⊖ FZ, and the nominal trajectory's margins to it, SI."""
+    """Return the widths of the tightened input set U ⊖ FZ, and the nominal inputs' least margins to its bounds, SI."""
     tightening = certificate("baseline")["tube"]["tightening"]
     widths = np.array(tightening["upper"]) - np.array(tightening["lower"])
     rooms = np.minimum(tightening["plan"]["margin_to_lower"], tightening["plan"]["margin_to_upper"])
@@ -142,9 +142,9 @@ def input_set(evidence: Evidence) -> Numbers:
 
 
 def kept_of_level(A: np.ndarray, B: np.ndarray, gain: np.ndarray, shape: np.ndarray) -> float:
-    """Return the largest factor per step on x' P x under u = K x, over all vertices and states.
+    """Return the largest ratio of x' P x after a step to that before it, under u = K x, over all vertices and states.
 
-    Below 1, x' P x decreases. The factor holds for the whole polytope, because x' P x is convex.
+    Below 1, x' P x decreases. It is the maximum over the whole polytope, because x' P x is convex.
 
     Args:
         A: (r, n, n) state matrices of the vertices.
@@ -156,9 +156,9 @@ def kept_of_level(A: np.ndarray, B: np.ndarray, gain: np.ndarray, shape: np.ndar
 
 
 def nominal_law(evidence: Evidence) -> Numbers:
-    """Return the largest factor per step on the nominal Lyapunov functions, and levels of x_n in Case 1.
+    """Return ``kept``, the largest :func:`kept_of_level` of all nominal gains, and values of x_n' P x_n in Case 1.
 
-    A level is x_n' P x_n of the outermost ellipsoid; ``left`` is the last level relative to the ``first``.
+    P is that of the outermost ellipsoid. ``left`` is the value at the end relative to the ``first``.
     """
     flown = design("baseline")
     A, B = flown.polytope.A[:, :N_RIGID, :N_RIGID], flown.polytope.B[:, :N_RIGID]
@@ -194,7 +194,7 @@ def seven_modes(evidence: Evidence) -> Numbers:
 
 
 def underdamped(evidence: Evidence) -> Numbers:
-    """Return the larger damping ratio of the elastic modes, and the rise (dB) by coupling at each one's peak."""
+    """Return the larger elastic damping ratio and by how much (dB) coupling raises the response at each one's peak."""
     raised = _rise()
     first, second = (float(np.interp(peak.frequency, modes.FREQUENCIES, raised)) for peak in modes.peaks(()).values())
     return {
@@ -205,10 +205,10 @@ def underdamped(evidence: Evidence) -> Numbers:
 
 
 def coupling_in_pitch_rate(evidence: Evidence) -> Numbers:
-    """Return the pitch rate's share of three effects of coupling, as ratios of sums of squares.
+    """Return the pitch rate's shares of three effects of coupling: its sum of squares divided by all rigid states'.
 
-    ``onto_rigid``: of the terms by which elastic states act on rigid-body states. ``onto_elastic``: of those in the
-    other direction. ``answer``: of the change of the rigid-body states' response to the elevator.
+    ``onto_rigid``: of the effect of elastic states on rigid-body ones. ``onto_elastic``: of that of rigid-body states
+    on elastic ones. ``answer``: of the change of the rigid-body states' response to the elevator.
     """
     scale = np.array(list(certificate("baseline")["inputs"]["model"]["tensor_product"]["state_scale"].values()))
     models = [modes.linearised(name) for name in ("paper_like", 0.0)]
@@ -244,9 +244,9 @@ def falls(evidence: Evidence) -> Numbers:
 def passed(evidence: Evidence) -> Numbers:
     """Return the effects of the design's filter away from its centre: phase lags (rad) and gains (dB).
 
-    ``lag`` is at the rigid-body crossover of the loop, ``slow_lag`` at 1 rad/s; ``second`` is the reduction of the
-    second peak. ``above`` is the magnitude of the gain at ten times the centre, ``unmatched`` the smallest with the
-    other pole frequencies of Figure 3.
+    ``lag`` is at the rigid-body ``crossover`` of the loop (rad/s), ``slow_lag`` at 1 rad/s; ``second`` is the reduction
+    of the second peak. ``above`` is the magnitude of the gain at ten times the centre, ``unmatched`` the smallest such
+    magnitude of the filters with the other pole frequencies of Figure 3.
     """
     section, crossover = design("baseline").notch[0], float(margins(evidence, {}, notched=False)[0, 0])
     slow_lag, lag = -np.angle(notch_response([section], np.array([1.0, crossover])))
@@ -266,7 +266,8 @@ def passed(evidence: Evidence) -> Numbers:
 def unit_circle(evidence: Evidence) -> Numbers:
     """Return how far the zeros of the discrete filter are from the unit circle, and the benefit of undamped zeros.
 
-    The distances are ``ours`` and, undamped, ``ideal``. Undamped zeros reduce the first peak by ``gained`` (dB) more.
+    ``ours`` is the distance of the design's zeros, ``ideal`` that of undamped ones, which reduce the first peak by
+    ``gained`` (dB) more.
     """
     ours = design("baseline").notch[0]
     ideal = replace(ours, zero_damping=0.0)
@@ -334,7 +335,8 @@ def margins(evidence: Evidence, corner: Corner, *, notched: bool) -> np.ndarray:
 def phase_margin(evidence: Evidence) -> Numbers:
     """Return by how much (rad) the notch filter raises phase margins, with the loop broken at the elevator.
 
-    ``gained``: the rise of the smallest margin, by vehicle. ``rigid``: that of the rigid body's, nominal vehicle.
+    ``gained``: the rise of the smallest of all margins, by vehicle. ``rigid``: the rise at the rigid-body crossover,
+    nominal vehicle, where the margin without the filter counts as positive even if the loop is unstable.
     """
     pairs = [
         [margins(evidence, corner, notched=notched)[:, 1] for notched in (False, True)] for corner in evidence.over
@@ -345,7 +347,7 @@ def phase_margin(evidence: Evidence) -> Numbers:
 
 
 def less_uncertainty(evidence: Evidence) -> Numbers:
-    """Return the largest lumped disturbances in Case 1 with the notch filter, divided by those without, by channel."""
+    """Return the largest disturbances in Case 1 with notch filter, divided by those without, in two channels of W."""
     over = [corner for corner in fraction(load_vehicle().uncertainty) if corner in evidence.over]
     a, b = (largest_disturbances(scenario, over) for scenario in ("case1", "case1_no_notch"))
     return {channel: a[channel].max() / b[channel].max() for channel in ("pitch_acceleration", "acceleration")} | {
@@ -379,7 +381,7 @@ def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.
 
 
 def conforms(evidence: Evidence) -> Numbers:
-    """Return the largest differences (dB, deg) between the co-designed model and the ECM, the extended model.
+    """Return the largest differences (dB, deg) between the responses of the co-designed model and the ECM (eq. 40).
 
     ``low_magnitude`` is the largest difference in magnitude below ``rigid`` (rad/s).
     """
@@ -403,10 +405,10 @@ def stabilises(evidence: Evidence) -> Numbers:
 
 @cache
 def sets(evidence: Evidence) -> Numbers:
-    """Return half-widths of sets, by state, relative to those of Z, the invariant set under F' for the disturbances W.
+    """Return half-widths of sets divided, state by state, by those of Z; Z is the invariant set for W under F'.
 
-    ``measured``: the set under F' for W'; ``halved``: for W / 2. ``flown``: Z' of the shipped design, ``mean`` over its
-    states. ``flown_scaled``: the same Z', relative to tau Z.
+    ``measured``, ``halved``: of the invariant sets under F' for W' and for W / 2. ``flown``: of Z', the shipped
+    design's set; ``mean``: the mean of ``flown``. ``flown_scaled``: ``flown`` divided by tau, to compare Z' with tau Z.
     """
     flown, inputs, ones = design("adjustable"), inputs_of("adjustable"), np.ones(N_RIGID)
     complete, incomplete = (

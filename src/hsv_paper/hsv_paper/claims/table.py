@@ -156,7 +156,7 @@ class Claim(BaseModel, frozen=True, extra="forbid"):
 
 @dataclass(frozen=True)
 class _Measured:
-    """The evidence that a claim's rows are measured with, and the numbers of the claim's function by name."""
+    """The evidence for a claim, and by name the ``numbers`` that the claim's function returns from this evidence."""
 
     evidence: Evidence
     numbers: dict[str, Any]
@@ -182,7 +182,7 @@ class _Measured:
         """Return the number (SI) that a row measures for a kind of vehicle: uncertain, nominal or worst.
 
         The worst value over all vehicles is the smallest if the row has a lower threshold, else the largest, which is
-        infinite if a vehicle has no value. A row with ``beyond`` counts the vehicles whose value is larger or missing.
+        infinite if a vehicle has no value. A row with ``beyond`` counts the vehicles that exceed it or have no value.
         """
         if vehicle == "uncertain":
             return float(self._of_flights(row, self.evidence.uncertain))

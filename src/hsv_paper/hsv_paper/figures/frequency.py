@@ -26,7 +26,7 @@ _WITHOUT = {"color": plots.RED, "linestyle": "--"}
 
 
 def figure_02() -> Figure:
-    """Draw the Bode diagram, elevator to pitch rate, of the polytopic and decoupled models between the samples."""
+    """Draw the Bode diagram, elevator to pitch rate, of the polytopic and the decoupled model at :data:`BETWEEN`."""
     flown, frequencies = design("baseline"), np.logspace(-2.0, 2.0, 600)
     exact = zero_order_hold(*linearise(load_vehicle().decoupled, *BETWEEN), flown.period)
     polytopic = flown.polytope.at(*BETWEEN)

@@ -36,7 +36,7 @@ _SIZE = N_STATES + N_INPUTS + 1
 class Point:
     """A first guess, an iterate or an optimum: the scalar s, the states (N + 1, 9) and the inputs (N, 2).
 
-    multipliers: (N, 9) scaled sensitivities of the cost to the equations of the states, the costates.
+    multipliers: The costates, shape (N, 9): sensitivities of the cost to the scaled defects of each period.
     """
 
     scalar: float
@@ -45,7 +45,7 @@ class Point:
     multipliers: np.ndarray
 
     def finer(self, factor: int) -> Point:
-        """Return the point with each period divided into ``factor``: states are interpolated, the rest repeated."""
+        """Return the point with ``factor`` times the periods: states interpolated, inputs and multipliers repeated."""
         n = len(self.input)
         fine = np.arange(n * factor + 1) / factor
         state = np.stack([np.interp(fine, np.arange(n + 1), column) for column in self.state.T], axis=1)
@@ -57,10 +57,10 @@ class Problem:
     """The problem of the least scalar s. Unknowns: s, the states at the ends of N periods, the inputs held over each.
 
     Args:
-        period, period_slope: shape (N,) each; the length of a period in seconds is period + s period_slope.
+        period, period_slope: The lengths of the periods in seconds are period + s period_slope, shape (N,).
         substeps: Number of Runge-Kutta steps of each period, shape (N,).
-        inputs, inputs_slope: (2, N, 2) lower and upper bounds of the inputs, inputs + s inputs_slope; if equal, fixed.
-        states: (2, N + 1, 9) lower and upper bounds of the states; if equal, as at the beginning, fixed.
+        inputs, inputs_slope: The bounds of the inputs are inputs + s inputs_slope, shape (2, N, 2), lower ones first.
+        states: Bounds of the states, shape (2, N + 1, 9), lower ones first. Equal ones fix an input or a state.
         at_rest: Whether the last state must be an equilibrium with the last input.
         scalar: Range of s.
         cost: Weight of s against the defects, which are relative to :data:`STATE_SCALE`.
@@ -156,9 +156,10 @@ def curvatures(
     vehicle: VehicleParameters,
     weights: np.ndarray,
 ) -> np.ndarray:
-    """Return the second derivatives (N, 12, 12) of the N periods' final states, summed with ``weights`` (N, 9).
+    """Return the second derivatives, shape (N, 12, 12), of the weighted sums of N periods' final states.
 
-    They are by state, input and period length, as differences of complex steps; those by elastic states stay zero.
+    The ``weights`` have shape (N, 9). The derivatives are by initial states, inputs and period length, as differences
+    of complex steps; those by elastic states are left zero.
     """
     reach = {0: 1.0, 1: 1.0, 2: 1e-4, 3: 1e-4, 4: 1e-4, 9: 1e-3, 10: 1e-3, 11: 1e-5}
     curved = list(reach)
@@ -176,9 +177,9 @@ def curvatures(
 
 
 class _Local:
-    """The convex programme about a point. Unknowns: scaled changes of states 1 to N, of inputs and of s; slacks.
+    """The convex programme about a point, for scaled changes of states 1 to N, of the inputs and of s.
 
-    Each equation has two slacks, its positive and its negative residual.
+    Each equation adds two unknowns, the slacks: its positive and its negative residual.
     """
 
     def __init__(self, problem: Problem, point: Point) -> None:
@@ -219,7 +220,7 @@ class _Local:
         self._bound()
 
     def _bound(self) -> None:
-        """Write equations and bounds as rows of one matrix; a bound is lower <= z - slope ds <= upper."""
+        """Write equations and bounds as rows of one matrix; unknown z: lower <= z - slope (change of s) <= upper."""
         problem, point, n, size = self._problem, self._point, len(self._point.input), self._equations.shape[1]
         sizes = np.concatenate((np.tile(STATE_SCALE, n), np.tile(INPUT_SCALE, n), [1.0]))
         value = np.concatenate((point.state[1:].ravel(), point.input.ravel(), [point.scalar]))
@@ -246,7 +247,7 @@ class _Local:
     def step(self, weight: float, missed: np.ndarray | None = None) -> tuple[Point, float]:
         """Return the next point for a proximal ``weight``, and the predicted decrease of the merit.
 
-        ``missed``: None, or the defects after the last step with this weight, for which the step is then corrected.
+        ``missed``: The defects after the last step with this weight, to correct that step for them; None: a new step.
 
         Raises:
             DesignError: The solver fails.

@@ -1,8 +1,8 @@
-"""The two problems: the fastest transfer of Case 1's step, and the deepest loss of elevator effectiveness.
+"""Two optimal control problems: the fastest transfer of Case 1, and the deepest loss of elevator effectiveness.
 
-The transfer leads the simulated vehicle from one trim of the step to the other, with any inputs in U. "Fastest" has two
-meanings. Either all states are at rest in the target's trim. Or, as settling times are measured, altitude and velocity
-are within 2 % of their steps, and stay there until the vehicle is at rest.
+The transfer leads the simulated vehicle from trim at the start to trim at the target, with any inputs in U. Its time
+ends in one of two ways: when all states are at rest in the target's trim; or, as settling times are measured, when
+altitude and velocity are within 2 % of their total changes, and stay there until the vehicle is at rest.
 
 In the second problem, the vehicle is in its trim at the target when the effectiveness falls from 1 to P: only P times
 the elevator command acts. The trim's command is kept during a delay; afterwards any inputs in U are permitted.
@@ -43,12 +43,12 @@ COST = 10.0
 
 
 def transfer(vehicle: VehicleParameters, periods: int, *, settling: bool, rest: float = REST) -> Problem:
-    """Return the problem of the least time s (s) of the transfer from Case 1's start to its target.
+    """Return the problem of the least time s, in seconds, of the transfer from Case 1's start to its target.
 
     Args:
         periods: Number of periods of equal length, with held inputs, within that time.
-        settling: Whether the time ends when altitude and velocity are within 2 % of their steps; the vehicle is at rest
-            a share ``rest`` of that time later. Otherwise the time ends at rest.
+        settling: Whether s is the time until altitude and velocity stay within 2 % of their total changes; the vehicle
+            is at rest after ``rest`` times s more. Otherwise s is the time until rest.
     """
     start, target = trim(vehicle, *START), trim(vehicle, *TARGET)
     total = periods + (round(rest * periods) if settling else 0)
@@ -92,7 +92,7 @@ def recovery(vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizo
         envelope: The vehicle whose envelope of commands must contain the final trim.
         delay: Time (s) for which the trim's command is kept.
         horizon: Time from the fault to the final trim (s).
-        divide: Number of parts into which these intervals are divided, for a finer mesh.
+        divide: Number of parts into which each of these intervals is divided, for a finer mesh.
     """
     before = trim(vehicle, *TARGET)
     held: list[int] = []
@@ -132,7 +132,7 @@ def static_limit(vehicle: VehicleParameters, points: np.ndarray) -> float:
 
 
 def envelope_points(envelope: Vehicle) -> np.ndarray:
-    """Return nine pairs (9, 2) of altitude (m) and velocity (m/s): corners, sides and centre of the envelope."""
+    """Return nine pairs (9, 2) of altitude (m) and velocity (m/s): a grid of three by three over the envelope."""
     return np.array([*product(*(np.linspace(*axis, 3) for axis in (envelope.altitude_range, envelope.velocity_range)))])
 
 

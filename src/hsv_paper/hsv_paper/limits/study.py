@@ -83,9 +83,9 @@ def fault_row(fault: Optimum, delay: float) -> dict[str, Any]:
 def corner_limits(
     vehicle: VehicleParameters, envelope: Vehicle, over: Sequence[Corner], delays: tuple[float, ...]
 ) -> np.ndarray:
-    """Return the least effectiveness for which each column holds, shape (vehicles, 2 + delays).
+    """Return the least effectiveness by vehicle and condition, shape (vehicles, 2 + delays).
 
-    Columns: a trim at the target exists, a trim in the envelope exists, the nose can be turned down after each delay.
+    Conditions: a trim at the target exists; one in the envelope exists; after each delay, the nose can be turned down.
     """
     points = problems.envelope_points(envelope)
     rows = []
@@ -151,9 +151,9 @@ def run(scope: Scope) -> Outcome:
 
 
 def settling_times(flight: Flight) -> np.ndarray:
-    """Return the times (s) from which altitude and velocity, in this order, stay at the target until the fault.
+    """Return the settling times (s) of altitude and velocity, in this order; infinite if unsettled at the fault.
 
-    The target is the last reference, within 2 % of its distance from the first state. Infinite: not settled by then.
+    Settled means within 2 % of the distance from the first state to the last reference, from then on until the fault.
     """
     before = flight.time < (np.inf if flight.fault_start is None else flight.fault_start - 1e-9)
     target = flight.reference[-1, :2]

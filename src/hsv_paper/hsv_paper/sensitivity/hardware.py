@@ -55,7 +55,7 @@ def elevator(bandwidth: float, delay: float = 0.0) -> Hardware:
 
 
 def growth(case: Controller, hardware: Hardware, over: Corners = NOMINAL) -> float:
-    """Return the largest growth (1/s) of all vehicles, at both ends of Case 1's step, before and after the fault."""
+    """Return the largest growth (1/s) of all vehicles, at Case 1's start and target, before and after the fault."""
     return replace(case.loop, hardware=hardware).growth(case.vehicle, over)
 
 
@@ -65,9 +65,9 @@ def tolerated_delay(case: Controller, hardware: Hardware, over: Corners = NOMINA
 
 
 def rms(case: Controller, hardware: Hardware, sensors: str) -> float:
-    """Return the rms elevator command (rad) due to the noise of a set of sensors, at the worse end of Case 1's step.
+    """Return the rms elevator command (rad) due to the noise of a set of sensors.
 
-    It is NaN if the loop is unstable at either end.
+    It is the larger one of those at Case 1's start and target, without its fault; NaN if either loop is unstable.
     """
     channels = SENSOR_SETS[sensors].channels
     noise = np.array([channels.get(name, {}).get("noise", 0.0) for name in STATE_NAMES])

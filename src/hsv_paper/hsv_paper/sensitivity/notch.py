@@ -89,8 +89,8 @@ def run(scope: Scope) -> Outcome:
 def stable_range(coupled: Controller, over: Corners, centres: np.ndarray, depths: np.ndarray) -> dict[str, str]:
     """Return table cells: ranges of centre and zero damping in which the loops of all vehicles ``over`` are stable.
 
-    The centre (rad/s) varies at the baseline's zero damping, and the zero damping, upwards, at the baseline's centre.
-    The limits are bracketed in ``centres`` and ``depths``, values of the zero damping.
+    The limits of the centre (rad/s), at the baseline's zero damping, lie on both sides of the most stable centre and
+    are bracketed by ``centres``. That of the zero damping, at the baseline's centre, is bracketed by ``depths``.
     """
     own = design("baseline").notch[0]
     around = np.union1d(centres, own.zero_frequency)

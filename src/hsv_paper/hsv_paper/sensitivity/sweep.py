@@ -163,7 +163,7 @@ def legend(figure: Figure, *, shares: bool) -> None:
 
 
 def lost_where(x: np.ndarray, columns: Columns, digits: int = 2, *, rising: bool = True) -> dict[str, str]:
-    """Return table cells with the values between which saturation, losses and the loss of the nominal vehicle begin.
+    """Return table cells: the intervals of ``x`` in which saturation, losses and the nominal vehicle's loss begin.
 
     Args:
         x: Values along the sweep, increasing.
