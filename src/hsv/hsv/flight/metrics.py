@@ -85,9 +85,9 @@ METRICS = {
     ),
     "elastic_rate_2_decay_time": Metric("s", "the same for the second mode", Group.modes),
     "elastic_decay_time": Metric("s", "the slower of the two", Group.modes),
-    "fuel_equivalence_ratio_minimum": Metric("1", "least command", Group.inputs),
+    "fuel_equivalence_ratio_minimum": Metric("1", "smallest command", Group.inputs),
     "fuel_equivalence_ratio_maximum": Metric("1", "largest command", Group.inputs),
-    "elevator_deflection_minimum": Metric("rad", "least command", Group.inputs),
+    "elevator_deflection_minimum": Metric("rad", "smallest command", Group.inputs),
     "elevator_deflection_maximum": Metric("rad", "largest command", Group.inputs),
     "saturated_steps": Metric("1", "steps in which a command was limited", Group.inputs, counted=True),
 }

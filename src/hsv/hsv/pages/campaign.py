@@ -126,13 +126,13 @@ def sentence(results: Results) -> str:
     """Return the verdict: how many flights keep all limits, which limit is violated most often, how many are lost."""
     ended, *limited = judged = shares(results)
     lost = ended.flights - ended.within
-    ending = f"{lost} of {ended.flights} flights did not come to their end" if lost else "All flights came to their end"
+    ending = f"{lost} of {ended.flights} flights did not reach the end" if lost else "All flights reached the end"
     if not limited:
         return f"{ending}; there are no limits to judge them by."
     text = f"{within_all(results)} of {ended.flights} flights are within all {len(limited)} limits"
     if failed := most_failed(judged):
         broken = failed.flights - failed.within
-        text += f"; most often not kept is the limit of {in_words(failed.name)}, by {broken} of {ended.flights}"
+        text += f"; the limit that most flights break is {in_words(failed.name)} ({broken} of {ended.flights})"
     return f"{text}. {ending}."
 
 
