@@ -50,7 +50,8 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
 
     W' is W with the fault and the parameter bounds scaled by tau (paper eq. 47). Z' is invariant under tau F' and under
     F', so that tau may change in flight between its value here and 1. The paper's Z' = tau Z would require W' = tau W
-    under F'; the half-widths of tau Z are reported for comparison. The bounds of |u_n| for K' grow with U minus F' Z'
+    under F'; the half-widths of tau Z are reported for comparison. The bounds of |u_n| for K' are those in ``inputs``
+    times the ratio of the room about the target's trim within U minus F' Z' to that within U minus F Z for tau = 1
     (eq. 52, eq. 53).
 
     Arguments and errors are those of :func:`hsv.design.baseline.design_baseline`. DesignError is also raised if
@@ -150,9 +151,9 @@ def _report(
 def certified_loops(design: ControlDesign, vehicle: Vehicle, effectiveness: float) -> np.ndarray:
     """Return the closed-loop state matrices (r, n, n) of error and notch filter that must share a Lyapunov function.
 
-    There is one for each vertex, elevator effectiveness (1, ``effectiveness``) and tube factor (the smallest, 1); the
-    vertex varies fastest, the tube factor slowest. If the smallest factor is 1, it is the only one. n: five rigid
-    states, then those of the filter.
+    There is one for each combination of tube factor (the smallest, then 1; 1 alone if they are equal), elevator
+    effectiveness (1, then ``effectiveness``) and vertex, in the order of nested loops: the vertex varies fastest.
+    n: five rigid states, then those of the filter.
     """
     polytope, model = design.polytope, ChannelModel(design, vehicle)
 
@@ -166,10 +167,10 @@ def certified_loops(design: ControlDesign, vehicle: Vehicle, effectiveness: floa
 def relaxed_bound(
     bound: np.ndarray, trim_input: np.ndarray, complete: TightenedInputs, incomplete: TightenedInputs
 ) -> np.ndarray:
-    """Return the bounds of |u_n| in eq. 52, shape (2,): ``bound`` times the growth of the tightened inputs, rounded.
+    """Return the bounds of |u_n| in eq. 52, shape (2,): ``bound`` times a ratio of tightened inputs, rounded.
 
-    The growth is the size of U minus F' Z' (``incomplete``) over that of U minus F Z at tau = 1 (``complete``). This
-    size is the distance, by input, from the target's ``trim_input`` to the nearer bound (paper eq. 53).
+    The ratio divides the room within ``incomplete``, U minus F' Z', by that within ``complete``, U minus F Z for
+    tau = 1. This room is the distance, by input, from the target's ``trim_input`` to the nearer bound (paper eq. 53).
 
     Raises:
         DesignError: The trim input is not inside the tightened bounds for tau = 1 or for the tau of the design.

@@ -185,7 +185,7 @@ def disturbance_columns(inputs: DesignInputs) -> np.ndarray:
 
 
 def _literal(inputs: DesignInputs, bounds: TightenedInputs) -> DesignInputs:
-    """Return ``inputs`` with the largest |u_n| (eq. 35) inside the tightened ``bounds`` about the target's trim."""
+    """Return ``inputs`` with the largest bounds of |u_n| (35) that keep u_n plus the target's trim in ``bounds``."""
     target = inputs.nominal.target
     bound = bounds.symmetric(trim(inputs.flown_vehicle.decoupled, target.altitude, target.velocity).input)
     if not bound.min() > 0.0:

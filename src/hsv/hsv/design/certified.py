@@ -69,7 +69,7 @@ def load_certified(path: Path) -> CertifiedDesign:
 
 @dataclass(frozen=True)
 class Plan:
-    """The plan (nominal trajectory) of ``flight``, a simulation of the nominal vehicle; its arrays have k rows.
+    """The plan (nominal trajectory) of ``flight``, a simulation of the nominal vehicle; k rows, one for each step.
 
     Methods that return bounds multiply them by :attr:`inflation`, like the bounds of the disturbance set.
     """
@@ -129,10 +129,10 @@ class Plan:
         return self.inflation * largest
 
     def remeasured(self, equipment: Mapping[str, Any]) -> np.ndarray:
-        """Return by how much disturbances in flights with ``equipment`` exceed certified bounds, by channel; else 0.
+        """Return by how much disturbances in flights with ``equipment`` exceed the certified bounds, by channel, or 0.
 
-        Sensor noise moves the elevator, and the model does not explain all of the response. The unexplained part is
-        measured in flights of the nominal vehicle and 32 corners, and inflated. ``equipment``: flat sensor parameters.
+        Sensor errors move the elevator, and the polytopic model predicts the response only in part. The rest is
+        measured in flights of the nominal vehicle and of 32 corners, and inflated. ``equipment``: sensor parameters.
 
         Raises:
             DesignError: A flight diverges or saturates an input.

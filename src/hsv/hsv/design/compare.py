@@ -22,8 +22,9 @@ from hsv.model.signals import N_RIGID
 class Row:
     """A row of the comparison: one kind of set with its half-widths and the half-range of its feedback by input, SI.
 
-    ``note``: the error if there is no such set or no range of an input is left. ``size``: geometric mean of the scaled
-    half-widths of the rigid states. ``lower`` and ``upper``, shape (2,): tightened bounds of u_n + u_r, or None.
+    ``note``: error message if there is no such set or its feedback needs the whole range of an input. ``size``:
+    geometric mean of the scaled half-widths of the rigid states. ``lower`` and ``upper``, shape (2,): tightened bounds
+    of u_n + u_r, or None.
     """
 
     name: str

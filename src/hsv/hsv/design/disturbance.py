@@ -203,7 +203,7 @@ def decompose(
 
 
 def scheduled(polytope: Polytope, points: np.ndarray) -> np.ndarray:
-    """Return [A(p), B(p)] (n, 9, 11) (paper eq. 11) at ``points`` (n, 2), altitude (m) and velocity (m/s)."""
+    """Return [A(p), B(p)] of paper eq. 11, shape (n, 9, 11), at ``points`` (n, 2): altitude (m) and velocity (m/s)."""
     data, S = polytope.data(), np.empty((len(points), N_STATES, N_STATES + N_INPUTS))
     for point, found in zip(points.tolist(), S, strict=True):
         lib.hsv_schedule(data.pointer, *point, doubles(found))
@@ -253,7 +253,7 @@ class DisturbanceSet:
         """Return the largest ratio of the disturbances (n, 7) of a flight to their bounds, with channel and step.
 
         A positive disturbance is divided by the upper bound, a negative one by the lower; if that bound is zero,
-        the ratio is infinite.
+        the ratio is infinite. The ratio of a zero disturbance is 0.
         """
         bounds = np.where(channels > 0.0, self.upper, self.lower)
         ratios = np.full(channels.shape, np.inf)

@@ -74,8 +74,8 @@ class FeedbackGain:
     """The feedback gain F = M N^-1 with its evidence.
 
     ``F`` (m, n) and ``N`` (n, n) in SI, rounded; ``M`` (m, n) = F N. ``residuals`` (r): smallest eigenvalue of eq. 24
-    at each vertex, recomputed with N scaled to the identity. The root of e' N^-1 e shrinks in each step at least by the
-    factor 1 - residual. ``radii`` (r): closed-loop spectral radii.
+    at each vertex, recomputed with N scaled to the identity. After a step at a vertex, sqrt(e' N^-1 e) is at most
+    (1 - residual) times its value before. ``radii`` (r): closed-loop spectral radii.
     """
 
     F: np.ndarray

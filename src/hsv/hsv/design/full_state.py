@@ -27,8 +27,8 @@ def full_state_report(
 ) -> dict[str, Any]:
     """Return the full-state gain, compared with the structured gain on the coupled vehicle, for JSON.
 
-    ``largest_real_part`` in it is the real part (1/s) of the rightmost closed-loop pole, for each gain and each set of
-    inertial coupling. The loop is sampled, with the coupled ECM at the target's trim, at the tube factor 1.
+    ``largest_real_part``: by gain and by set of inertial coupling, the real part (1/s) of the rightmost pole of the
+    sampled loop, log(spectral radius) / period, with the coupled ECM at the target's trim and the tube factor 1.
 
     Args:
         inputs: Scales and target of the design.

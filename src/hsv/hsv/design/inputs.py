@@ -160,7 +160,7 @@ class FeedbackInputs(_Table):
 
 
 class NominalInputs(_Table):
-    """Inputs of the nominal gains K (paper eq. 32 to 35): one for each of ``scales`` times x_n(0) = start - target."""
+    """Inputs of the nominal gains K (eq. 32 to 35), one for each of the ``scales`` of x_n(0) = start - target."""
 
     interpolated: bool | None = None
     """True: the gain is interpolated between two ellipsoids. False or None: it is switched."""
@@ -202,7 +202,7 @@ class RampInputs(_Table):
 
 
 def _coupling(value: Any) -> Any:
-    """Return ``value`` as text if it is a number, a multiple of the derived coupling; else return it unchanged."""
+    """Return a number, which is a multiple of the derived coupling, as text, and any other ``value`` unchanged."""
     try:
         return value if isinstance(value, bool) else repr(float(value))
     except (TypeError, ValueError):
@@ -289,7 +289,7 @@ def _vehicle_values(vehicle: Vehicle | None) -> dict[str, Any] | None:
 
 
 def _vehicle(value: Any, info: ValidationInfo) -> Vehicle | None:
-    """Return the vehicle given by name, path or certificate table; None: the default one, unnamed in old designs."""
+    """Return the vehicle given by name, path or certificate table; None if it is the default one, as if not given."""
     if info.context == _SI:
         return Vehicle.from_parameters(value)
     if not isinstance(value, str):
@@ -299,7 +299,7 @@ def _vehicle(value: Any, info: ValidationInfo) -> Vehicle | None:
 
 
 class DesignInputs(_Table):
-    """All inputs of a design, in SI: with ``adjustable`` that of the paper's section 4, else that of section 3."""
+    """All inputs, in SI, of a design: adjustable (paper section 4) if ``adjustable`` is given, else a baseline."""
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
 

@@ -31,8 +31,8 @@ from hsv.model.vehicle import Vehicle
 class DesignModel:
     """The polytopic model of a design as computed (``found``), and a ``report`` on it, ready for JSON.
 
-    ``polytope``: the rounded vertices of the design file, for the nine states of the vehicle. ``whole``: the same for
-    the DM; for the ECM the filtered pitch rate takes the place of the true one, and the filter states follow the nine.
+    ``polytope``: the rounded vertices of the design file, for the nine states of the vehicle. ``whole``: for the DM,
+    ``polytope``; for the ECM, not rounded: the filtered pitch rate replaces the true one, and filter states follow.
     """
 
     found: polytopic.PolytopicModel
@@ -91,7 +91,7 @@ def design_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[NotchSec
 
 
 def _rounded(polytope: Polytope, state_scale: np.ndarray, input_scale: np.ndarray) -> Polytope:
-    """Return the vertices rounded to :data:`VERTEX_DIGITS` digits below the scales; rounding noise becomes zero."""
+    """Return ``polytope`` rounded to :data:`VERTEX_DIGITS` digits relative to the scales; rounding noise becomes 0."""
     A = rounded(polytope.A, state_scale[:, None] / state_scale, VERTEX_DIGITS)
     B = rounded(polytope.B, state_scale[:, None] / input_scale, VERTEX_DIGITS)
     return Polytope(A, B, polytope.altitude, polytope.velocity)

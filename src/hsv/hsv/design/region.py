@@ -1,9 +1,10 @@
 """The declared region of a design: the flights over which its disturbances are measured (paper eq. 17, eq. 19, eq. 47).
 
-    W = {Delta: lower <= Delta <= upper in all flights},   W'(tau): the same with tau times fault and parameter bounds.
+    W = {Delta: lower <= Delta <= upper},   lower and upper: extremes of Delta in the flights.
 
-The flights are simulated with the full closed loop: the coupled vehicle, the notch filter, the gains of the design, its
-step or ramp from start to target, and the fault. The parameters are nominal or at the corners of their bounds.
+W'(tau) is the same set for flights with tau times the fault and tau times the parameter bounds. The flights are
+simulated with the full closed loop: the coupled vehicle, the notch filter, the gains of the design, its step command or
+ramp from start to target, and the fault. The parameters are nominal or at the corners of their bounds.
 """
 
 from __future__ import annotations
@@ -37,9 +38,9 @@ def incomplete_share(inputs: DesignInputs) -> float:
 
 
 class Region:
-    """The flights of a design in its declared region: corners of the parameter bounds times ``share``, with the fault.
+    """The flights of a design in its declared region: nominal vehicle and corners of parameter bounds, with the fault.
 
-    The share also multiplies the fault (paper eq. 47). ``equipment``: flat parameters of non-ideal hardware and air.
+    ``share`` multiplies the bounds and the fault (paper eq. 47). ``equipment``: flat parameters of hardware and air.
     """
 
     def __init__(
@@ -93,9 +94,9 @@ def _checked(corner: Corner, flight: Flight) -> Flight:
 
 @dataclass(frozen=True)
 class RegionResult:
-    """Extremes over ``flights`` flights, SI: of the ``channels``; by state, of ``remainder`` f, ``fault`` w, ``delta``.
+    """Extremes over all flights, SI: of ``channels``, and by state of f (``remainder``), w (``fault``) and ``delta``.
 
-    ``lag_feedback``, by input: feedback due to the actuators' lag behind the plan, zero for ideal actuators.
+    ``lag_feedback``: feedback due to the actuators' lag behind the plan, by input; 0 if ideal. ``flights``: how many.
     """
 
     flights: int

@@ -46,7 +46,8 @@ def tighten(
 ) -> TightenedInputs:
     """Return U minus F Z (paper eq. 30, eq. 53) for inputs U from ``minimum`` to ``maximum``.
 
-    ``lag``: minimum and maximum, shape (2,) each, of the feedback due to the actuators' lag; None: no lag.
+    ``lag``: smallest and largest additional feedback, shape (2,) each, in response to the actuators' lag behind the
+    plan; None: ideal actuators.
 
     Raises:
         DesignError: The feedback needs the whole range of an input.
@@ -75,9 +76,9 @@ def left_by(
 def plan_bounds(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray) -> PlanBounds:
     """Return bounds of other nominal plans, within which the disturbance set should hold; flights have to confirm it.
 
-    Another plan may hold an input for a long time that the certified plans reach only briefly. Its input ranges are
-    therefore those of the certified plans, moved down by 5 % of their widths. The pitch acceleration has the range of
-    the certified plans.
+    Another plan may hold a large input for a long time that the certified plans reach only briefly. Its input range is
+    therefore the range in the certified plans, both ends of which are lowered by 5 % of its width. The range of the
+    pitch acceleration is unchanged.
 
     Args:
         bounds: The tightened bounds.

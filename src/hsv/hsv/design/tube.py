@@ -87,7 +87,7 @@ class MeasuredSet:
 def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, progress: Progress) -> MeasuredSet:
     """Return the invariant set of ``design`` for the disturbances measured over ``region``.
 
-    The flights are those of :meth:`Region.fraction`: the nominal vehicle and a quarter of the corners, or all.
+    The flights are those of :meth:`Region.fraction`: the nominal vehicle, and all corners or a quarter of them.
 
     Raises:
         DesignError: A flight diverges or saturates; no invariant set was found, or it fails when recomputed; or its
@@ -110,7 +110,7 @@ def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, pr
 def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress) -> Tube:
     """Return the certified tube of ``design`` for its declared region, with evidence from flights at all corners.
 
-    The disturbances are measured only at corners of :meth:`Region.fraction`; flights at other corners are independent.
+    The disturbances are measured only in flights of :meth:`Region.fraction`; any others test the set independently.
 
     Raises:
         DesignError: As for :func:`measured_set`, or if the nominal plan exceeds the tightened bounds.

@@ -31,8 +31,8 @@ class TubeProblem:
     def columns(self, centre: np.ndarray) -> np.ndarray:
         """Return the columns (r, n, d + 1) by which the disturbances, scaled to at most 1, act on e - ``centre``.
 
-        The last column is constant: the drift of the centre in one step, with all disturbances at their mid-points. No
-        choice of the centre makes it zero at every vertex.
+        The last column is constant: the drift of the centre in one step, with all disturbances at their mid-points. In
+        general, no choice of the centre makes it zero at every vertex.
         """
         A, G = self.system.A, self.system.G
         drift = A @ centre + G @ self.disturbance.centre - centre

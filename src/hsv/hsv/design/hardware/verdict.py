@@ -85,7 +85,8 @@ class Verdict:
     """Verdict on a design with models of hardware and air: its invariant set, and the margins of the plan, SI.
 
     ``half_width``: of the rigid states; ``feedback``: half-range by input. ``room[i]``: margins of the plan to the
-    lower and upper tightened bound of input i; it fits if they are positive. ``reason``: why, if they do not decide.
+    lower and upper tightened bound of input i; it fits if they are positive. ``reason``: why ``room`` is None; for a
+    verdict on limits of actuators, the text of :meth:`said`.
     """
 
     name: str

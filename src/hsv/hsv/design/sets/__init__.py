@@ -1,1 +1,1 @@
-"""Robust invariant sets of the error system (for paper eq. 25 to eq. 28): an ellipsoid, and narrower star norms."""
+"""Robust invariant sets of the error system, in place of the box of eq. 25 to 28: ellipsoid and narrower star norms."""

@@ -1,7 +1,7 @@
-"""The invariant set of the tube: an ellipsoid {c + v: v' Q^-1 v <= 1}, which star norms may narrow (for paper eq. 26).
+"""The tube's invariant set, in place of eq. 26: an ellipsoid {c + v: v' Q^-1 v <= 1}, which star norms may narrow.
 
-At vertex i, v+ = A_i v + G_i d with |d_j| <= 1; the last d_j is constant, for the drift of the centre. By the
-S-procedure v stays inside if there are lam and l_j >= 0 with sum l_j <= 1 - lam and
+At vertex i the next v is v+ = A_i v + G_i d with |d_j| <= 1; the last d_j is constant, for the drift of the centre c.
+By the S-procedure v stays inside if there are lam and l_j >= 0 with sum l_j <= 1 - lam and
 
     [lam Q, 0, Q A_i'; 0, diag(l), G_i'; A_i Q, G_i, Q] >= 0.
 
@@ -44,7 +44,7 @@ class InvariantSet:
     """A set centre + Z that the error never leaves, with its evidence; SI.
 
     ``centre`` c (n), ``Q`` (n, n), ``contraction`` lam, ``multipliers`` l (r, d + 1). With ``star_norms`` the set is
-    the intersection of the ellipsoid with the sets of the star norms; each half-width is then the smaller of the two.
+    the ellipsoid's intersection with theirs; rigid states and feedback then have the smaller of the two half-widths.
     """
 
     problem: TubeProblem
@@ -83,9 +83,10 @@ class InvariantSet:
         return np.asarray(np.einsum("...i,ij,...j->...", v, inverse(self.Q), v))
 
     def residuals(self) -> np.ndarray:
-        """Return the smallest eigenvalue (r) of the inequality at each vertex; above zero: invariant (for eq. 27).
+        """Return the margin (r) of the module's inequality at each vertex, in place of eq. 27; above zero: it holds.
 
-        It is that of the Schur complement, with Q and the diagonal scaled to the identity.
+        It is the smallest eigenvalue of I - M M' with M = L^-1 [A L / sqrt(lam), G / sqrt(l)] and Q = L L', the scaled
+        Schur complement.
         """
         columns = self.problem.columns(self.centre) / np.sqrt(self.multipliers)[:, None, :]
         return 1.0 - image(self.Q, "ellipsoid: Q", self.problem.system.A / np.sqrt(self.contraction), columns) ** 2
@@ -144,7 +145,7 @@ class InvariantSet:
 def ellipsoid(
     problem: TubeProblem, state_scale: np.ndarray, input_scale: np.ndarray, contractions: list[float]
 ) -> InvariantSet:
-    """Return the ellipsoid with the smallest sum of squares of scaled half-widths and feedback (for paper eq. 26).
+    """Return the ellipsoid with the least sum of squares of scaled half-widths and feedback, in place of paper eq. 26.
 
     Args:
         problem: Error system and disturbances.

@@ -8,8 +8,8 @@ for a contraction lam,
     Q - A_i Q A_i' / lam - g_i g_i' / (1 - lam) >= 0.
 
 An output row of the error is then at most sum_j sqrt(row Q_j row') from its centre. Each row has its own ellipsoids,
-which minimise its bound. The intersection, over all rows, of the sums of ellipsoids is invariant, and the bounds of all
-rows hold in it.
+which make its bound small. The intersection, over all rows, of the Minkowski sums of their ellipsoids is invariant, and
+the bounds of all rows hold in it.
 """
 
 from __future__ import annotations
@@ -61,9 +61,9 @@ class StarNorms:
         return np.asarray(np.sqrt(np.einsum("ki,kjil,kl->kj", rows, self.Q, rows)).sum(axis=1))
 
     def residuals(self, problem: TubeProblem, centre: np.ndarray) -> np.ndarray:
-        """Return the smallest eigenvalue over the vertices of each inequality (7, d + 1); above zero: invariant.
+        """Return the margin of the module's inequality, shape (7, d + 1), by row and channel; above zero: it holds.
 
-        Q is scaled to the identity. The value is infinite for a channel without effect.
+        It is the smallest eigenvalue over all vertices, Q scaled to the identity; infinite if a channel has no effect.
 
         Raises:
             DesignError: A Q is not positive definite.
@@ -80,11 +80,11 @@ class StarNorms:
     def level_at_start(self, problem: TubeProblem, centre: np.ndarray, error: np.ndarray | None = None) -> float:
         """Return an upper bound of the level of an initial ``error`` (None: zero) in the set of the star norms.
 
-        If it is at most 1 the error is inside: the error minus the centre is then a sum of terms v, one per channel,
-        each in its ellipsoid. The result is the largest v' Q^-1 v over all rows and channels. For zero error, each term
-        is minus the steady response of the mean vertex to the mid-point of the channel; the last channel with an effect
-        takes the remainder. ``error`` is added to one term, for each row to the one that gives the smallest result.
-        If no channel has an effect, the result is zero for an error at the centre, else infinite.
+        The error minus the centre is split into terms v, one for each channel. The result is the largest v' Q^-1 v over
+        all rows and channels; if it is at most 1, each v lies in its ellipsoid, and the error in the set. For zero
+        error, v is minus the steady response of the mean vertex to the mid-point of the channel; the last channel with
+        an effect takes the remainder. Another ``error`` is added to one v, for each row to that with the smallest
+        result. If no channel has an effect, the result is zero for an error at the centre, else infinite.
         """
         mean = problem.system.A.mean(axis=0)
         G, acting = problem.system.G.mean(axis=0), np.flatnonzero(problem.columns(centre).any(axis=(0, 1)))
@@ -178,10 +178,10 @@ def star_norms(
 
 
 def _least(A: np.ndarray, g: np.ndarray, row: np.ndarray, contractions: Sequence[float]) -> tuple[np.ndarray, float]:
-    """Return a Q (n, n) with a small bound of ``row``, and its contraction.
+    """Return a Q (n, n) that gives ``row`` a small bound, and its contraction.
 
-    The contractions are tried in the order of a lower bound of row Q row'; the first with a solution is taken. The
-    lower bound is the largest value that the Gramian of a single vertex gives: no Q common to all vertices is below it.
+    The contractions are tried in ascending order of a lower bound of row Q row'; the first with a solution is taken.
+    This lower bound is the largest row Q row' with Q the Gramian of a single vertex; no Q common to all is below it.
     """
     if not g.any():
         return np.zeros(A.shape[1:]), contractions[0]
@@ -195,7 +195,7 @@ def _least(A: np.ndarray, g: np.ndarray, row: np.ndarray, contractions: Sequence
 
 
 def _solve(A: np.ndarray, g: np.ndarray, row: np.ndarray, contraction: float) -> np.ndarray:
-    """Return the Q that minimises row Q row' for a given contraction.
+    """Return the Q that minimises row Q row' plus a small multiple of its trace for ``contraction``, then inflated.
 
     Raises:
         DesignError: The inequality has no solution.
