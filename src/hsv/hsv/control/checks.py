@@ -1,4 +1,4 @@
-"""Checks of a design: each compares a value found in its files with the expected one, which is recomputed."""
+"""Checks of a design: each compares a number or text, read from its files or recomputed, with what is expected."""
 
 from __future__ import annotations
 
@@ -125,8 +125,8 @@ def parameter(
 ) -> Check:
     """Return the check that the ``value`` of the design parameter ``name`` equals ``expected``, within its tolerance.
 
-    ``value`` is the array of the parameter, or only its part ``[index]``. The check is called ``shown``, by default
-    ``name``, and covers these ``fields`` of the certificate.
+    ``value`` is the array of the parameter or, with an ``index``, only this part of it. The check is named ``shown``
+    or, if that is empty, ``name``; it covers these ``fields`` of the certificate.
     """
     size = entry_size(name, subject.certificate)[index]
     return replace(same(shown or name, value, expected, PARAMETERS[name], size), fields=tuple(fields))
@@ -148,7 +148,7 @@ def required(check: Check) -> Check:
 
 
 def gathered(name: str, checks: Callable[[], Checks]) -> list[Check]:
-    """Return the results of ``checks``; an error while they run becomes a last, failed and required check ``name``."""
+    """Return the results of ``checks``; if an error ends them, the last is a failed, required check ``name``."""
     done: list[Check] = []
     try:
         done.extend(checks())
@@ -163,8 +163,8 @@ def gathered(name: str, checks: Callable[[], Checks]) -> list[Check]:
 def unchecked(subject: Subject, checks: Iterable[Check], *, whole: bool = True) -> list[str]:
     """Return the fields of the certificate that none of the ``checks`` covers: they are stated, not checked.
 
-    By default only the path of a table is listed if none of its fields is covered, and ``*`` replaces every index of
-    a list, as in ``nominal.*.gamma``. With ``whole=False`` every uncovered field is listed by its own path.
+    By default a table without any covered field is listed as one path, not field by field, and ``*`` replaces every
+    index of a list, as in ``nominal.*.gamma``. With ``whole=False`` every uncovered field is listed by its own path.
     """
     held = {field for check in checks for field in check.fields}
     free: dict[str, bool] = {}

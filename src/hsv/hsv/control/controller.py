@@ -134,7 +134,7 @@ class Controller(ABC):
         """Return the input of this step, limited and unlimited; called once per step, in order."""
 
     def unsaturated_input(self, inputs: ControllerInput) -> tuple[float, float]:
-        """Return fuel equivalence ratio and elevator (rad) before the limits; called instead of :meth:`step`."""
+        """Return fuel equivalence ratio and elevator (rad) before the limits; the C loop calls it, not :meth:`step`."""
         fuel, elevator = self.step(inputs).u_unsaturated
         return float(fuel), float(elevator)
 

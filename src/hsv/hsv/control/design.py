@@ -52,8 +52,8 @@ def rigid_factors(values: Sequence[float], name: str) -> np.ndarray:
 def certified(values: Sequence[float], minimum: np.ndarray, name: str = TAU.name) -> np.ndarray:
     """Return the factors tau (5) in ``values``, one or five, if they are certified.
 
-    The certified factors lie on the straight line from ``minimum`` (5) to 1 for every state: one Lyapunov function
-    covers the closed loops along it. Factors that are small for one state and large for another are not on this line.
+    The certified factors lie on the straight line from ``minimum`` (5) to five ones: one Lyapunov function covers the
+    closed loops along it. Factors near ``minimum`` for one state and near 1 for another are not on this line.
 
     Raises:
         ParameterError: The factors are not certified; the message names a value and the range.
@@ -137,9 +137,9 @@ class TubeSet:
 class PlanBounds:
     """Bounds of the total nominal input u_r + u_n and of the nominal pitch acceleration, SI.
 
-    ``input_minimum`` and ``input_maximum`` (2) are U minus F Z; beyond them the feedback may saturate.
-    ``region_minimum`` and ``region_maximum`` (3: both inputs, pitch acceleration) follow the range of the certified
-    plans. The disturbance set was measured in flights along those plans, and faster plans cause larger disturbances.
+    ``input_minimum`` and ``input_maximum`` (2) are the ends of U minus F Z; beyond them the feedback may saturate.
+    ``region_minimum`` and ``region_maximum`` (3: both inputs, pitch acceleration) are the range of the certified
+    plans, for the inputs shifted down by 5 %. Disturbances were measured along these plans; faster ones cause more.
     """
 
     input_minimum: np.ndarray
@@ -239,7 +239,7 @@ def positive(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np
 
 
 def samples(values: Mapping[str, Any], axis: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return breakpoints (n) of ``axis``, e.g. ``"scheduling.altitude"``, and weights (n, v) of its v vertices."""
+    """Return breakpoints (n) of ``axis``, e.g. ``scheduling.altitude``, and the weights (n, v) of v vertices there."""
     breakpoints = np.array(values[f"{axis}.breakpoints"], float)
     if len(breakpoints) < 2:
         raise DesignError(f"parameter {axis}.breakpoints: {len(breakpoints)} values, expected at least 2")
@@ -250,11 +250,11 @@ def samples(values: Mapping[str, Any], axis: str) -> tuple[np.ndarray, np.ndarra
 class ControlDesign:
     """The numbers of a Tube-MPC controller in flight, SI, with states in the order of :mod:`hsv.model.signals`.
 
-    ``feedback_gain`` is F (2, 9). ``nominal_gains`` K (g, 2, 9) and ``nominal_ellipsoids`` P (g, 5, 5), x' P x <= 1 on
-    the rigid states, come outermost first. ``nominal_state_scale`` (5) and ``nominal_input_scale`` (2) are the scales
-    of the nominal cost, ``nominal_input_bound`` (2) is the largest |u_n| of the gains. ``input_minimum`` and
-    ``input_maximum`` (2) limit the input, and ``notch`` is the filter of the design. ``altitude_samples`` and
-    ``velocity_samples`` are breakpoints (n) and weights (n, v) of the vertices along each scheduling axis.
+    ``feedback_gain`` is F (2, 9). ``nominal_gains`` are K (g, 2, 9), outermost ellipsoid first, ``nominal_ellipsoids``
+    the P (g, 5, 5) of their ellipsoids x' P x <= 1 of rigid states. ``nominal_state_scale`` (5) and
+    ``nominal_input_scale`` (2) weigh equally in the nominal cost; ``nominal_input_bound`` (2) bounds |u_n| (eq. 35).
+    ``input_minimum`` and ``input_maximum`` (2) limit u, and ``notch`` is the filter of the design. The samples of each
+    scheduling axis are breakpoints (n) and, at them, the weights (n, v) of the axis' v vertices.
     """
 
     name: str
@@ -617,7 +617,7 @@ def find_certificate(design: str, named: str = "") -> Path | None:
 
     Args:
         design: Name of the design, or path of its parameter file; the certificate lies next to this file.
-        named: Path of another certificate, returned even if there is no such file; empty: none.
+        named: Path of a certificate to return instead, whether or not there is such a file; empty: none.
     """
     if named:
         return Path(named)

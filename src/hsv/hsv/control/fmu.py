@@ -69,7 +69,7 @@ class FmuClass(LibraryClass):
         return LibraryController(self._name, self._path, self._symbol, self.block.state_size, numbers, vehicle)
 
     def _routes(self, own: Mapping[str, Any]) -> list[int]:
-        """Return each FMU input's index in ``_INPUTS``, or -1, then the FMU output's index for each of ``_OUTPUTS``."""
+        """Return each FMU input's index in ``_INPUTS``, or -1; then for each of ``_OUTPUTS``, the FMU output's."""
         sources = {own[f"fmu.{name}"]: (i, name, unit) for i, (name, unit) in enumerate(_INPUTS)}
         if len(sources) < len(_INPUTS):
             raise ParameterError("[fmu]: a name stands twice, expected a variable for each input")
@@ -190,7 +190,7 @@ class LoadedFmu:
         self._next = 0
 
     def _step(self, k: int, given: int, out: int, state: int, par: int) -> int:
-        """Step the FMU: a step function of ``hsv_block.h`` with the parameters that :class:`FmuClass` passes."""
+        """Step the FMU, as a step function of ``hsv_block.h``; ``par`` points to the numbers from :class:`FmuClass`."""
         try:
             count = len(self._inputs)
             period, *routes = (c_double * (1 + count + len(_OUTPUTS))).from_address(par)

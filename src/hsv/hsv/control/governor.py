@@ -181,7 +181,7 @@ class Governor:
         return half
 
     def _corner(self, corners: Sequence[Corner], leg: Leg, half: int, name: str, beginning: Beginning) -> Corner:
-        """Return the earliest end of ``leg`` for which the plan fits; ``half`` is its blend's half-width in steps."""
+        """Return the earliest corner at which ``leg`` can end, with a blend of half-width ``half``, given in steps."""
         begin = self._steps(corners[-1].time)
 
         def end(length: int) -> Corner:

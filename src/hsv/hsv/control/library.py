@@ -215,7 +215,7 @@ def inside(controller: str, folder: Path) -> str:
 
 
 def seen_from(controller: str, folder: Path) -> str:
-    """Return the ``controller`` for a scenario in ``folder``; the path of a library or FMU there is made relative."""
+    """Return ``controller`` for a scenario in ``folder``: the path of a library or FMU inside it is made relative."""
     place = library_place(controller)
     if place is None or not place[0].is_relative_to(folder.resolve()):
         return controller

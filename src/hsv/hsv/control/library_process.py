@@ -119,7 +119,7 @@ class LibraryProcess:
 
     @contextmanager
     def sharing(self, numbers: int) -> Iterator[np.ndarray]:
-        """Yield the memory shared with the child, ``numbers`` floats; requests of other threads wait meanwhile."""
+        """Yield the memory shared with the child as an array of ``numbers`` floats; other threads' requests wait."""
         with self._lock:
             yield self._memory.numbers(numbers)
 

@@ -46,8 +46,9 @@ class NominalProblem:
     """The data of the nominal problem (eq. 31 to eq. 35), SI.
 
     ``A`` (r, n, n) and ``B`` (r, n, m) are the vertices, discretised with the ``period`` (s). ``state_scale`` (n) and
-    ``input_scale`` (m) are deviations that cost the same: psi = period diag(1 / state_scale^2), sigma likewise. The
-    factor period makes costs integrals over time (s), which hardly depend on it. ``input_bound`` (m): largest |u_n|.
+    ``input_scale`` (m) are deviations that cost the same: psi = period diag(1 / state_scale^2), sigma likewise. As the
+    period is a factor of both, costs are integrals over time (s), almost the same for any period. ``input_bound`` (m)
+    is the largest permitted |u_n|.
     """
 
     A: np.ndarray
@@ -126,15 +127,15 @@ def _decrease_blocks(contraction: np.ndarray, weighted: np.ndarray) -> np.ndarra
 
 @dataclass(frozen=True)
 class NominalGain:
-    """The gain K = Y Q^-1 of one ellipsoid x' Q^-1 x <= 1, with its evidence.
+    """The gain K = Y Q^-1 of one ellipsoid x' Q^-1 x <= 1, with the numbers that show that eq. 31 to 35 hold.
 
-    ``K`` (m, n) and ``Q`` (n, n) are in SI and rounded, ``Y`` (m, n) is K Q. ``gamma`` (s) is the bound of eq. 32 from
-    the solver, ``certified_gamma`` (s) the recomputed bound of the cost from any state of the ellipsoid. The residuals
-    belong to the rounded matrices. ``decrease`` (r): smallest eigenvalue of eq. 34 at each vertex with the certified
-    bound, scaled to a unit diagonal. ``state``: 1 minus the level of the design state (eq. 33). ``input`` (m): 1 minus
-    the largest squared input over its squared bound (eq. 35). ``nesting``: smallest eigenvalue of 1 - Q in coordinates
-    in which the next ellipsoid outside is the unit ball. ``between`` (r): for an interpolated family, the decrease of
-    the level in that outer ellipsoid under K. ``radii`` (r): closed-loop spectral radii.
+    ``K`` (m, n) and ``Q`` (n, n) are in SI and rounded, ``Y`` (m, n) is K Q. Two numbers bound the cost (s): ``gamma``
+    is that of the solver (eq. 32); ``certified_gamma``, recomputed from K and Q, holds for any state of the ellipsoid.
+    The others, too, are those of K and Q. ``decrease`` (r): smallest eigenvalue of the matrix of eq. 34 at each vertex,
+    with the recomputed bound, diagonal blocks scaled to 1. ``state``: 1 minus the level of the design state (eq. 33).
+    ``input`` (m): 1 minus the largest squared input over its squared bound (eq. 35). ``nesting``: smallest eigenvalue
+    of 1 - Q in coordinates in which the next ellipsoid outside is the unit ball. ``between`` (r): for an interpolated
+    family, :func:`decrease_between` in that outer ellipsoid. ``radii`` (r): closed-loop spectral radii.
     """
 
     K: np.ndarray
@@ -272,7 +273,7 @@ def nested_gains(
     interpolated: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[NominalGain]:
-    """Return gains with nested ellipsoids, outermost first: one for each of ``scales``, for ``state`` times the scale.
+    """Return gains with nested ellipsoids, outermost first; each is designed for ``state`` times one of ``scales``.
 
     Args:
         problem: Vertices, weights and input bounds.

@@ -85,13 +85,13 @@ _HEADROOM = 1.02
 
 
 class KothareLaw(FamilyLaw):
-    """Nominal law u_n = K x_n with K from eq. 32 to 35 for x_n(k), used from exactly step k + ``SOLVE_STEPS`` on.
+    """Nominal law u_n = K x_n, with a new K from eq. 32 to 35 every ``SOLVE_STEPS`` steps.
 
-    A worker thread solves the LMI between the steps. A step whose solution is late waits for it, so that the flight
-    depends on the nominal state alone, never on timing. Until the first solution, the family of gains is used. A new
-    gain replaces the last one only if x_n lies in its ellipsoid, in which eq. 35 bounds the input. Otherwise, and if
-    the solver fails, the last gain is kept and the status reports it. In the innermost ellipsoid of the family no new
-    gain is computed.
+    At such a step k, a worker thread starts to solve the LMI for x_n(k), unless x_n(k) is in the innermost ellipsoid of
+    the family. The gain is used from exactly step k + ``SOLVE_STEPS`` on; if it is late, this step waits for it, so
+    that the flight depends on the nominal state alone, never on timing. A new gain replaces the last one only if x_n
+    then lies in its ellipsoid, in which eq. 35 bounds the input. Otherwise, and if the solver fails, the last gain is
+    kept and the status reports it. Before the first new gain, the family of gains is used.
     """
 
     in_core = False

@@ -41,7 +41,7 @@ class SolverReport:
     objective: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report as a dictionary for JSON, the same whenever this machine solves the problem."""
+        """Return the report as a dictionary for JSON; it is reproducible on one machine, as it contains no times."""
         return asdict(self)
 
 
@@ -99,7 +99,7 @@ BOUND_DIGITS = 6
 
 
 def rounded(values: np.ndarray, size: Any, digits: int) -> np.ndarray:
-    """Return ``values`` rounded to decimal numbers with ``digits`` digits after the leading digit of their ``size``."""
+    """Return ``values`` rounded to ``digits`` digits after the leading digit of ``size``, their typical magnitude."""
     values = np.asarray(values, float)
     leading = np.floor(np.log10(np.broadcast_to(np.asarray(size, float), values.shape))).astype(int)
     flat = [round(v, digits - k) for v, k in zip(values.ravel().tolist(), leading.ravel().tolist(), strict=True)]
@@ -108,7 +108,7 @@ def rounded(values: np.ndarray, size: Any, digits: int) -> np.ndarray:
 
 
 def rounded_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Return a positive definite ``matrix`` (n, n), rounded relative to the roots of its diagonal, and symmetric."""
+    """Return M = ``matrix`` > 0 (n, n) made symmetric and rounded, each M_ij relative to the root of M_ii M_jj."""
     root = np.sqrt(np.diag(matrix))
     return rounded(0.5 * (matrix + matrix.T), np.outer(root, root), MATRIX_DIGITS)
 
@@ -116,7 +116,7 @@ def rounded_matrix(matrix: np.ndarray) -> np.ndarray:
 def outward(values: np.ndarray) -> np.ndarray:
     """Return ``values`` rounded away from zero to :data:`BOUND_DIGITS` significant digits.
 
-    A magnitude that exceeds one with so many digits by no more than a relative 1e-12 is rounded down to it.
+    A value that exceeds a number of so few digits by at most 1e-12, relative to it, is rounded to that number instead.
     """
     values = np.asarray(values, float)
     size = np.where(values == 0.0, 1.0, np.abs(values))
@@ -138,15 +138,15 @@ class Whitening:
     input_scale: np.ndarray
 
     def dynamics(self, A: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return in the new coordinates ``A`` (..., n, n) and ``B`` (..., n, m), given in the original ones."""
+        """Return the matrices ``A`` (..., n, n) and ``B`` (..., n, m), transformed to the new coordinates."""
         return self.to_white @ A @ self.from_white, self.to_white @ B * self.input_scale
 
     def gain(self, K: np.ndarray) -> np.ndarray:
-        """Return in the original coordinates a gain ``K`` (m, n) that is given in the new ones."""
+        """Return a gain ``K`` (m, n) of the new coordinates, transformed to the original ones."""
         return np.asarray(self.input_scale[:, None] * (K @ self.to_white))
 
     def covariance(self, N: np.ndarray) -> np.ndarray:
-        """Return in the original coordinates the ``N`` (n, n) of an ellipsoid z' N^-1 z <= 1 in the new ones."""
+        """Return ``N`` (n, n), an ellipsoid z' N^-1 z <= 1 of the new coordinates, transformed to the original ones."""
         return _symmetric(self.from_white @ N @ self.from_white.T)
 
 
@@ -161,7 +161,7 @@ def lqr_whitening(A: np.ndarray, B: np.ndarray, state_scale: np.ndarray, input_s
         A: (r, n, n) state matrices of the vertices, discrete time.
         B: (r, n, m) input matrices of the vertices.
         state_scale: (n) deviations that weigh equally in the LQR cost, SI.
-        input_scale: (m) inputs that weigh as much, SI.
+        input_scale: (m) inputs that weigh as much as these deviations, SI.
 
     Raises:
         DesignError: The mean of the vertices cannot be stabilised.
@@ -244,11 +244,11 @@ class _Inequality:
 def minimise(
     unknowns: Sequence[Unknown], cost: Cost, inequalities: Inequalities, name: str
 ) -> tuple[list[np.ndarray], SolverReport]:
-    """Return the solution on the central path, at a cost about :data:`GAP` above the minimum, and the solver's report.
+    """Return the solution on the central path, about the share :data:`GAP` above the minimum cost, and a report.
 
     Args:
-        unknowns: Unknown matrices, in the order of the solution.
-        cost: Linear cost; if it is always zero, the solution is the solver's instead, a feasible point.
+        unknowns: Unknown matrices, in the order of the solution, a list of matrices.
+        cost: Linear cost; if it is always zero, the solution is any feasible one, as the solver finds it.
         inequalities: Affine inequalities, with entries near one.
         name: Name of the result, for error messages.
 

@@ -47,7 +47,7 @@ class QpLaw(FamilyLaw):
     in_core = False
 
     def __init__(self, design: ControlDesign, data: Struct, reference: ReferenceTrajectory) -> None:
-        """Set up the programme; its bounds are the plan bounds of the design minus the reference inputs of the flight.
+        """Set up the programme, which keeps u_n plus every reference input of the flight within the plan bounds.
 
         Raises:
             DesignError: The design has no plan bounds, or the reference inputs lie outside them.
@@ -130,13 +130,14 @@ class QpLaw(FamilyLaw):
 def _predicted(
     closed: np.ndarray, B: np.ndarray, K: np.ndarray, rate: np.ndarray, block: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the predicted inputs and pitch acceleration at each checked time as linear functions of x_n and c.
+    """Return the matrices that predict inputs and pitch acceleration at checked times from x_n and c, for u = K x + c.
 
-    ``closed`` is A + B K, ``rate`` (n + m) maps [x; u] to the pitch acceleration, and a block has ``block`` steps.
+    ``closed`` is A + B K, ``rate`` (n + m) maps [x; u] to the pitch acceleration. c has m entries for each block of
+    ``block`` steps.
 
     Returns:
-        Matrices on x_n (rows, n) and on c (rows, m times blocks), and flags (rows): whether a row is bounded. Each time
-        has m + 1 rows: the inputs, then the pitch acceleration, bounded in the first :data:`NEAR_BLOCKS` blocks only.
+        Factor of x_n (rows, n), factor of c (rows, m times blocks), and whether a row is bounded (rows). Each time has
+        m + 1 rows: the inputs, always bounded, then the pitch acceleration, only in the first :data:`NEAR_BLOCKS`.
     """
     n, m = B.shape
     power, forced = [np.eye(n)], [np.zeros((n, m))]

@@ -229,11 +229,10 @@ def _blend(
     slope: np.ndarray,
     bend: np.ndarray,
 ) -> None:
-    """Blend in place ``command`` (r, 2), altitude and velocity, its ``slope`` (r, 2), and the altitude's ``bend`` (r).
+    """Add the blends to ``command`` (r, 2), its ``slope`` (r, 2) and the altitude's second derivative ``bend`` (r).
 
-    All times are in steps: ``instants`` (b) and ``half`` (b) are the times of the corners and half-widths of their
-    blends, ``commands`` (b, 2) altitude and velocity there. Slope and bend are first and second derivative at the
-    ``steps`` (r).
+    These arrays change in place; their rows are for the ``steps`` (r). At the times ``instants`` (b) are the corners,
+    with altitude and velocity ``commands`` (b, 2) and blends of half-width ``half`` (b). All times are in steps.
     """
     before = np.zeros(commands.shape[1])
     for index in range(len(instants)):

@@ -67,7 +67,7 @@ def tube_data(
     """Return the data of the law as the struct ``hsv_tube`` of the core, by default a feedback on x - x_r alone.
 
     Args:
-        gains: (c, 2, 9) gains F diag(tau); each is used from its first step, see ``starts``, until the next gain's.
+        gains: (c, 2, 9) gains F diag(tau); each is used from its step in ``starts`` until the next gain's.
         minimum: (2) smallest inputs.
         maximum: (2) largest inputs.
         period: Control period T, s.
@@ -219,12 +219,15 @@ class TubeLaw(Controller):
         return np.asarray(self.kernel.gains[active_gain(self.kernel, self._next)])
 
     def reset(self) -> None:
-        """Prepare a new flight from step 0: the current factors tau stay, and all scheduled changes apply again."""
+        """Prepare a new flight from step 0, in which all scheduled changes of tau apply again.
+
+        Until the first of them, tau is that of the last :meth:`change_tau`, or of the design if there was none.
+        """
         self._next = 0
         self._arrange([(0, self._tau), *self._scheduled])
 
     def change_tau(self, values: Sequence[float]) -> int:
-        """Use the factors tau in ``values``, one or five, from the next step on; return the number of that step.
+        """Use the factors tau ``values``, one or five, from the next step until another change; return the next step.
 
         Raises:
             ParameterError: The factors are not certified.

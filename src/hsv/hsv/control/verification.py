@@ -88,7 +88,7 @@ _LONGEST = 10_000
 
 _STATUS = ("optimal", "optimal_inaccurate")
 _KEPT_OFF = 0.05
-"""Both bounds of plans in flight are those of the certified plans, shifted down by this share of their range."""
+"""The input range of plans in flight is that of the certified plans, shifted down by this share of its width."""
 
 
 # --- algebra ----------------------------------------------------------------------------------------------------------
@@ -302,7 +302,7 @@ class NominalWeights:
         return float(np.linalg.eigvals(np.linalg.solve(decrease, stage)).real.max())
 
     def decrease(self, K: np.ndarray, Q: np.ndarray, gamma: float) -> np.ndarray:
-        """Return the smallest eigenvalue (r) of eq. 34 at each vertex, its diagonal blocks scaled to the identity."""
+        """Return the smallest eigenvalue (r) of the matrix of eq. 34 at each vertex, diagonal blocks scaled to 1."""
         L = np.linalg.cholesky(Q)
         M = np.linalg.solve(L, (self.A + self.B @ K) @ L)
         stage = np.vstack((np.sqrt(self.psi) @ L, np.sqrt(self.sigma) @ K @ L)) / np.sqrt(gamma)
@@ -397,9 +397,9 @@ def symmetric(name: str, Q: np.ndarray) -> Check:
 
 
 def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
-    """Return the changes (5, 3) of the rigid states by the first three channels of W, each held at 1 for ``period`` s.
+    """Return the changes (5, 3) that the first three channels of W, each held at 1 for ``period`` s, cause in x.
 
-    The vehicle is linearised at mid-envelope.
+    The rows are the rigid states x of the vehicle, which is linearised at mid-envelope.
     """
     A, _ = linearise(vehicle.decoupled, *vehicle.centre)
     unit = np.zeros((N_RIGID, 3))
@@ -515,7 +515,7 @@ class Tube:
         return self._narrowed(np.sqrt(np.sum((F @ self.Q) * F, axis=1)), slice(N_RIGID, None))
 
     def _narrowed(self, bounds: np.ndarray, rows: slice) -> np.ndarray:
-        """Return ``bounds``, the first of which the star norms of output ``rows`` replace where they are smaller."""
+        """Return ``bounds``; the first of them are limited to the star norms of the output ``rows``, if stated."""
         if self.star is None:
             return bounds
         # An output is bounded by the sum, over all channels, of its half-range in the ellipsoid of the channel.
@@ -523,10 +523,11 @@ class Tube:
         return np.append(np.minimum(bounds[: len(star)], star), bounds[len(star) :])
 
     def residuals(self) -> np.ndarray:
-        """Return the residual (r) of the S-procedure in each closed loop; all positive: the set is invariant (eq. 26).
+        """Return the smallest eigenvalues (r) of Q - A Q A' / lam - sum_j g_j g_j' / l_j, with Q scaled to 1.
 
-        With the contraction lam and multipliers l_j, errors v = e - c in the set satisfy lam v' Q^-1 v <= lam, and
-        disturbances |d_j| <= 1 satisfy sum_j l_j d_j^2 <= sum_j l_j <= 1 - lam.
+        There is one for each closed loop, with its A, its :attr:`columns` g_j and multipliers l_j, and the contraction
+        lam. If all are positive, the set is invariant (eq. 26, S-procedure): from v = e - c in the set and with
+        |d_j| <= 1, the level after a step is at most lam v' Q^-1 v + sum_j l_j d_j^2 <= lam + (1 - lam).
 
         Raises:
             DesignError: A multiplier is not positive, or their sum exceeds 1 - lam.
@@ -539,8 +540,8 @@ class Tube:
     def tightened(self, lag: Sequence[Sequence[float]] = ((0.0, 0.0), (0.0, 0.0))) -> np.ndarray:
         """Return the lower and upper bounds (2 each) of u_n + u_r: U minus the range of the feedback (eq. 30).
 
-        Eq. 53 prints a plus instead. ``lag`` is the minimum and maximum (2 each) of the feedback that the lag of the
-        actuators behind the plan causes.
+        Eq. 53 prints a plus instead. ``lag`` is the minimum and maximum (2 each) of the feedback that arises because
+        the actuators lag behind the plan.
         """
         middle = self.system.F @ self.c + self.system.F_d @ self.middle
         half = self.feedback + np.abs(self.system.F_d) @ self.half
@@ -558,12 +559,12 @@ class StarNorms(NamedTuple):
     contraction: np.ndarray
 
     def residuals(self, tube: Tube) -> np.ndarray:
-        """Return the residuals (7, acting channels): where positive, the ellipsoid of row and channel is invariant.
+        """Return a residual for each row and acting channel (7, a); if it is positive, their ellipsoid is invariant.
 
-        Acting channels have a column other than zero. The ellipsoid v' Q^-1 v <= 1 is invariant under
+        A channel acts if its column is not zero everywhere. The ellipsoid v' Q^-1 v <= 1 is invariant under
         v(k+1) = A_i v + g_i d with |d| <= 1 if Q - A_i Q A_i' / lam - g_i g_i' / (1 - lam) >= 0 (Abedor, Nagpal and
-        Poolla 1996), with contraction lam. A residual is the smallest eigenvalue of this matrix over all vertices, with
-        Q scaled to the identity.
+        Poolla 1996), with contraction lam. A residual is the smallest eigenvalue of this matrix over all closed loops
+        i of the tube, with Q scaled to the identity.
 
         Raises:
             DesignError: A contraction is not between 0 and 1.
@@ -583,10 +584,10 @@ class StarNorms(NamedTuple):
         )
 
     def start(self, tube: Tube) -> float:
-        """Return the largest level of the start e = 0 in the ellipsoids; at most 1 means that it lies in all (eq. 25).
+        """Return the largest level of the parts of the start e = 0 in their ellipsoids; at most 1: inside (eq. 25).
 
-        The start e - c = -c is split into one term for each acting channel: minus the steady response of the mean
-        vertex to the mid-point of the channel. The last term takes the remainder. This split is not in the paper.
+        The start e - c = -c is the sum of one part for each acting channel: minus the steady response of the mean
+        closed loop to the mid-point of the channel; the last part is the remainder. The split is not in the paper.
         """
         acting, mean = np.flatnonzero(tube.columns.any(axis=(0, 1))), tube.A.mean(axis=0)
         terms = np.linalg.solve(mean - np.eye(len(mean)), tube.G.mean(axis=0) * tube.middle).T
@@ -702,10 +703,10 @@ def _star_checks(subject: Subject, tube: Tube) -> Checks:
 
 
 def counter_example_checks(subject: Subject) -> Checks:
-    """Recompute the errors that the stated disturbance sequences reach (eq. 22): lower bounds of half-widths (eq. 28).
+    """Recompute the errors that counter-examples reach (eq. 22), if stated; no half-width (eq. 28) may be smaller.
 
-    At a constant vertex i and with W moved to the origin, an output row y satisfies
-    |y e(m)| <= sum over j < m of |y A_i^j G_i| half, which disturbances with the signs of the terms attain.
+    At a constant vertex i and with W moved to the origin, an output y e reaches at most the sum over j < m of
+    |y A_i^j G_i| times the half-widths of W in m steps, namely with disturbances that have the signs of the terms.
     """
     inside = "tube.invariant_set"
     if "star_norms" not in subject.stated(inside):
@@ -729,7 +730,8 @@ def counter_example_checks(subject: Subject) -> Checks:
 def factor_checks(subject: Subject) -> Checks:
     """Check that tau (eq. 48) may change in flight, or that it is fixed at 1 if the design is not adjustable.
 
-    All factors tau share one Lyapunov function, with and without the fault, and the plan also fits at tau = 1.
+    It may change if both extreme factors share one Lyapunov function, with and without the fault, and the plan also
+    fits at tau = 1.
     """
     design, stated = subject.design, subject.certificate.get("adjustable")
     filtered = stated is not None
@@ -757,7 +759,7 @@ def factor_checks(subject: Subject) -> Checks:
 
 
 def adjustable_checks(subject: Subject) -> Checks:
-    """Recompute tau (eq. 48), Z, Z' (eq. 47), relaxed input bounds (eq. 52), K' (eq. 49 to 52) and poles, if stated."""
+    """Check an adjustable design: tau (eq. 48), Z, Z' (eq. 47), relaxed bounds and K' (eq. 49 to 52), and poles."""
     design, stated = subject.design, subject.certificate.get("adjustable")
     if stated is None:
         return
@@ -857,7 +859,7 @@ def preflight(design: ControlDesign, certificate: str = "") -> str:
 
     Args:
         design: The design to check.
-        certificate: Path of the certificate; empty: the one next to the file of the design with this name.
+        certificate: Path of the certificate; empty: the one next to the parameter file found by the design's name.
 
     Raises:
         DesignError: A required check fails, or the certificate that is named or found cannot be read.
