@@ -116,7 +116,7 @@ def rounded_matrix(matrix: np.ndarray) -> np.ndarray:
 def outward(values: np.ndarray) -> np.ndarray:
     """Return ``values`` rounded away from zero to :data:`BOUND_DIGITS` significant digits.
 
-    A value that exceeds a number of so few digits by at most 1e-12, relative to it, is rounded to that number instead.
+    A magnitude at most 1e-12, relative, above a number with so many digits is rounded to that number instead.
     """
     values = np.asarray(values, float)
     size = np.where(values == 0.0, 1.0, np.abs(values))

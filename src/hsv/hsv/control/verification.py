@@ -559,7 +559,7 @@ class StarNorms(NamedTuple):
     contraction: np.ndarray
 
     def residuals(self, tube: Tube) -> np.ndarray:
-        """Return a residual for each row and acting channel (7, a); if it is positive, their ellipsoid is invariant.
+        """Return a residual (7, a) for each output row and acting channel; if positive, their ellipsoid is invariant.
 
         A channel acts if its column is not zero everywhere. The ellipsoid v' Q^-1 v <= 1 is invariant under
         v(k+1) = A_i v + g_i d with |d| <= 1 if Q - A_i Q A_i' / lam - g_i g_i' / (1 - lam) >= 0 (Abedor, Nagpal and
@@ -584,7 +584,7 @@ class StarNorms(NamedTuple):
         )
 
     def start(self, tube: Tube) -> float:
-        """Return the largest level of the parts of the start e = 0 in their ellipsoids; at most 1: inside (eq. 25).
+        """Return the largest level of the parts of the start e = 0 in their ellipsoids; at most 1 means inside (eq. 25).
 
         The start e - c = -c is the sum of one part for each acting channel: minus the steady response of the mean
         closed loop to the mid-point of the channel; the last part is the remainder. The split is not in the paper.
