@@ -584,7 +584,7 @@ class StarNorms(NamedTuple):
         )
 
     def start(self, tube: Tube) -> float:
-        """Return the largest level of the parts of the start e = 0 in their ellipsoids; at most 1 means inside (eq. 25).
+        """Return the largest level of the parts of the start e = 0 in the ellipsoids; at most 1 means inside (eq. 25).
 
         The start e - c = -c is the sum of one part for each acting channel: minus the steady response of the mean
         closed loop to the mid-point of the channel; the last part is the remainder. The split is not in the paper.
