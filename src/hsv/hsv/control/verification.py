@@ -639,7 +639,7 @@ def set_checks(subject: Subject) -> Checks:
 
 
 def lag_feedback(subject: Subject) -> Sequence[Sequence[float]]:
-    """Return minimum and maximum (2 each) of the feedback due to the actuators' lag; zeros if none are stated."""
+    """Return the smallest and largest response of the feedback to the actuators' lag, shape (2,) each; default: zeros."""
     lag = subject.certificate["tube"]["tightening"].get("lag_feedback")
     return (lag["lower"], lag["upper"]) if lag else ((0.0, 0.0), (0.0, 0.0))
 
@@ -796,7 +796,8 @@ def adjustable_checks(subject: Subject) -> Checks:
 def _full_state_checks(subject: Subject) -> Checks:
     """Check the poles of the coupled vehicle (eq. 42) under the structured F and the full-state F' (eq. 24, eq. 45).
 
-    F acts on the rigid states; F' also acts on the states of the notch filter.
+    F acts on the rigid states, F' also on the states of the notch filter. Also recomputed, for F': the spectral radii
+    at the vertices and the elevator's gain on the true pitch rate. Only the poles under F must be stable.
     """
     design, field, notch = subject.design, "adjustable.full_state", notch_in_series(subject.design)
     gain, whole = np.array(subject.stated(f"{field}.gain")), recomputed_model(subject)[0].whole

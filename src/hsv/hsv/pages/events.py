@@ -34,7 +34,7 @@ _DIAGNOSTIC_LEVELS = {1: "warning", 2: "error", 3: "error"}
 
 @dataclass(frozen=True)
 class Event:
-    """An event; ``start`` and ``end`` (s) are equal for an instant, and ``end`` is None if the event never ends."""
+    """An event; ``start`` and ``end`` (s) are equal for an instant, and ``end`` is None if the bag ends first."""
 
     start: float
     end: float | None

@@ -119,7 +119,7 @@ def box(evidence: Evidence) -> Numbers:
 
 
 def symmetric(evidence: Evidence) -> Numbers:
-    """Return the largest ratio of centre to half-width of a channel of W, with this channel, and of a state of Z."""
+    """Return the largest |centre| / half-width over the channels of W, with that channel, and over the states of Z."""
     tube = tube_of("baseline")
     channels = certificate("baseline")["tube"]["disturbance"]["channels"]
     off = {name: abs(b["upper"] + b["lower"]) / (b["upper"] - b["lower"]) for name, b in channels.items()}

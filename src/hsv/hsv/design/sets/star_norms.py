@@ -195,10 +195,12 @@ def _least(A: np.ndarray, g: np.ndarray, row: np.ndarray, contractions: Sequence
 
 
 def _solve(A: np.ndarray, g: np.ndarray, row: np.ndarray, contraction: float) -> np.ndarray:
-    """Return the Q that minimises row Q row' plus a small multiple of its trace for ``contraction``, then inflated.
+    """Return the Q (n, n) with the smallest row Q row' that satisfies the module's inequality, slightly enlarged.
+
+    A small multiple of the trace, in the coordinates of :func:`_coordinates`, is added to the cost to keep Q bounded.
 
     Raises:
-        DesignError: The inequality has no solution.
+        DesignError: The inequality has no solution for this ``contraction``.
     """
     T = _coordinates(A, g, contraction)
     inside, columns, output = np.linalg.solve(T, A @ T), np.linalg.solve(T, g.T).T, row @ T

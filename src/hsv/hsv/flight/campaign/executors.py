@@ -359,7 +359,7 @@ def program() -> str:
 
 
 def _check_workers(client: Any, address: str, notice: Notice) -> None:
-    """Raise a ``CampaignError`` if any worker lacks the library, has another version of it, or does not answer."""
+    """Raise a ``CampaignError`` if any worker lacks the library, has another version or sources, or does not answer."""
 
     def worker_program() -> str:
         # A local function is sent by value, and so it can be called on a worker without the library.
