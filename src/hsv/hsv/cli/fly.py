@@ -536,10 +536,10 @@ def resilience(
     listed: Annotated[bool, Option("--list", help="List the faults with their severities and exit.")] = False,
     json: JsonOption = False,
 ) -> None:
-    """Fly controllers with faults of increasing severity until each is lost, and make a map of what they survive.
+    """Fly controllers with faults of three severities, find the severest that each survives, and make a map of it.
 
     After an interruption, the same command continues where it stopped; controllers and faults can be added later. The
-    exit code is 1 if every flight crashed.
+    exit code is 1 if the controller failed in every flight.
 
     Example: hsv resilience --controllers case1,case1_rmpc --faults elevator_loss,elevator_delay
     """

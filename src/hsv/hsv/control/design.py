@@ -36,7 +36,7 @@ TAU_CHANGE_PARAMETERS = (
 
 
 def rigid_factors(values: Sequence[float], name: str) -> np.ndarray:
-    """Return the factors tau (5) of the rigid states from ``values``: one for all states, or one for each.
+    """Return the factors tau of the rigid states, shape (5,), from ``values``: one for all states, or one for each.
 
     Raises:
         ParameterError: The parameter ``name`` has another number of values, or one that is not above zero.

@@ -244,10 +244,10 @@ class _Inequality:
 def minimise(
     unknowns: Sequence[Unknown], cost: Cost, inequalities: Inequalities, name: str
 ) -> tuple[list[np.ndarray], SolverReport]:
-    """Return the solution on the central path, about the share :data:`GAP` above the minimum cost, and a report.
+    """Return a solution on the central path, whose cost is about :data:`GAP` (relative) above the minimum, and a report.
 
     Args:
-        unknowns: Unknown matrices, in the order of the solution, a list of matrices.
+        unknowns: Unknown matrices; the solution is a list with a matrix for each, in this order.
         cost: Linear cost; if it is always zero, the solution is any feasible one, as the solver finds it.
         inequalities: Affine inequalities, with entries near one.
         name: Name of the result, for error messages.

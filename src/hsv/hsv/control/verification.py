@@ -478,7 +478,7 @@ class Tube:
     """
 
     def __init__(self, subject: Subject, design: ControlDesign, field: str) -> None:
-        """Read set and disturbances from the certificate, and compute the error systems at the extreme factors tau."""
+        """Read the tube under ``field`` of the certificate; compute the error systems at the extreme factors tau."""
         self.field, self.design = field, design
         systems = [error_system(design, subject.vehicle, tau) for tau in factors(design)]
         self.system = systems[0]
@@ -639,7 +639,7 @@ def set_checks(subject: Subject) -> Checks:
 
 
 def lag_feedback(subject: Subject) -> Sequence[Sequence[float]]:
-    """Return the smallest and largest response of the feedback to the actuators' lag, shape (2,) each; default: zeros."""
+    """Return the smallest and largest response of the feedback to the actuators' lag, shape (2,) each; or zeros."""
     lag = subject.certificate["tube"]["tightening"].get("lag_feedback")
     return (lag["lower"], lag["upper"]) if lag else ((0.0, 0.0), (0.0, 0.0))
 

@@ -1,10 +1,11 @@
 """The declared region of a design: the flights over which its disturbances are measured (paper eq. 17, eq. 19, eq. 47).
 
-    W = {Delta: lower <= Delta <= upper},   lower and upper: extremes of Delta in the flights.
+    W = {d: lower <= d <= upper},   from the extremes of the channels d of Delta in the flights, which are widened.
 
 W'(tau) is the same set for flights with tau times the fault and tau times the parameter bounds. The flights are
 simulated with the full closed loop: the coupled vehicle, the notch filter, the gains of the design, its step command or
-ramp from start to target, and the fault. The parameters are nominal or at the corners of their bounds.
+ramp from start to target, and the fault. The parameters are nominal or at corners of their bounds:
+a quarter of the corners for ten parameters.
 """
 
 from __future__ import annotations

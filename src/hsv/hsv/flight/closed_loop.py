@@ -65,7 +65,10 @@ def fly(components: Components) -> Flight:
 
 
 def is_ideal(components: Components) -> bool:
-    """Return whether the controller receives the true state: hardware and air are ideal and no estimator is enabled."""
+    """Return whether hardware, links and air are ideal, all faults are of the command, and no estimator is enabled.
+
+    The controller then receives the true state.
+    """
     injector = components.fault_injector
     ideal = components.plant.is_ideal(injector.known) and injector.link.ideal
     return ideal and components.notch_filter.estimator is None

@@ -356,7 +356,10 @@ def _custom_tables(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def _check(scenario: Scenario, tables: Collection[str]) -> None:
-    """Refuse a ``scenario`` whose fields contradict each other; ``tables`` are the top-level keys of its file."""
+    """Refuse a ``scenario`` with fields that are invalid for its vehicle or controller, or contradict each other.
+
+    ``tables`` are the top-level keys of its complete text, inherited ones included.
+    """
     if not scenario.design and scenario.controller in SHIPPED_CONTROLLERS:
         raise ScenarioError(f"design = '': expected one, {scenario.controller} flies with its gains")
     for name, value in scenario.vehicle.perturbation.items():

@@ -347,7 +347,10 @@ def phase_margin(evidence: Evidence) -> Numbers:
 
 
 def less_uncertainty(evidence: Evidence) -> Numbers:
-    """Return the largest disturbances in Case 1 with notch filter, divided by those without, in two channels of W."""
+    """Return the largest disturbance in Case 1 with notch filter, divided by that without, for two channels of W.
+
+    ``pitch_nominal`` is the quotient of the pitch acceleration for the nominal vehicle alone.
+    """
     over = [corner for corner in fraction(load_vehicle().uncertainty) if corner in evidence.over]
     a, b = (largest_disturbances(scenario, over) for scenario in ("case1", "case1_no_notch"))
     return {channel: a[channel].max() / b[channel].max() for channel in ("pitch_acceleration", "acceleration")} | {

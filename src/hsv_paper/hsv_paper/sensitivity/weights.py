@@ -127,7 +127,10 @@ def run(scope: Scope) -> Outcome:
     figure.legend(loc="outside upper center", ncols=2, frameon=False)
 
     def rows(law: str, columns: Callable[[Group, int], dict[str, Any]]) -> list[dict[str, Any]]:
-        """Return table rows for the baseline itself, and for the smallest and largest factor on each group."""
+        """Return rows for the baseline, then for smallest and largest factor in ``FLOWN`` on each group of ``law``.
+
+        ``columns`` returns the further cells of a row from a group and the index of its factor in ``FLOWN``.
+        """
         chosen = [(ELEVATOR, FLOWN.index(1.0)), *((group, i) for group in GROUPS[law] for i in (0, len(FLOWN) - 1))]
         return [
             {law: "own weights" if FLOWN[i] == 1.0 else f"{group.label} times {FLOWN[i]:g}"} | columns(group, i)
