@@ -244,7 +244,7 @@ class _Inequality:
 def minimise(
     unknowns: Sequence[Unknown], cost: Cost, inequalities: Inequalities, name: str
 ) -> tuple[list[np.ndarray], SolverReport]:
-    """Return a solution on the central path, whose cost is about :data:`GAP` (relative) above the minimum, and a report.
+    """Return a solution on the central path, with a cost about :data:`GAP` (relative) above the minimum, and a report.
 
     Args:
         unknowns: Unknown matrices; the solution is a list with a matrix for each, in this order.
