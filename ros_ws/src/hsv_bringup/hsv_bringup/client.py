@@ -88,7 +88,7 @@ class GraphClient(Node):
         return self._others(self.get_subscriptions_info_by_topic(topic))
 
     def settle(self, enough: Callable[[], object]) -> None:
-        """Wait until topics and endpoints have not changed for a while, or until ``enough`` returns a true value."""
+        """Wait until ``enough`` returns true, or topics and endpoints have not changed for ``SETTLED_AFTER``."""
         standstill = Standstill()
         while not enough():
             names = (name for name, _ in self.get_topic_names_and_types())
@@ -100,13 +100,13 @@ class GraphClient(Node):
     def wait_for(
         self, done: Callable[[], object], what: str, published: Sequence[str] = (), for_ever: bool = False
     ) -> bool:
-        """Wait until ``done`` returns a true value; return False if no node joins or leaves the domain for too long.
+        """Return True once ``done`` returns a true value; False if no node joins or leaves the domain for a time limit.
 
         Args:
             done: Condition to wait for.
             what: Object of the wait, for the message "waiting for ...".
-            published: Topics of the awaited node. The wait is short if no process of this machine publishes any of
-                them.
+            published: Topics of the awaited node. The limit is ``SILENT_AFTER``, or ``ABSENT_AFTER`` as long as no
+                process of this machine has published any of the given topics.
             for_ever: Whether to wait without a limit.
         """
         standstill, message_pause = Standstill(), Standstill()
@@ -141,8 +141,8 @@ class GraphClient(Node):
 def run_client(name: str, act: Callable[[GraphClient, Any], None], options: Any) -> int:
     """Run the command ``name``, which calls ``act`` with ``options``, and return the exit code.
 
-    The code is 1 after a RunError, such as no run, 2 after a rejected request, and 130 after Ctrl-C. An error is
-    printed on one line.
+    The code is 0 after success, 1 after a RunError, such as no run, or if the reader of a pipe has ended, 2 after
+    another HsvError, such as a rejected request, and 130 after Ctrl-C. An HsvError is printed on one line.
     """
     client: GraphClient | None = None
     code = 1

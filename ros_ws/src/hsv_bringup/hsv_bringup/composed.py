@@ -1,4 +1,4 @@
-"""All nodes of the graph in one process with one executor.
+"""All nodes of the graph, except an external controller, in one process with one executor.
 
 Messages and bag are identical to those of separate processes; the flight takes less time.
 """

@@ -27,11 +27,11 @@ class FlowExecutor(SingleThreadedExecutor):
     """An executor that asks each subscription in turn for a message, node by node, and waits only if none has any.
 
     If the nodes are in the order of the data flow, one sweep over the subscriptions is one step of the loop: a message
-    published in the same process has arrived when its subscription is asked. If it has not (with another middleware),
-    the executor waits for it with the wait set of the base class.
+    published in the same process has usually arrived when its subscription is asked. If it has not (with another
+    middleware), the executor waits for it with the wait set of the base class.
 
-    Latched subscriptions are not swept, because their messages are rare; the wait set finds these. Raw ones, such as
-    the recorder's, are swept, so that a message is recorded as it arrives.
+    Messages on latched topics are rare: their subscriptions are left to the wait set. Only raw ones, such as the
+    recorder's, are swept nevertheless, so that a message is recorded as it arrives.
     """
 
     def __init__(self) -> None:

@@ -64,7 +64,7 @@ class PeerEmulatorNode(LockstepNode):
         self._standstill = Standstill()
 
     def _join(self) -> bool:
-        """Announce a run; if a plant is under test, instead prepare to announce all peers as ready and return True."""
+        """Announce a run and return False; for a plant under test, prepare to announce its peers and return True."""
         if self._is_plant:
             self._announcer = self.create_publisher(Ready, description.READY, LATCHED)
             self.create_subscription(Run, description.RUN, self._on_run, LATCHED)

@@ -58,7 +58,7 @@ class PlayerNode(ProcessNode):
         self._begins = time.monotonic() + delay
 
     def poll(self) -> None:
-        """Publish the messages that are due; end after the last one."""
+        """Publish the messages that are due; after the last one, end once the subscribers have received it."""
         while self._next < len(self._instants) and self._delay() <= 0.0:
             for topic, data in self._instants[self._next][1]:
                 self._outputs[topic].publish(data)
@@ -78,7 +78,7 @@ class PlayerNode(ProcessNode):
         return self._begins + played - time.monotonic()
 
     def _end(self) -> None:
-        """Finish if all subscribers have received everything, else log the slow topics; DDS drops hung subscribers."""
+        """Finish if the subscribers have received everything, else log their topics (DDS drops a hung subscriber)."""
         slow = [t for t, p in self._outputs.items() if not p.wait_for_all_acked(Duration(seconds=0.25))]
         if not slow:
             self.finish(0)
@@ -88,7 +88,7 @@ class PlayerNode(ProcessNode):
 
 
 def _instants(bag: Bag, topics: Sequence[str]) -> list[tuple[int, list[tuple[str, bytes]]]]:
-    """Return each instant (ns) and its messages (topic, bytes): step topics last, in their order of recording."""
+    """Return the instants (ns) in order, each with its messages (topic, bytes); step topics last, as recorded."""
     gathered: dict[int, list[tuple[str, bytes]]] = {}
     order = [bag.name_of(role) for role in TOPICS]
     for topic in sorted(topics, key=lambda name: order.index(name) if name in order else -1):

@@ -114,7 +114,7 @@ class RecorderNode(PeerNode):
         self._begin_bag()
 
     def start_run(self, run: Run) -> None:
-        """Prepare to record a new run, after a reset in a new bag; fail if the bag has steps of another run."""
+        """Prepare to record a new run: begin a new bag after a reset, otherwise fail if the bag has steps already."""
         if self._run is not None and not self.over and len(self.publishers_of(RUN)) == 1:
             self._keep_reset_run()
         elif self._complete >= 0:
@@ -210,7 +210,7 @@ class RecorderNode(PeerNode):
             self._held.append((topic, data))
 
     def _is_of_this_run(self, topic: str, data: bytes) -> bool:
-        """Return whether a message belongs to the announced run, not to one whose announcement is still to arrive."""
+        """Return False for a ready message or a reference of another run than the announced one, otherwise True."""
         if topic == READY:
             return self._run is not None and deserialize_message(data, Ready).run_id == self._run.run_id
         if topic != REFERENCE:

@@ -56,7 +56,7 @@ def watch_flight(client: GraphClient, options: SimpleNamespace) -> None:
 
 
 def _snapshot(state: Any, nominal: Any, status: Any | None, actuator: Any) -> dict[str, Any]:
-    """Return the displayed values (SI) of a step, from its messages; the tube level is None without a tube."""
+    """Return the values to display (SI), from the latest messages; the tube level is None without a tube."""
     return {
         "time": state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec,
         "altitude": state.altitude,

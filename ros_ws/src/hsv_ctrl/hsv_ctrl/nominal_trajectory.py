@@ -69,7 +69,7 @@ class NominalTrajectoryNode(BlockNode):
         return self._plan is not None and step >= self._first
 
     def poll(self) -> None:
-        """Switch to a new plan once it is complete."""
+        """Once a plan is computed, switch to it or reject its command; then answer the step that waited for it."""
         super().poll()
         if self._plan is not None and self._plan.done():
             plan, self._plan = self._plan, None

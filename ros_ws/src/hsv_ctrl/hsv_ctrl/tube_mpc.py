@@ -93,7 +93,7 @@ class TubeMpcNode(TubeNode):
         self.add_on_set_parameters_callback(self._on_change)
 
     def _on_change(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Change ``feedback.tau``, the only parameter that is not read-only, from the next step on."""
+        """Change ``feedback.tau`` from the next step on, or reject it; the law's other parameters are read-only."""
         for parameter in parameters:
             if parameter.name == TAU.name:
                 values = list(parameter.value)

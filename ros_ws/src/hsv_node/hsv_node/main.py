@@ -33,9 +33,9 @@ def run_node(
 ) -> int:
     """Spin the node that ``build`` returns until it finishes or is interrupted; return the exit code of the process.
 
-    With ``several``, all nodes share one executor until the first of them finishes. Wrong parameters end the process
-    before it joins the graph, with exit code 2 and one line on standard error that begins with ``name``. So do
-    arguments other than those of ROS, unless ``own_arguments`` says that the caller has checked them.
+    With ``several``, ``build`` yields several nodes, which share one executor until the first of them finishes. Wrong
+    parameters end the process before it joins the graph, with exit code 2 and one line on standard error that begins
+    with ``name``. So do other arguments than those of ROS, unless ``own_arguments`` says that the caller checks them.
     """
     words = list(sys.argv if args is None else args)
     try:

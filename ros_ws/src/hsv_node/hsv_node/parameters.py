@@ -31,7 +31,7 @@ _LARGEST = 2**63 - 1
 
 
 def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Declare every parameter of ``table`` on ``node`` and return the checked values.
+    """Declare the parameters of ``table`` that ``node`` does not have yet, and return the values of all by name.
 
     ``defaults``, by name (e.g. of the shipped design), replace those of the table.
 
@@ -104,7 +104,9 @@ def given(node: Node, name: str) -> bool:
 
 
 def refuse_unknown(node: ProcessNode, role: str) -> None:
-    """Raise a ParameterError if ``node`` was given an unknown parameter; files may contain those of other nodes.
+    """Raise a ParameterError if ``node`` was given an unknown parameter.
+
+    A parameter given in a file may be that of another node or of a custom controller.
 
     Args:
         node: A new node, which has not declared its parameters yet.

@@ -14,7 +14,7 @@ from hsv_node.middleware import type_name
 def node_in_role(asking: Node, role: NodeDescription) -> tuple[str, str] | None:
     """Return name and namespace of the node that has ``role`` in the graph of node ``asking``, or None.
 
-    It is in the namespace of ``asking``, or publishes a topic of the role in that namespace from another one.
+    The node is in the namespace of ``asking``, or publishes a topic of its role there from another namespace.
     """
     here = (node for node in asking.get_node_names_and_namespaces() if node[1] == asking.get_namespace())
     publishers = (

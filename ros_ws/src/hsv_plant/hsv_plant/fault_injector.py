@@ -41,7 +41,7 @@ class FaultInjectorNode(BlockNode):
         self._due_step = 0
 
     def on_message(self, topic: str, message: bytes) -> None:
-        """Process a command; end the run if the step or time in it is not the expected one."""
+        """Process a command; in a run for which this node is ready, fail if its step or time is not as expected."""
         if self.announced is not None:
             step, (seconds, nanoseconds) = self.messages[topic].step(message), stamp_of(self._due_step, self._period)
             if step != self._due_step or stamp_in(message) != seconds * 10**9 + nanoseconds:
@@ -51,7 +51,7 @@ class FaultInjectorNode(BlockNode):
         super().on_message(topic, message)
 
     def missing_links(self) -> list[str]:
-        """Return the missing links; end the run if there are two controllers."""
+        """Return the missing links; if there are none, fail if several nodes publish commands."""
         missing = super().missing_links()
         if not missing:
             self._refuse_two()

@@ -146,7 +146,7 @@ class PlantNode(LockstepNode):
         self._planning = reference.status == Reference.PLANNING
 
     def _on_change(self, parameters: list[RosParameter]) -> SetParametersResult:
-        """Change pace or pause, from the next step on."""
+        """Change pace or pause; the change acts from the next step that is published."""
         step = self._signals.step
         for parameter in parameters:
             if parameter.name in _IN_FLIGHT:
@@ -192,7 +192,7 @@ class PlantNode(LockstepNode):
         self._continue()
 
     def _continue(self) -> None:
-        """Execute the next step, unless the plant must wait for its input, the recorder or the wall clock."""
+        """Reset, end or advance the run, as far as input, recorder, pause and pace permit."""
         if self._resets and (self._answered or not self._published):
             # Not earlier: the actuator message is the last message of a step that a node waits for.
             self.get_logger().info(f"run {short_id(self._run)} reset at {step_in_words(self.step, self.plant.period)}")
@@ -215,7 +215,7 @@ class PlantNode(LockstepNode):
         return not self.recorded or self._signals.step < self._recorded_step + MAX_AHEAD
 
     def _delay(self) -> float:
-        """Return the wall time (s) until the next state is due."""
+        """Return the wall time (s) until the next state is due; negative if it is late or if there is no pace."""
         factor, (begun, first) = self.values["real_time_factor"], self._paced_from
         due = begun + (self.step + 1 - first) * self.plant.period / factor if factor else 0.0
         return due - time.monotonic()
@@ -255,7 +255,7 @@ class PlantNode(LockstepNode):
         return super().stopped(signal_number)
 
     def close(self) -> None:
-        """Log how the run ended, and announce it to the other nodes."""
+        """If the run has started, announce its end to the other nodes and, unless the flight diverged, log it."""
         if not self._started:
             return
         run, where = f"run {short_id(self._run)}", step_in_words(self.step, self.plant.period)
@@ -312,7 +312,8 @@ class PlantNode(LockstepNode):
 def unresponsive(node: LockstepNode, peers: Sequence[NodeDescription]) -> tuple[list[str], str | None]:
     """Return the names of the ``peers`` that do not answer, and the name of the last one that answers, or None.
 
-    The function calls the parameter service of every peer and ends after 2 s without a new answer.
+    The function calls the parameter service of every peer; it ends when all have answered, or after 2 s in
+    which no request is sent and no answer arrives.
     """
     # The helper ignores remappings given on the command line.
     helper = rclpy.create_node(f"{node.get_name()}_liveness", context=node.context, use_global_arguments=False)
