@@ -51,10 +51,7 @@ def clean_environment(route: str) -> dict[str, str]:
 
 
 def sourced_distribution() -> str:
-    """Return the name of the sourced ROS distribution, or ``wheels`` if none is sourced.
-
-    ROS_DISTRO alone does not count: official images set it without sourcing anything.
-    """
+    """Return the sourced ROS distribution, or ``wheels``: official images set ROS_DISTRO without sourcing anything."""
     env = clean_environment("jazzy")
     return (env.get("AMENT_PREFIX_PATH") and env.get("ROS_DISTRO")) or "wheels"
 
@@ -146,10 +143,7 @@ def relocate() -> None:
 
 
 def package_key(folder: Path, identity: str, pins: str) -> str:
-    """Return a hash of the inputs of the build of the package in ``folder``.
-
-    For a Python package these are the files at its top, the C sources, build.py, and the names of its data files.
-    """
+    """Return a hash of a build's inputs; for a Python package: setup.py, C sources and the names of its data files."""
     is_python = (folder / "setup.py").exists()
     parts = [identity, *([] if is_python else re.findall(r"(?m)^(?:ros-|numpy=).*", pins))]
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
@@ -178,10 +172,7 @@ def build(route: str, names: list[str], env: dict[str, str]) -> Step:
 
 
 def simplify_scripts(name: str) -> None:
-    """Replace the scripts of a Python package by scripts as pip writes them, which start faster.
-
-    Those of "setup.py develop" first search the metadata of all packages.
-    """
+    """Write the scripts of a Python package as pip does: those of "setup.py develop" first search all metadata."""
     for info in (BUILD / name).glob("*.egg-info"):
         for entry in Distribution.at(info).entry_points.select(group="console_scripts"):
             # Ctrl-C would print a traceback while Python starts, so it is blocked until hsv.cli.entry unblocks it.
