@@ -133,7 +133,7 @@ def class_place(name: str) -> str:
 
 
 def build_controller(values: Mapping[str, Any], design: ControlDesign | None = None) -> Controller:
-    """Return the controller that the flat parameters ``values`` describe.
+    """Return the controller that the flat parameters ``values`` describe; a placeholder if it is a node.
 
     Args:
         values: Flat parameters of the flight, of which the controller uses its own.
@@ -141,6 +141,7 @@ def build_controller(values: Mapping[str, Any], design: ControlDesign | None = N
 
     Raises:
         ParameterError: There is no such controller, or it cannot be built.
+        HsvError: The class of the controller raised it, for example a DesignError.
     """
     name = str(validate(CONTROLLER_PARAMETERS, values)["controller"])
     if name.startswith(NODE):

@@ -183,7 +183,7 @@ def _effectiveness(certificate: Mapping[str, Any]) -> float:
 
 
 def commanded(design: ControlDesign) -> np.ndarray:
-    """Return the largest |u| (2) of plan plus feedback in the tube or, without plan bounds, within the input limits."""
+    """Return the largest |u|, shape (2,): of certified plans plus feedback or, without plan bounds, of the limits."""
     bounds = design.plan_bounds
     if bounds is None:
         return np.maximum(np.abs(design.input_minimum), np.abs(design.input_maximum))

@@ -56,7 +56,7 @@ def certified(values: Sequence[float], minimum: np.ndarray, name: str = TAU.name
     closed loops along it. Factors near ``minimum`` for one state and near 1 for another are not on this line.
 
     Raises:
-        ParameterError: The factors are not certified; the message names a value and the range.
+        ParameterError: The factors are not certified; the message says which are.
     """
     tau = rigid_factors(values, name)
     outside = np.flatnonzero(~((tau >= minimum) & (tau <= 1.0)))
@@ -139,7 +139,8 @@ class PlanBounds:
 
     ``input_minimum`` and ``input_maximum`` (2) are the ends of U minus F Z; beyond them the feedback may saturate.
     ``region_minimum`` and ``region_maximum`` (3: both inputs, pitch acceleration) are the range of the certified
-    plans, for the inputs shifted down by 5 %. Disturbances were measured along these plans; faster ones cause more.
+    plans; the range of each input is shifted down by 5 % of its width. Disturbances were measured along these plans;
+    faster ones cause more.
     """
 
     input_minimum: np.ndarray
@@ -206,8 +207,8 @@ NO_DESIGN = "none"
 def digest(values: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a design's flat parameters, in hexadecimal.
 
-    ``design.hash`` itself and ``feedback.tau``, which may have any certified value, are left out. So are empty values
-    and values that mean the same as an absent parameter.
+    ``design.hash`` itself and ``feedback.tau``, which may have any certified value, are left out. So are empty values,
+    ``feedback.tau_minimum`` at its default, and ``nominal.filtered`` and ``nominal.interpolated`` if they are false.
     """
     known = {p.name for p in DESIGN_PARAMETERS} - {"design.hash", TAU.name}
     absent = {TAU_MINIMUM.name: TAU_MINIMUM.default, "nominal.filtered": False, "nominal.interpolated": False}
@@ -239,7 +240,7 @@ def positive(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np
 
 
 def samples(values: Mapping[str, Any], axis: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return breakpoints (n) of ``axis``, e.g. ``scheduling.altitude``, and the weights (n, v) of v vertices there."""
+    """Return the breakpoints (n) of ``axis``, e.g. ``scheduling.altitude``, and the vertices' weights (n, v) there."""
     breakpoints = np.array(values[f"{axis}.breakpoints"], float)
     if len(breakpoints) < 2:
         raise DesignError(f"parameter {axis}.breakpoints: {len(breakpoints)} values, expected at least 2")
@@ -252,7 +253,7 @@ class ControlDesign:
 
     ``feedback_gain`` is F (2, 9). ``nominal_gains`` are K (g, 2, 9), outermost ellipsoid first, ``nominal_ellipsoids``
     the P (g, 5, 5) of their ellipsoids x' P x <= 1 of rigid states. ``nominal_state_scale`` (5) and
-    ``nominal_input_scale`` (2) weigh equally in the nominal cost; ``nominal_input_bound`` (2) bounds |u_n| (eq. 35).
+    ``nominal_input_scale`` (2) are deviations of equal nominal cost; ``nominal_input_bound`` (2) bounds |u_n| (eq. 35).
     ``input_minimum`` and ``input_maximum`` (2) limit u, and ``notch`` is the filter of the design. The samples of each
     scheduling axis are breakpoints (n) and, at them, the weights (n, v) of the axis' v vertices.
     """
@@ -566,7 +567,7 @@ def read_design(path: Path) -> ControlDesign:
 
 
 def find_design(name: str) -> Path:
-    """Return the path of a design's parameter file, given as a path or as a name.
+    """Return the path of a design's parameter file, given as a path (with ``/`` or ending in ``.yaml``) or as a name.
 
     A name is looked up in the folders of the environment variable ``HSV_DESIGN_PATH``, then among the shipped designs.
 
@@ -577,7 +578,7 @@ def find_design(name: str) -> Path:
 
 
 def find_file(name: str, suffix: str) -> Path:
-    """Return the path of a design's file with the given ``suffix``, looked up as in :func:`find_design`."""
+    """Return the path of a design's file with this ``suffix``; look-up and error are those of :func:`find_design`."""
     if "/" in name or name.endswith(suffix):
         candidates = [Path(name)]
     else:

@@ -56,7 +56,8 @@ class FmuClass(LibraryClass):
         """Return the controller for a flight with the flat parameters ``values``; ``design`` is not used.
 
         Raises:
-            ParameterError: A variable of the FMU is missing, has another type or unit, or is not a signal of the bench.
+            ParameterError: A variable is missing, has another type or unit or stands for two inputs, or an input is
+                neither a signal of the bench nor listed in ``fmu.unconnected``.
         """
         own = validate(_PARAMETERS, values)
         try:
@@ -69,7 +70,7 @@ class FmuClass(LibraryClass):
         return LibraryController(self._name, self._path, self._symbol, self.block.state_size, numbers, vehicle)
 
     def _routes(self, own: Mapping[str, Any]) -> list[int]:
-        """Return each FMU input's index in ``_INPUTS``, or -1; then for each of ``_OUTPUTS``, the FMU output's."""
+        """Return for each FMU input its index in ``_INPUTS``, or -1; then for each of ``_OUTPUTS``, the FMU's index."""
         sources = {own[f"fmu.{name}"]: (i, name, unit) for i, (name, unit) in enumerate(_INPUTS)}
         if len(sources) < len(_INPUTS):
             raise ParameterError("[fmu]: a name stands twice, expected a variable for each input")
@@ -190,7 +191,7 @@ class LoadedFmu:
         self._next = 0
 
     def _step(self, k: int, given: int, out: int, state: int, par: int) -> int:
-        """Step the FMU, as a step function of ``hsv_block.h``; ``par`` points to the numbers from :class:`FmuClass`."""
+        """Step the FMU, as a step function of ``hsv_block.h``; ``par``: period (s), then :meth:`FmuClass._routes`."""
         try:
             count = len(self._inputs)
             period, *routes = (c_double * (1 + count + len(_OUTPUTS))).from_address(par)

@@ -3,8 +3,8 @@
 A command is a list of legs. A leg has a target point of altitude and velocity, the time of the request, and a minimum
 duration. It becomes a ramp with blended corners along the climbing, accelerating trims of
 :mod:`hsv.control.reference_trajectory`. Bisection finds the shortest ramp, in integer numbers of periods, that keeps
-u_r + u_n inside U minus F Z (paper eq. 30) in every step, with x_n (eq. 20) driven by the defect of the reference, and
-that moves no input faster than its actuator can.
+u_r + u_n inside U minus F Z (paper eq. 30) in every step, with x_n (eq. 20) driven by the defect of the reference. The
+ramp must also keep x_n in the ellipsoids of the nominal gains and move no input faster than its actuator can.
 """
 
 from __future__ import annotations
@@ -118,11 +118,12 @@ class Governor:
 
         Args:
             start: Altitude (m) and velocity (m/s) at the start of the flight, in trim.
-            legs: Legs in order; each begins when requested, or at the last corner of the previous one if that is later.
+            legs: Legs in order. The first corner of each is ``blend`` after its request, so that the blend begins then,
+                or is the last corner of the previous leg if that is later.
             blend: Half-width of the blend at each corner, s, rounded up to a multiple of the period.
 
         Raises:
-            GovernorError: No reference fits a leg; the message gives the reason.
+            GovernorError: There is no leg, no reference fits a leg, or ``blend`` is out of its range.
         """
         half = self._half(blend)
         if not legs:
@@ -138,13 +139,13 @@ class Governor:
     def continued(
         self, corners: Sequence[Corner], leg: Leg, blend: float, beginning: Beginning
     ) -> tuple[GovernedReference, int]:
-        """Return the fastest reference that continues ``corners`` by one ``leg``, and its first new step.
+        """Return the fastest reference that continues ``corners`` by one ``leg``, and the first step that changes.
 
-        All earlier steps equal those of ``corners``, bit for bit. The leg begins when requested, but not before the
-        last of the corners, nor so early that a step before ``beginning`` would change.
+        All earlier steps equal those of ``corners``, bit for bit. The blend into the leg begins when requested, but
+        its corner comes after the last of ``corners``, and no step before ``beginning`` changes.
 
         Raises:
-            GovernorError: No reference fits; the message gives the reason.
+            GovernorError: No reference fits, or ``blend`` is out of its range.
         """
         half = self._half(blend)
         last = corners[-1]

@@ -88,7 +88,8 @@ class LibraryProcess:
             name: Name of the request.
             arguments: Arguments of the request.
             kept: Keyword arguments that the child stores; an object that it already has is not sent again.
-            begun: Returns the number of steps that the child has begun; while it is 0, there is no time limit.
+            begun: Returns the number of steps that the child has begun. If it does not change for :data:`NO_PROGRESS`,
+                the child is taken to hang; there is no time limit while it is 0.
 
         Raises:
             OSError: The file cannot be read.
