@@ -90,10 +90,10 @@ def montecarlo(
 
     Args:
         scenario: Name of a shipped scenario, or path.
-        samples: Number of flights; ignored for corners.
+        samples: Number of flights, a power of two for ``sobol``; ignored for ``corners``.
         seed: Seed from which all samples are drawn.
         method: ``uniform``, ``latin_hypercube``, ``sobol`` or ``corners`` (all combinations of extreme values).
-        scale: Factor on the bounds of the uncertain parameters; with 0 they do not vary.
+        scale: Factor on the bounds of the vehicle's uncertain parameters; with 0 these bounds are not used.
         factors: Least and largest value of further fields, by field, written as in a scenario file.
         workers: Number of processes: 1 to fly in this process, 0 for one per processor.
 
@@ -124,8 +124,8 @@ def trim(
 ) -> Trim:
     """Return the equilibrium at an altitude and a velocity: level, or climbing and accelerating.
 
-    A flight condition is a number in SI units or a text with a unit, such as ``"85500 ft"``. State and input of the
-    result are in its ``quantities``, by name, with their SI units.
+    Each of the first four arguments is a number in SI units or a text with a unit, such as ``"85500 ft"``. The states
+    and inputs of the result are in its ``quantities``, by name, with their SI units.
 
     Args:
         altitude: Altitude (m); empty: as in the published trim, or the middle of the envelope if that trim is outside.
@@ -133,7 +133,7 @@ def trim(
         climb_rate: Climb rate (m/s).
         acceleration: Acceleration (m/s^2).
         vehicle: Name of a shipped vehicle, or path; empty: the paper's vehicle.
-        coupling: Name of a set of inertial coupling, or a multiple of ``derived``; empty: the vehicle's own.
+        coupling: Name of a set of inertial coupling, or a multiple of ``derived``; empty: the vehicle's first set.
 
     Raises:
         QuantityError, VehicleError: An argument is wrong; the message names it.
@@ -144,9 +144,9 @@ def trim(
 
 
 def plot(flights: Flight | Mapping[str, Flight], *, units: str = UnitSystem.metric) -> Figure:
-    """Return a figure of one or several flights: the paper's eight plots over time, or six for rigid vehicles.
+    """Return a figure of one or several flights: the paper's eight plots over time, or six if all vehicles are rigid.
 
-    The dotted reference and the shaded time from the first fault on are those of the first flight.
+    Only the first flight's reference is drawn, dotted, and its time from the first fault on is shaded.
 
     Args:
         flights: One flight, or several by label.

@@ -211,7 +211,7 @@ class _Episodes:
 class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """An environment in which the agent tracks the reference of a scenario by fuel and elevator, see :mod:`hsv.gym`.
 
-    ``info`` has ``nominal_input``, u_r + u_n with shape (2,), and ``flight``, the flight's number in the campaign.
+    ``info`` has ``nominal_input``, u_r + u_n, shape (2,), and ``flight``, its number in the campaign (0 without one).
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012 (as in the base class)
@@ -220,12 +220,12 @@ class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def __init__(self, scenario: str = "case1", scale: float = 0.0, factors: Factors | None = None) -> None:
         """Read a scenario, whose controller is replaced by the agent.
 
-        If the scenario has no distributions and nothing varies, every episode is flown as by ``hsv simulate``.
-        Otherwise every episode is a random flight of the campaign :func:`hsv.montecarlo` with these arguments.
+        If the scenario has no distributions, ``scale`` is 0 and ``factors`` is empty, every episode is the flight of
+        ``hsv simulate``. Otherwise it is a random flight of the campaign :func:`hsv.montecarlo` with these arguments.
 
         Args:
             scenario: Name of a shipped scenario, or path.
-            scale: Factor on the bounds of the vehicle's uncertain parameters; with 0 they do not vary.
+            scale: Factor on the bounds of the vehicle's uncertain parameters; with 0 these bounds are not used.
             factors: Least and largest value of further fields, written as in a scenario file, by field, such as
                 ``fault[0].effectiveness``.
 
@@ -241,9 +241,10 @@ class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._episodes.observation[0], self._info
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, Info]:
-        """Simulate a control period with a finite ``action``, shape (2,).
+        """Simulate a control period with a finite ``action``, shape (2,); an episode that is over begins anew instead.
 
-        Return the observation, shape (18,), the reward, whether the episode terminates or is truncated, and ``info``.
+        Return the observation, shape (18,), the reward, whether the episode terminates, whether it is truncated, and
+        ``info``.
         """
         [reward], [terminated], [truncated] = self._episodes.step(np.asarray(action, float)[None])
         return self._episodes.observation[0], float(reward), bool(terminated), bool(truncated), self._info
@@ -266,11 +267,11 @@ class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
 
 class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
-    """Several :class:`TrackEnv`, simulated side by side by the core; the results have the same bits as alone.
+    """Several :class:`TrackEnv`, simulated side by side by the core; each step has the same bits as alone.
 
-    Environment i has the seed of the reset plus i. Flights that are simulated side by side have a common step: when one
-    of them diverges, the others are truncated, and all begin anew in the next step. Flights that the core cannot
-    simulate side by side, for example because the engine of one fails, are simulated alone.
+    A reset with one seed gives environment i that seed plus i. Flights that are simulated side by side have a common
+    step: when one of them diverges, the others are truncated, and all begin anew in the next step. Flights that the
+    core cannot simulate side by side, for example because the engine of one fails, are simulated alone.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 (as in the base class)

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 
 class HsvError(Exception):
-    """Base class of all errors of this library; the message names the field, its value and what was expected."""
+    """Base class of all errors of this library; most messages name the field, its value and what was expected."""
 
 
 class QuantityError(HsvError, ValueError):
@@ -14,11 +14,11 @@ class QuantityError(HsvError, ValueError):
 
 
 class TrimError(HsvError, ValueError):
-    """No equilibrium with admissible inputs exists at the requested flight condition."""
+    """A flight condition that is impossible or has no equilibrium within the input limits."""
 
 
 class VehicleError(HsvError, ValueError):
-    """A vehicle file that is missing or has a wrong field."""
+    """A vehicle that is unknown, or whose file cannot be read or has a wrong field."""
 
 
 class DocumentError(HsvError, ValueError):
@@ -26,11 +26,11 @@ class DocumentError(HsvError, ValueError):
 
 
 class ScenarioError(HsvError, ValueError):
-    """A scenario file that is missing or has a wrong field."""
+    """A scenario that is unknown, or whose file cannot be read or has a wrong field or design."""
 
 
 class DesignError(HsvError, ValueError):
-    """A design file or controller parameter that is missing or malformed, or a design that does not stabilise."""
+    """A design, its inputs or a controller parameter that is missing or wrong, or a problem without a solution."""
 
 
 class GovernorError(HsvError, ValueError):
@@ -42,7 +42,7 @@ class RecordingError(HsvError, ValueError):
 
 
 class RunError(HsvError, RuntimeError):
-    """A flight that did not finish."""
+    """A flight or another process that failed."""
 
 
 class ControllerError(RunError):

@@ -136,7 +136,7 @@ def parse_yaml(text: str) -> Any:
 
 
 class _Loader(Composer, _Parser, SafeConstructor, Resolver):
-    """PyYAML's safe loader with the fast parser in C and the composer in Python, which does not overflow the stack."""
+    """PyYAML's safe loader with the parser in C, if installed, and the composer in Python, which limits the nesting."""
 
     def __init__(self, stream: str) -> None:
         _Parser.__init__(self, stream)
@@ -278,7 +278,7 @@ def follow_extends(
 
 
 def is_path(name: str) -> bool:
-    """Return whether ``name`` is the path of a TOML file rather than a registered name."""
+    """Return whether ``name`` contains a slash or ends in ``.toml``, and so is a path rather than a registered name."""
     return "/" in name or name.endswith(".toml")
 
 

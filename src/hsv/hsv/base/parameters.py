@@ -1,4 +1,4 @@
-"""Parameters: each component has one table of them, from which nodes declare them and by which files are checked."""
+"""Parameters: each component has a table, from which nodes declare its parameters and files are checked."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Parameter:
         return value
 
     def refusal(self, value: object) -> ParameterError:
-        """Return the error for an invalid ``value``; for an integer it says how to write a double."""
+        """Return the error for an invalid ``value``; for an integer in place of a double, it gives the correct form."""
         hint = ""
         if self.kind == "double" and _is_whole(value):
             hint = f" (write {float(cast(int, value))})"
@@ -97,7 +97,7 @@ class Parameter:
         return ParameterError(f"parameter {self.name} = {_shown(shown)}: expected {self.constraint}{hint}")
 
     def admits(self, value: object) -> bool:
-        """Return whether a number is finite, within the range, and integer-valued if that is required."""
+        """Return whether ``value`` is a finite number within the range, and integer-valued if that is required."""
         if not isinstance(value, int | float) or not is_finite(value):
             return False
         return self.minimum <= value <= self.maximum and (not self.whole or float(value).is_integer())

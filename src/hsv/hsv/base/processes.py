@@ -34,8 +34,8 @@ _WHOLE: set[CodeType] = set()
 def uninterrupted(function: Callable[P, R]) -> Callable[P, R]:
     """Decorate a short ``function`` so that Ctrl-C takes effect only after it has returned.
 
-    A function that starts a process, for example, can then always record it. This works after :func:`take_interrupts`.
-    Use :func:`ctrl_c_held_back` for longer work, and for processes that must never receive Ctrl-C.
+    A function that starts a process, for example, can then always record it. :func:`take_interrupts` must have been
+    called. Use :func:`ctrl_c_held_back` for longer work, and for processes that must not receive Ctrl-C.
     """
     _WHOLE.add(function.__code__)
     return function
@@ -45,8 +45,8 @@ def interrupt(number: int, frame: FrameType | None) -> None:
     """Handle a signal: raise ``KeyboardInterrupt`` at once, or after the current import or uninterrupted function.
 
     An interrupted import of a compiled module would fail with another error, and callbacks of the import system swallow
-    the exception. A timer therefore calls this function again after ``_LATER``. It survives an ``exec``, so the signal
-    is not lost even if another program is about to replace this one.
+    the exception. A timer therefore calls this function again after ``_LATER`` (s). The timer survives an ``exec``, so
+    the signal is not lost even if another program is about to replace this one.
 
     Raises:
         KeyboardInterrupt: Unless it must be postponed.
@@ -89,7 +89,7 @@ def ignore_ctrl_c_at_end() -> None:
 
 
 def end_with_parent(parent: int) -> None:
-    """Have Linux terminate this process when the thread that started it, in the process ``parent``, ends."""
+    """On Linux, have this process terminated when the thread that started it, in process number ``parent``, ends."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
         if os.getppid() != parent:  # it has ended already
@@ -139,7 +139,7 @@ def over_threads(
 
 @contextmanager
 def ctrl_c_held_back() -> Iterator[None]:
-    """Delay Ctrl-C until the end of the ``with`` block; threads and processes started in the block never receive it.
+    """Delay Ctrl-C until the end of the ``with`` block; in threads and processes started there it stays blocked.
 
     A pool of workers needs this because it cannot be closed if it is interrupted while it starts. After Ctrl-C,
     the code that started the pool must end its processes.

@@ -1,7 +1,7 @@
 """Conversion between quantities with units, as people write them, and the SI numbers used inside the library.
 
-Each conversion rounds once: numbers are read and factors are multiplied as fractions. Constants therefore have the same
-bits on every machine and with every version of pint, the units library.
+Reading a quantity rounds once: its number is read, and factors are multiplied, as fractions. Constants therefore have
+the same bits on every machine and with every version of pint, the units library.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ def readable(value: float, unit: str, system: UnitSystem = UnitSystem.metric) ->
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """Return ``value`` as text with ``digits`` significant digits, or as an integer of up to 6 digits if longer."""
+    """Return ``value`` as text with ``digits`` significant digits; a longer integer part, up to 6 digits, is kept."""
     return f"{value:.0f}" if float(f"1e{digits - 1}") <= abs(value) < 999999.5 else f"{value:.{digits}g}"
 
 

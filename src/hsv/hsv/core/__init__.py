@@ -160,7 +160,7 @@ def lanes() -> int:
 
 
 def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int, halves: int = lib.SENSE | lib.ACT) -> int:
-    """Simulate the steps ``start`` ... ``stop`` - 1 of one flight, or of :func:`lanes` flights at a time.
+    """Simulate the steps ``start`` ... ``stop`` - 1, or until all have diverged, of one or :func:`lanes` flights.
 
     Args:
         flights: Structs ``hsv_flight``.
@@ -289,7 +289,7 @@ def _contiguous(value: np.ndarray, required: np.dtype[Any]) -> np.ndarray:
 
 
 def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: dict[str, int]) -> None:
-    """Add to ``counts`` the fields given by the shape ``found``; raise a ValueError if it is not as ``declared``."""
+    """Add the counts in the shape ``found`` to ``counts``; raise a ValueError if they contradict it or ``declared``."""
     fits = len(found) == len(declared)
     for size, dimension in zip(found, declared, strict=False):
         count = size - dimension.more
@@ -305,7 +305,7 @@ def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: d
 class Callback:
     """A Python function that the core can call as a step function of ``hsv_block.h``, as long as this object lives.
 
-    ``error`` is the exception that the function raised, or None; ``times`` are the durations (s) of its other calls.
+    ``error`` is the exception that the function raised, or None; ``times`` are the durations (s) of all other calls.
     """
 
     def __init__(self, function: Callable[[int, Any, Any], None]) -> None:

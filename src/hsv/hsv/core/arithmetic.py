@@ -31,7 +31,7 @@ def of_each(function: Callable[[float], float], values: Any) -> np.ndarray:
 def solve(A: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return X (n, m) with A X = b for ``A`` (n, n) and ``b`` (n, m), by elimination with partial pivoting.
 
-    If ``A`` is singular, the result is not finite.
+    If a pivot is zero, the result is not finite.
 
     Raises:
         ValueError: The shapes do not match.
