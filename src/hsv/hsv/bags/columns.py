@@ -2,8 +2,8 @@
 
 A column is named by the path of its field, such as ``header.stamp``. For n messages, a number becomes an array of shape
 (n,), a time or duration one of int64 nanoseconds, shape (n,), and an array or sequence of numbers one of shape
-(n, length). Texts, sequences of different lengths, and lists of messages (as lists of dictionaries) become arrays of
-objects, shape (n,).
+(n, length). A nested message becomes the columns of its fields. Texts, sequences of different lengths, and lists of
+texts, times or messages (as dictionaries) become arrays of objects, shape (n,).
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def read_one_by_one(messages: Sequence[object]) -> Read:
 
 
 def columns_of(types: Typesdict, message_type: str, read: Read, source: str = "") -> Columns:
-    """Return the columns of messages of a type, with values from ``read``; ``source`` is for error messages."""
+    """Return the columns of messages of a type, with values from the function ``read``; errors name ``source``."""
     columns = Columns(source)
 
     def gather(kind: str, prefix: str) -> None:

@@ -97,7 +97,7 @@ def compare(expected: Track, actual: Track, tolerance: float = 0.0) -> Compariso
 
 
 def _apart(expected: Track, actual: Track) -> Difference:
-    """Return the first difference between the times of two recordings: a time that one lacks, or a different order."""
+    """Return the first difference in the times of two recordings: their number, a time that one lacks, or the order."""
     ours, theirs = expected.times, actual.times
     only = np.setxor1d(ours, theirs)
     swapped = (a for a, b in zip(ours, theirs, strict=False) if a != b)

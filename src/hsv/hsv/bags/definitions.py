@@ -48,7 +48,7 @@ class Field:
 
     @property
     def is_text(self) -> bool:
-        """Whether the field is a text or a list of texts, bounded or unbounded."""
+        """Whether the field is a text or a list of texts, bounded or unbounded, but not of wide characters."""
         return self.type == "string"
 
     @property
@@ -149,7 +149,7 @@ def installed_types(message_type: str) -> Typestore:
 
 
 def deserialized(types: Typestore, message: bytes, message_type: str) -> Any:
-    """Return ``message`` (CDR) deserialized, ignoring surplus bytes at its end; raise a SerdeError if it is invalid."""
+    """Return ``message`` (CDR) deserialized, ignoring a few surplus bytes at its end; raise a SerdeError if invalid."""
     try:
         return types.deserialize_cdr(message, message_type)
     except SerdeError:

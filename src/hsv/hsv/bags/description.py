@@ -260,7 +260,7 @@ def peers(me: NodeDescription, controller: str, recorded: bool, estimator: bool 
 def links(
     me: NodeDescription, controller: str, recorded: bool, estimator: bool = False
 ) -> list[tuple[str, NodeDescription]]:
-    """Return the connections of ``me`` as pairs (topic, other node), including the recorder if ``recorded``."""
+    """Return (topic, peer) for each step topic between ``me`` and a peer, in either direction, see :func:`peers`."""
     return [
         (topic, other)
         for topic in TOPICS

@@ -39,11 +39,11 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
     """Write ``topics``, given by name or role; return the written files.
 
     CSV and Parquet: the folder ``target`` contains one file per topic, such as ``hsv_state.csv`` for ``/hsv/state``,
-    with one column per number, such as ``elastic_rate_1 [kg^0.5 m/s]``; other fields become texts or JSON. npz: one
-    file with one array per field, such as ``hsv_state.elastic_rate_1 [kg^0.5 m/s]``. mat: one file with one structure
-    per topic, such as ``hsv_state``, with a field ``elastic_rate_1`` and its unit in
+    with one column per number, such as ``elastic_rate_1 [kg^0.5 m/s]``; other fields become texts or JSON. npz: the
+    file ``target`` has one array per field, such as ``hsv_state.elastic_rate_1 [kg^0.5 m/s]``. mat: the file has one
+    structure per topic, such as ``hsv_state``, with a field ``elastic_rate_1`` and its unit in
     ``hsv_state.units.elastic_rate_1``. The first column or field of a topic is the simulated ``time`` (s). Warnings
-    about an incomplete bag are added as a file or array, :data:`INCOMPLETE`.
+    about an incomplete bag become one more text file or array, :data:`INCOMPLETE`.
 
     Raises:
         RecordingError: A topic is missing, or the target exists or cannot be written.
@@ -120,7 +120,7 @@ def _columns(bag: Bag, topic: str) -> tuple[dict[str, NDArray[Any]], dict[str, U
 
 
 def _fields(bag: Bag, topic: str) -> dict[str, tuple[NDArray[Any], str]]:
-    """Return each field of a topic, by name, as (array, unit); a field of varying length becomes JSON texts."""
+    """Return each field of a topic, by name, as (array, unit); fields other than texts and number arrays are JSON."""
     columns, units = _columns(bag, topic)
     fields = {}
     for name, column in columns.items():
@@ -130,10 +130,10 @@ def _fields(bag: Bag, topic: str) -> dict[str, tuple[NDArray[Any], str]]:
 
 
 def table(columns: Mapping[str, NDArray[Any]], units: Mapping[str, Units]) -> dict[str, NDArray[Any]]:
-    """Return a table of messages, {name with unit: column}, with a column for each number and for each other field.
+    """Return a table of messages, {name with unit: column}: a column for each number, and one for each other field.
 
     A sequence of numbers has as many columns as its longest value; shorter values are padded with NaN. Fields that are
-    neither numbers nor texts become JSON.
+    neither numbers nor texts become texts in JSON.
 
     Args:
         columns: Fields of messages from :mod:`hsv.bags.columns`.

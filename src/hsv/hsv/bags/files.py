@@ -30,9 +30,10 @@ compressed to about a quarter."""
 
 
 def locked(stream: IO[bytes], *, shared: bool = False) -> bool:
-    """Try to lock an open file until it is closed; return whether it is locked. A recorder locks its file in this way.
+    """Try once to lock an open file; return whether this succeeded. The lock lasts until the file is closed.
 
-    On a file system without locks every attempt succeeds. Several processes can hold a ``shared`` lock.
+    A recorder holds the exclusive lock of its file. Several processes can hold a ``shared`` one. On a file system
+    without locks every attempt succeeds.
     """
     try:
         fcntl.flock(stream, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
@@ -44,7 +45,7 @@ def locked(stream: IO[bytes], *, shared: bool = False) -> bool:
 
 
 def being_recorded(path: Path) -> bool:
-    """Return whether a recorder is writing the file."""
+    """Return whether a recorder or a recovery holds the exclusive lock of the file, see :func:`locked`."""
     with path.open("rb") as stream:
         return not locked(stream, shared=True)
 
@@ -56,7 +57,8 @@ def find_files(path: Path) -> tuple[list[Path], list[str]]:
         path: A bag directory, or one of its files, which is then returned alone.
 
     Raises:
-        RecordingError: There is no MCAP file, the bag is in sqlite3, or the directory contains files of several bags.
+        RecordingError: There is no MCAP file, the bag is in sqlite3, or the directory contains files of several bags
+            and its metadata.yaml does not tell which to read.
     """
     if path.suffix == ".db3" or (path.is_dir() and any(path.glob("*.db3"))):
         raise RecordingError(
@@ -119,7 +121,7 @@ class Unpacker:
     def unpacked(self, data: bytes, compression: str | None = None) -> tuple[bytes, bool]:
         """Return ``data``, decompressed up to the first damage, and whether they were decompressed completely.
 
-        ``compression`` is ``zstd``, ``lz4``, or empty for data that are not compressed; None: inferred from them.
+        ``compression`` is ``zstd``, ``lz4``, or empty (not compressed); None: identified by the first bytes.
         """
         match COMPRESSIONS.get(data[:_MAGIC], "") if compression is None else compression:
             case "zstd":

@@ -24,7 +24,7 @@ MEASURED = (STATE, NOMINAL, COMMAND, ACTUATOR)
 
 
 def labels(bags: Sequence[Bag]) -> list[str]:
-    """Return a distinct label for each of ``bags``: its scenario, with as much of its path as necessary."""
+    """Return a distinct label for each of ``bags``: its scenario; where bags share it, also folder, path or number."""
     scenarios = [bag.custom_data.get("scenario", bag.path.stem) for bag in bags]
     names = scenarios
     for details in (
@@ -51,7 +51,7 @@ def input_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarra
 
 
 def flight_data(bag: Bag) -> FlightData:
-    """Return the flight in ``bag`` at the steps that state, nominal and command share, or raise a RecordingError."""
+    """Return the flight in ``bag`` at the common steps of state, nominal and command; RecordingError if none."""
     rows = joined(bag, (STATE, NOMINAL, COMMAND))
     state, nominal, command = rows[STATE], rows[NOMINAL], rows[COMMAND]
     status = bag.columns(ACTUATOR)
@@ -72,7 +72,10 @@ def flight_data(bag: Bag) -> FlightData:
 
 
 def flight_fingerprint(bag: Bag) -> str | None:
-    """Return the flight's fingerprint; None if steps are missing. Raise a RecordingError if no step is complete."""
+    """Return the flight's fingerprint, or None if steps may be missing, are repeated, or are out of order.
+
+    Raise a RecordingError if no step is complete.
+    """
     topics = (STATE, FILTERED_STATE, NOMINAL, COMMAND, ACTUATOR)
     state, filtered, nominal, command, actuator = joined(bag, topics).values()
     every = np.arange(len(state["step"]))
@@ -92,7 +95,7 @@ def flight_fingerprint(bag: Bag) -> str | None:
 
 
 def equipment_topics(bag: Bag) -> list[str]:
-    """Return the topics in ``bag`` that show how sensors, links, effectors and air deviate from the ideal."""
+    """Return the topics in ``bag``, by role, that show how sensors, links, effectors and air deviate from the ideal."""
     return [topic for topic in (STATE, MEASUREMENT, COMMAND, ACTUATOR, FORCES) if topic in bag.roles]
 
 
@@ -105,7 +108,10 @@ def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def held(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return, by link (measurement, command), the steps at which it held old data, if any, as masks of shape (n,)."""
+    """Return {link: mask, shape (n,)} of the steps, if any, at which its output, but not its input, repeats the last.
+
+    The links are ``measurement`` (state to measurement) and ``command`` (command to actuator command).
+    """
     ends = {}
     if MEASUREMENT in topics:
         ends["measurement"] = state_columns(topics[STATE]), state_columns(topics[MEASUREMENT], "state.")

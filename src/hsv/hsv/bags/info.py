@@ -51,13 +51,13 @@ def describe(bag: Bag) -> dict[str, Any]:
 
     Returns:
         ``path``, ``folder``, ``warnings`` (texts), ``complete`` (whether there are none), ``start_s``, ``duration_s``,
-        ``messages``, ``topics``, ``custom_data``, ``fingerprint`` (None if not complete), ``as_published`` (None
+        ``messages``, ``topics``, ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None
         without a published value), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
         entry per interval), ``equipment`` (deviations of sensors, links, effectors and air from the ideal, SI),
         ``step_times`` (wall times of the steps of the control law in ms, by node, and the control period),
         ``saturation``, ``tube`` and ``not_covered`` (texts: properties of the flight outside the certificate of its
-        design). From ``ending`` on, an entry is None if its topics or other data for it are missing. Other times are
-        simulated times in seconds; ``end_s`` is None for an interval that lasts until the end of the bag.
+        design). From ``ending`` on, an entry is None if its topics or other data for it are missing. Names that end in
+        ``_s`` are simulated times in seconds; ``end_s`` is None if an interval lasts until the end of the bag.
     """
     start, end = bag.span
     fingerprint, warnings = None, bag_warnings(bag)
@@ -140,7 +140,7 @@ def parameters_in_words(fault: dict[str, Any], written: Callable[[float, str], s
 
     Args:
         fault: Entry of ``faults`` in :func:`describe`.
-        written: Function that formats a number with its SI unit; the unit is empty if there is none or it is unknown.
+        written: Function that formats a number with its SI unit (empty if none or unknown); not used for rad/s.
     """
     given = fault["parameters"]
     try:
@@ -158,7 +158,7 @@ def parameters_in_words(fault: dict[str, Any], written: Callable[[float, str], s
 
 
 def _equipment(bag: Bag) -> dict[str, Any] | None:
-    """Return deviations from the ideal, SI: of measurements, links, effectors, air; None if no step is complete."""
+    """Return how measurements, links, effectors and air deviate from the ideal, SI; None if no step is complete."""
     try:
         topics = joined(bag, equipment_topics(bag))
     except RecordingError:
@@ -174,7 +174,7 @@ def _equipment(bag: Bag) -> dict[str, Any] | None:
 
 
 def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | None:
-    """Return a text on each property of the flight outside its certificate; None if the attachments are unreadable."""
+    """Return a text on each property of the flight outside its certificate; None if attachments are missing or bad."""
     try:
         sections = [ParameterSections.parse(bag.text(name), name) for name in ("design.yaml", "scenario.yaml")]
         values = sections[0].overlaid(sections[1]).of(TUBE_MPC.name)

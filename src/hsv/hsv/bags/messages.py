@@ -65,7 +65,8 @@ class Structure:
             ``header.stamp.sec`` or ``state.altitude``. A text includes its closing zero.
         lengths: Offset and value of the length of every text and sequence, by path.
         size: Size of :attr:`dtype`, bytes.
-        complete: Whether dtype has all fields; else it ends before wide text or a non-empty list of texts or messages.
+        complete: Whether dtype has all fields but empty lists of texts or messages; else it ends before a non-empty one
+            or wide text.
     """
 
     def __init__(self, store: Typesdict, message_type: str, message: bytes) -> None:
@@ -93,7 +94,7 @@ class Structure:
         self._checked = [(ENCAPSULATION + at, value.to_bytes(4, "little")) for at, value in self.lengths.values()]
 
     def fits(self, message: bytes) -> bool:
-        """Return whether ``message`` has this layout."""
+        """Return whether ``message`` has this layout, possibly followed by further bytes."""
         if len(message) < ENCAPSULATION + self.size or message[:2] != _LITTLE_ENDIAN:
             return False
         return all(message[at : at + 4] == value for at, value in self._checked)
@@ -112,7 +113,7 @@ class Structure:
 
         The size is 1 for a number, :data:`VARYING` for a sequence of numbers, and n for n consecutive numbers; their
         path is that of the first, or of the nested message that contains them. A MessageError names a field that the
-        definition lacks.
+        definition lacks or that is no such number.
         """
         names, formats, offsets = list(self._places), [], []
         for path, size in chosen.values():
@@ -198,7 +199,7 @@ _TUBE = {
 
 
 class StepMessages:
-    """Conversion of the signals of a step to and from the messages of one topic."""
+    """Conversion of the signals of a step to and from the messages of one topic; clock messages can only be packed."""
 
     def __init__(self, topic: str, store: Typestore | None = None) -> None:
         """Prepare for a step ``topic``, given by its role; ``store`` has its definitions, default: installed ones."""
@@ -280,7 +281,7 @@ class StepMessages:
         return self._faults
 
     def _allocate(self, lengths: Sequence[int], faults: tuple[ActiveFault, ...]) -> None:
-        """Allocate a message with sequences of these lengths, and a view of its numbers."""
+        """Allocate a message with sequences of these ``lengths`` and these ``faults``, and a view of its numbers."""
         message = blank(self._store, self.type)
         if hasattr(message, "header"):
             message.header.frame_id = FRAME

@@ -70,7 +70,10 @@ def usual_qos(depth: int = 10, *, latched: bool = False) -> Qos:
 
 
 def recorded_qos(text: str, *, latched: bool) -> Qos:
-    """Return the first quality of service in an MCAP channel (YAML), with usual values for missing or invalid ones."""
+    """Return the first quality of service in an MCAP channel (YAML).
+
+    Usual values replace missing or unknown ones, or all if the description as such is invalid.
+    """
     usual = usual_qos(latched=latched)
     try:
         first, *_ = parse_yaml(text)
@@ -161,13 +164,13 @@ def custom_data(values: Mapping[str, Any]) -> dict[str, str]:
 
 
 def file_names(values: Mapping[str, Any]) -> list[str]:
-    """Return the names of the bag's files in the metadata, in their order."""
+    """Return the bag's files as the metadata name them, in their order; old versions of rosbag2 wrote paths."""
     names = values.get("relative_file_paths")
     return [name for name in names if isinstance(name, str)] if isinstance(names, list) else []
 
 
 def message_counts(values: Mapping[str, Any]) -> dict[str, int]:
-    """Return the number of messages in each file, by file name, as stated in the metadata."""
+    """Return the number of messages in each file for which the metadata state it, by the file's name in them."""
     files = values.get("files")
     entries = [entry for entry in files if isinstance(entry, dict)] if isinstance(files, list) else []
     counts = {str(entry.get("path")): entry.get("message_count") for entry in entries}

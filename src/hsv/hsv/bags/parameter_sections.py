@@ -24,7 +24,7 @@ class ParameterSections:
 
     @classmethod
     def gathered(cls, values: Mapping[str, Mapping[str, Any]]) -> Self:
-        """Return the parameters of ``values``, {node: {name: value}}; those equal wherever they occur become shared."""
+        """Return the parameters in ``values``, {node: {name: value}}; those that do not differ by node are shared."""
         differing = differences(values)
         shared = {name: value for flat in values.values() for name, value in flat.items() if name not in differing}
         own = {node: {name: flat[name] for name in differing if name in flat} for node, flat in values.items()}
@@ -88,8 +88,8 @@ def differences(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, 
 def disagreements(values: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Return a message for each parameter that must be equal in all nodes of a graph and is not.
 
-    ``feedback.tau`` may differ, because only the controller uses it. If the designs differ, only ``design.hash`` and
-    ``period`` of their parameters are compared.
+    ``feedback.tau`` may differ, because only the controller uses it. If ``design.hash`` differs, so do the designs; of
+    their parameters, only it and ``period`` are then reported.
     """
     differing = differences(values)
     differing.pop(TAU.name, None)
