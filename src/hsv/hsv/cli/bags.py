@@ -33,7 +33,8 @@ def replay(
 ) -> None:
     """Feed every node's algorithm with its recorded inputs, and compare its outputs with the recorded ones.
 
-    The exit code is 1 if anything differs. A run in which the controller was hardly active is rejected.
+    The exit code is 1 if an output differs by more than the tolerance of its node. A run in which the controller was
+    hardly active is rejected.
 
     Example: hsv replay bags/case1_20260101T000000Z --parameters offline_design/baseline.yaml
     """
@@ -151,7 +152,7 @@ def diff(
 ) -> None:
     """Compare two bags step by step: print the first difference, and the largest difference of every field.
 
-    The exit code is 0 if all step topics are equal, and 1 if not, or if a topic is missing in one of the bags.
+    The exit code is 0 if all step topics are equal, and 1 if not, or if a topic is in one of the bags only.
 
     Example: hsv diff bags/case1_20260101T000000Z bags/case1_20260102T000000Z
     """
@@ -238,7 +239,7 @@ def export(
     out: Annotated[Path | None, Option(help="What to write; default: in the bag's folder.")] = None,
     json: JsonOption = False,
 ) -> None:
-    """Write the topics of a bag as tables with field names and units (SI), or add a 3-D scene to the bag.
+    """Write the topics of a bag as tables with field names and units (SI), or a copy of the bag with a 3-D scene.
 
     A mat file is for MATLAB and Octave: a structure per topic, with the units in its field "units".
 

@@ -154,7 +154,7 @@ def read_run(path: Path) -> tuple[str, Mapping[str, Recorded]]:
 
 
 def groups(scale: float = 1.0) -> dict[str, Callable[[], list[Figure]]]:
-    """Return a function for each group of measurements, by name; ``scale`` multiplies the number of repetitions."""
+    """Return a function for each group of measurements, by name; ``scale`` multiplies the repetitions (at least 2)."""
 
     def times(number: int) -> int:
         return max(2, round(scale * number))

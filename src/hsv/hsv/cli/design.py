@@ -185,9 +185,9 @@ def design(
 ) -> None:
     """Compute a controller with its tube offline, and write its parameter file and its certificate.
 
-    Both are written to the current folder or to --out; existing files are not overwritten unless --force is given. With
-    --check, the design is compared with the shipped one; on a difference the largest deviation is printed and the exit
-    code is 1.
+    The certificate is written next to the parameter file; existing files are not overwritten unless --force is given.
+    With --check, nothing is written: the design is compared with the shipped one, and if the largest deviation is above
+    the tolerance, it is printed and the exit code is 1.
 
     Example: hsv design baseline; hsv design adjustable --tau 0.8 --out softer.yaml; hsv design baseline --check
     """
@@ -248,7 +248,7 @@ def design(
 
 
 def _half_widths(half_width: np.ndarray | None, feedback: np.ndarray | None, *size: float | None) -> list[float] | None:
-    """Return the half-widths of a set, rigid states then inputs, and its size if given; None if any is unknown."""
+    """Return half-widths of a set: rigid states, feedback F Z, then any given ``size``; None if one is unknown."""
     if half_width is None or feedback is None or None in size:
         return None
     return [*half_width[:5], *feedback, *(value for value in size if value is not None)]

@@ -24,7 +24,7 @@ TREE = (
 
 
 class Command(NamedTuple):
-    """Place of a command: the module that defines it, and its heading in the help; without one it is hidden."""
+    """Place of a command: the module that defines it, and its heading in the help (empty: it is not listed)."""
 
     module: str
     panel: str = "Commands"

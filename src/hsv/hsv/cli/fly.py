@@ -314,7 +314,7 @@ def _conclude(
 
 
 class _FlyByDefault(TyperGroup):
-    """A group of commands that takes the first word for a scenario to fly if it is not one of the commands."""
+    """A group of commands that runs ``fly`` unless the first word is one of its commands or a help option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         if args and args[0] not in (*self.commands, *ctx.help_option_names):
@@ -539,7 +539,7 @@ def resilience(
     """Fly controllers with faults of three severities, find the severest that each survives, and make a map of it.
 
     After an interruption, the same command continues where it stopped; controllers and faults can be added later. The
-    exit code is 1 if the controller failed in every flight.
+    exit code is 1 if every flight crashed.
 
     Example: hsv resilience --controllers case1,case1_rmpc --faults elevator_loss,elevator_delay
     """

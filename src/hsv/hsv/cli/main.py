@@ -59,7 +59,7 @@ UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 
 
 class _StrictCommand(TyperCommand):
-    """A command that refuses empty texts and repeated options that take one value, where typer would use the last."""
+    """A command that refuses empty texts and the repetition of a single-valued option (typer would use the last)."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         values, _, given = self.make_parser(ctx).parse_args(args=[*args])
@@ -133,7 +133,7 @@ def options(
 
 
 def run(prog: str, commands: Mapping[str, Command], description: str, moved: Mapping[str, str] | None = None) -> None:
-    """Run a command line; bad input ends with one line and exit code 2, a failed run with exit code 1.
+    """Run a command line and exit; bad input gives one line and exit code 2, a failed run exit code 1.
 
     Args:
         prog: Name of the command line.

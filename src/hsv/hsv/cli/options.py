@@ -33,7 +33,7 @@ UnitsOption = Annotated[
 
 
 def check_target(path: Path, field: str, *suffixes: str) -> None:
-    """Refuse, before any work is done, a file name with none of the ``suffixes``, or a file that cannot be written."""
+    """Refuse a file whose name does not end in one of the ``suffixes`` (if any), or that cannot be written."""
     if suffixes and path.suffix not in suffixes:
         ends = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
         raise ParameterError(f"{field} = {str(path)!r}: expected a file that ends in {ends}")
@@ -60,7 +60,7 @@ def check_folder(path: Path, field: str) -> None:
 
 @contextmanager
 def writing(path: Path, field: str) -> Iterator[None]:
-    """Convert system errors while ``path`` is written into a ``ParameterError``; an incomplete file is removed."""
+    """Turn a system error that occurs while ``path`` is written into a ``ParameterError``, and remove the file."""
     try:
         yield
     except OSError as error:

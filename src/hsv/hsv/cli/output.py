@@ -33,7 +33,7 @@ _COLUMN = 12
 
 
 def _visible(text: str) -> str:
-    """Return ``text`` with escapes for control, bidirectional and invisible characters, which could mislead."""
+    """Return ``text`` with escapes for control and format (e.g. bidirectional) characters except newline and tab."""
     if text.isprintable():
         return text
     hidden = (character not in "\n\t" and category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp") for character in text)
@@ -59,7 +59,7 @@ class Interrupted(Exception):  # noqa: N818 - an interruption by the user is no 
 
 @contextmanager
 def resumable(folder: Path) -> Iterator[Callable[[Path], None]]:
-    """Turn Ctrl-C into a message of one line that finished results are in ``folder``, if it exists.
+    """Turn Ctrl-C into an ``Interrupted`` with the place of the finished results, if ``folder`` exists.
 
     Yields a function to call with the path of the results once all flights are finished; the message then names it.
     """
@@ -108,7 +108,7 @@ def say(*lines: object) -> None:
 
 
 def print_bag_warnings(*bags: Bag) -> None:
-    """Print one line for each bag that has warnings: damage, a missing end, or missing files, topics or steps."""
+    """Print one line for each bag with warnings: contradictory metadata, damage, no end, missing topics or steps."""
     from hsv.bags.steps import bag_warnings
 
     for bag in {bag.path: bag for bag in bags}.values():

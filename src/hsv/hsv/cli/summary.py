@@ -139,7 +139,7 @@ def print_metrics(
 
 
 def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, flown: int | None = None) -> None:
-    """Print a campaign's summary and, with ``page``, write its HTML page; ``flown``: number of new flights if known."""
+    """Print a campaign's summary and, with ``page``, write its page; ``flown`` (for JSON): number of new flights."""
     from hsv.flight.campaign.summary import CONFIDENCE, distributions, shares, worst_flights
     from hsv.pages.campaign import write_campaign_page
 

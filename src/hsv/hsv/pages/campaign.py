@@ -181,7 +181,7 @@ def relative(factor: Factor) -> bool:
 
 
 def histogram(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return counts, shape (b,), and edges, shape (b + 1,), of the bars for finite ``values``; b <= :data:`BINS`."""
+    """Return counts, shape (b,), and edges, shape (b + 1,), of a histogram of finite ``values``; b <= :data:`BINS`."""
     values = values[np.isfinite(values)]
     distinct = np.unique(values.round(9))
     bins: int | np.ndarray = min(BINS, max(10, 2 * round(np.sqrt(len(values)))))
@@ -207,7 +207,7 @@ def _repeated(results: Results, worst: int) -> dict[str, Flight]:
 
 
 def _windows(results: Results) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return first step and time (s) of each time window, the indices of windows with data, and the end time (s)."""
+    """Return first step and time (s) of each time window, the indices of windows with data, and the planned end (s)."""
     campaign = results.campaign
     plant = Plant.from_parameters({**campaign.design, **campaign.scenario.parameters()})
     reached = np.flatnonzero(np.isfinite(results.envelope.low).all(axis=1))
@@ -270,7 +270,7 @@ def _scatter(results: Results, factor: Factor, drawn: np.ndarray, numbers: Numbe
 
 
 def _limits(results: Results, shown: Distribution) -> list[float]:
-    """Return the limits of a metric that lie within the range of the data; others would compress the plot."""
+    """Return minus and plus the limit (SI) of a metric, each only if it lies within the range of the data."""
     limit = limits(results).get(shown.name)
     return [] if limit is None else [end for end in (-limit, limit) if shown.minimum <= end <= shown.maximum]
 

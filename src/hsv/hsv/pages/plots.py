@@ -25,8 +25,8 @@ _REMARK_WIDTH = 130
 def flight_figure(flights: Mapping[str, FlightData], system: UnitSystem, remarks: Sequence[str] = ()) -> Figure:
     """Return a figure of panels over time, with one curve per flight.
 
-    There are eight panels, or six if all vehicles are rigid. The reference is dotted, and the time from the first fault
-    on is shaded; both are those of the first flight.
+    There are eight panels, or six if all vehicles are rigid. The references of altitude and velocity are dotted, and
+    the time from the first fault on is shaded; both are those of the first flight.
 
     Args:
         flights: The flights by label.

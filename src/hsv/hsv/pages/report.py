@@ -122,7 +122,7 @@ def _several(runs: Sequence[ReportedRun], system: UnitSystem) -> str:
 
 
 def _one(run: ReportedRun, limits: str) -> str:
-    """Return ``limits``, the verdict as text, or why a run has no scenario, with notes on a loss and missing steps."""
+    """Return ``limits`` or, without a scenario, the reason why there is none; with notes on loss and missing steps."""
     parts = [f"lost: {run.failure}"] if run.failure else []
     parts.append(limits if run.scenario else run.remark)
     if run.incomplete:

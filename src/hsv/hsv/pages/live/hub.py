@@ -82,7 +82,7 @@ class Hub:
             self._note(words, round(self.time * 1e-9 / self._period) if step is None else step, warning)
 
     def sample(self) -> None:
-        """Add the newest complete step to the history, unless it has been added already."""
+        """Add the newest complete step to history and status, unless it has been added already."""
         kept = {topic: self._latest[topic] for topic in self._topics if self._latest[topic]}
         if not kept.keys() >= self._steady:
             return

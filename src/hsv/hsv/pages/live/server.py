@@ -123,7 +123,7 @@ class PageServer:
         )
 
     def _respond(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer requests for page and layout, and refuse pages of other origins; return None to accept a WebSocket."""
+        """Serve page and layout, and refuse requests from other origins; return None to accept a WebSocket."""
         origin, allowed = request.headers.get("Origin"), origins(self.port)
         socket = request.path == SOCKET and "Upgrade" in request.headers
         if origin not in allowed and (origin is not None or socket):
