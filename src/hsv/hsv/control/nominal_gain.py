@@ -129,13 +129,14 @@ def _decrease_blocks(contraction: np.ndarray, weighted: np.ndarray) -> np.ndarra
 class NominalGain:
     """The gain K = Y Q^-1 of one ellipsoid x' Q^-1 x <= 1, with the numbers that show that eq. 31 to 35 hold.
 
-    ``K`` (m, n) and ``Q`` (n, n) are in SI and rounded, ``Y`` (m, n) is K Q. Two numbers bound the cost (s): ``gamma``
-    is that of the solver (eq. 32); ``certified_gamma``, recomputed from K and Q, holds for any state of the ellipsoid.
-    The others, too, are those of K and Q. ``decrease`` (r): smallest eigenvalue of the matrix of eq. 34 at each vertex,
-    with the recomputed bound, diagonal blocks scaled to 1. ``state``: 1 minus the level of the design state (eq. 33).
-    ``input`` (m): 1 minus the largest squared input over its squared bound (eq. 35). ``nesting``: smallest eigenvalue
-    of 1 - Q in coordinates in which the next ellipsoid outside is the unit ball. ``between`` (r): for an interpolated
-    family, :func:`decrease_between` in that outer ellipsoid. ``radii`` (r): closed-loop spectral radii.
+    ``K`` (m, n) and ``Q`` (n, n) are in SI and rounded, ``Y`` (m, n) is K Q. ``gamma`` is the solver's bound of the
+    cost (s, eq. 32). All other numbers are recomputed from the rounded K and Q: ``certified_gamma``, a bound of the
+    cost (s) from any state of the ellipsoid; ``decrease`` (r), the smallest eigenvalue of the matrix of eq. 34 at each
+    vertex with this bound, diagonal blocks scaled to 1; ``state``, 1 minus the level of the design state (eq. 33);
+    ``input`` (m), 1 minus the largest squared input over its squared bound (eq. 35); ``nesting``, the smallest
+    eigenvalue of 1 - Q in coordinates in which the next ellipsoid outside is the unit ball; ``between`` (r),
+    :func:`decrease_between` in that ellipsoid; ``radii`` (r), the closed-loop spectral radii. ``nesting`` is None
+    without an ellipsoid outside, ``between`` also if the family is not interpolated.
     """
 
     K: np.ndarray
@@ -283,7 +284,7 @@ def nested_gains(
         progress: Called after each gain with the number solved and the total number.
 
     Raises:
-        DesignError: The scales do not decrease, there is no solution, or a rounded solution violates an inequality.
+        DesignError: The scales do not decrease or are not positive, or :func:`nominal_gain` fails.
     """
     if not scales or min(scales) <= 0.0 or any(b >= a for a, b in pairwise(scales)):
         raise DesignError(f"nominal.scales = {list(scales)}: expected decreasing factors above zero")

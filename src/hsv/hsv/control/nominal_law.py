@@ -34,8 +34,8 @@ class NominalStatus(IntFlag):
 class LawResult:
     """Result of a nominal law: u_n (2), the gain K (2, 9) used, its index in the family, and the status of the step.
 
-    The index is 0 for the outermost ellipsoid and ``NOT_IN_FAMILY`` for another gain. In an interpolated family, gain
-    and index are those of the smallest ellipsoid that contains x_n.
+    The index counts from 0, the outermost ellipsoid; ``NOT_IN_FAMILY`` marks a gain that is not of the family. In an
+    interpolated family, gain and index are those of the smallest ellipsoid with x_n, and u_n is interpolated.
     """
 
     input: np.ndarray
@@ -51,10 +51,10 @@ def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
 
 
 class FamilyLaw:
-    """Nominal law with the nested family of gains: that of the smallest ellipsoid that contains x_n.
+    """Nominal law that uses, of the nested family, the gain of the smallest ellipsoid that contains x_n.
 
     If x_n lies in no ellipsoid, the gain of the outermost one is used. An interpolated family uses a gain between that
-    of the smallest ellipsoid with x_n and that of the next one inside. The other laws derive from this class and fall
+    of the smallest ellipsoid and that of the next one inside, if any. The other laws derive from this class and fall
     back to it. A law is deterministic and stepped once per control period.
     """
 

@@ -97,7 +97,7 @@ class NominalTrajectory:
         self.reference = reference
 
     def reset(self) -> None:
-        """Go back to the original reference and to step 0, where the next nominal trajectory begins."""
+        """Go back to the original reference and to step 0, which sets x_n from the measurement again; reset the law."""
         self.reference = self._planned
         self._deviation[:] = 0.0
         self._step = 0

@@ -126,7 +126,7 @@ def notch_response(sections: Sequence[NotchSection], frequencies: np.ndarray) ->
 def with_notch(
     A: np.ndarray, B: np.ndarray, gain: np.ndarray, notch: Struct
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the open loop of vehicle and notch filter in discrete time, and the gain on its extended state.
+    """Return A and B of the vehicle with the filter at its pitch rate, and the feedback as a gain on the joint state.
 
     Args:
         A: (..., n, n) state matrices of the vehicle, discrete time, with the pitch rate among the states.
@@ -166,7 +166,7 @@ def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
     """Return the sections of the filter in flight; each array of ``notch.flown.*`` that is given replaces the design's.
 
     Raises:
-        ParameterError: Arrays have different lengths, or there are too many sections.
+        ParameterError: A value is wrong, arrays have different lengths, or there are too many sections.
     """
     v = validate((*DESIGN_NOTCH_PARAMETERS, *FLOWN_NOTCH_PARAMETERS), values)
     pairs = zip(DESIGN_NOTCH_PARAMETERS[1:], FLOWN_NOTCH_PARAMETERS, strict=True)

@@ -1,15 +1,15 @@
 """Linear matrix inequalities posed so that they have a unique solution, which every processor finds.
 
 The optimum of a semidefinite programme need not be unique, and rounding decides the last steps of a solver near it:
-nominal gains that differ by half have the same cost to 1e-4. The solution returned is therefore not the optimum but a
-point of the central path, the minimum of
+nominal gains that differ by 50 % have the same cost to 1e-4. The solution returned is therefore not the optimum
+but a point of the central path, the minimum of
 
     t c'x - sum_k log det G_k(x)
 
-over the unknowns x, with cost c'x and inequalities G_k(x) >= 0. The factor t is chosen so that the cost exceeds its
-optimum by about the share :data:`GAP`. This function is smooth and strictly convex. Among all points of nearly minimal
-cost, its minimum is farthest from the bounds of all inequalities, as measured by the product of their eigenvalues.
-Newton's method finds it to rounding from any interior point; Clarabel provides one.
+over the unknowns x, with cost c'x and inequalities G_k(x) >= 0. The factor t is chosen so that the cost is about
+:data:`GAP` (relative) above the optimum. This function is smooth and strictly convex. Of all points of the same cost,
+its minimum has the largest product of the eigenvalues of all G_k(x), and so keeps clear of the bounds. Newton's method
+finds it to rounding from any interior point; Clarabel provides one. A problem without cost is left to Clarabel alone.
 
 Unscaled, or scaled by typical sizes only, the inequalities of a fast-sampled integrator chain defeat interior-point
 solvers. In coordinates whitened by an LQR problem at the mean vertex (:class:`Whitening`), the Lyapunov matrices are
@@ -108,7 +108,7 @@ def rounded(values: np.ndarray, size: Any, digits: int) -> np.ndarray:
 
 
 def rounded_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Return M = ``matrix`` > 0 (n, n) made symmetric and rounded, each M_ij relative to the root of M_ii M_jj."""
+    """Return the positive definite M = ``matrix`` (n, n) made symmetric, M_ij rounded relative to root(M_ii M_jj)."""
     root = np.sqrt(np.diag(matrix))
     return rounded(0.5 * (matrix + matrix.T), np.outer(root, root), MATRIX_DIGITS)
 
@@ -116,7 +116,7 @@ def rounded_matrix(matrix: np.ndarray) -> np.ndarray:
 def outward(values: np.ndarray) -> np.ndarray:
     """Return ``values`` rounded away from zero to :data:`BOUND_DIGITS` significant digits.
 
-    A magnitude at most 1e-12, relative, above a number with so many digits is rounded to that number instead.
+    A value that is farther from zero than such a rounded number by at most 1e-12, relative, becomes that number.
     """
     values = np.asarray(values, float)
     size = np.where(values == 0.0, 1.0, np.abs(values))
@@ -253,7 +253,7 @@ def minimise(
         name: Name of the result, for error messages.
 
     Raises:
-        DesignError: There is no solution inside the inequalities.
+        DesignError: No solution was found inside the inequalities.
     """
     ends = np.cumsum([unknown.size for unknown in unknowns])
     n = int(ends[-1])

@@ -1,9 +1,9 @@
-"""The nominal law u_n = K x_n + c, where c over a horizon is the solution of a quadratic programme in every step.
+"""The nominal law u_n = K x_n + c; in every step, a quadratic programme finds the course of c over a horizon.
 
-The programme keeps the inputs within U minus F Z and within the range of the certified plans. It keeps the nominal
-pitch acceleration within the range of those plans, too, because the disturbance set was measured along them. A plan
-bounded by U minus F Z alone causes disturbances several times as large as the set, mainly through the filtered pitch
-rate.
+The programme keeps u_n + u_r within U minus F Z and within the range of the certified plans. In the first third of the
+horizon, it keeps the nominal pitch acceleration within the range of those plans, too, because the disturbance set was
+measured along them. A plan bounded by U minus F Z alone causes disturbances several times as large as the set, mainly
+through the filtered pitch rate.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class QpLaw(FamilyLaw):
 
     With P the solution of the Riccati equation, the infinite-horizon cost is x' P x plus the sum of c' (R + B' P B) c.
     The Hessian is therefore constant, and c = 0 is optimal wherever it satisfies the bounds. The solver starts cold in
-    every step, so that the input depends on x_n alone. If the solver fails, the law continues the previous plan; if
+    every step, so that its solution depends on x_n alone. If the solver fails, the law continues the previous plan; if
     there is no plan or it has ended, the family of nominal gains is used.
     """
 
@@ -50,7 +50,7 @@ class QpLaw(FamilyLaw):
         """Set up the programme, which keeps u_n plus every reference input of the flight within the plan bounds.
 
         Raises:
-            DesignError: The design has no plan bounds, or the reference inputs lie outside them.
+            DesignError: The design has no plan bounds, or a reference input lies outside them.
         """
         bounds = design.plan_bounds
         if bounds is None:
@@ -130,14 +130,15 @@ class QpLaw(FamilyLaw):
 def _predicted(
     closed: np.ndarray, B: np.ndarray, K: np.ndarray, rate: np.ndarray, block: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the matrices that predict inputs and pitch acceleration at checked times from x_n and c, for u = K x + c.
+    """Return the matrices that predict u = K x + c and the pitch acceleration over the horizon from x_n and c.
 
     ``closed`` is A + B K, ``rate`` (n + m) maps [x; u] to the pitch acceleration. c has m entries for each block of
     ``block`` steps.
 
     Returns:
-        Factor of x_n (rows, n), factor of c (rows, m times blocks), and whether a row is bounded (rows). Each time has
-        m + 1 rows: the inputs, always bounded, then the pitch acceleration, only in the first :data:`NEAR_BLOCKS`.
+        Factor of x_n (rows, n), factor of c (rows, m times blocks), and whether a row is bounded (rows). Each time of
+        :data:`CHECKED_NEAR` or :data:`CHECKED_FAR` in each block has m + 1 rows: the inputs, always bounded, then the
+        pitch acceleration, bounded only in the first :data:`NEAR_BLOCKS`.
     """
     n, m = B.shape
     power, forced = [np.eye(n)], [np.zeros((n, m))]

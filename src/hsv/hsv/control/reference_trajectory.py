@@ -198,7 +198,7 @@ def _commands(times: Sequence[float], altitudes: Sequence[float], velocities: Se
 
 
 def _blends(times: Sequence[float], blend: float | Sequence[float]) -> np.ndarray:
-    """Return the half-width (b) of the blend of each corner, s.
+    """Return the half-width (b) of the blend of each corner, s; zero if there is only one corner.
 
     Raises:
         ParameterError: A blend begins before time 0 or lies at a jump, or there is not one for each time.
@@ -258,7 +258,7 @@ def _in_steps(times: np.ndarray, period: float) -> np.ndarray:
 
 
 def _evaluate(instants: np.ndarray, commands: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return altitude and velocity (r, 2) at the integer ``steps`` (r), and the slopes (r, 2) per step just after.
+    """Return altitude and velocity (r, 2) at the integer ``steps`` (r), and their slopes (r, 2) right after, per step.
 
     The corners have the times ``instants`` (b), in steps, and the altitudes and velocities ``commands`` (b, 2).
     """

@@ -152,9 +152,10 @@ def statement_checks(subject: Subject) -> Checks:
 
 
 def input_checks(subject: Subject) -> Checks:
-    """Check what the design copies from its inputs: period (eq. 12), notch (eq. 38), U (eq. 29), vehicle and actuators.
+    """Check what the design copies from its inputs, and that the scheduling weights of each axis are convex.
 
-    Also check that the scheduling weights sum to one (eq. 11), and that none is negative (eq. 12).
+    The copies are period (eq. 12), notch filter (eq. 38), U (eq. 29), vehicle, inertial coupling and actuators. Convex
+    weights sum to one (eq. 11), and none is negative (eq. 12).
     """
     design, inputs = subject.design, subject.certificate["inputs"]
     yield recomputed(subject, "inputs.model.period", design.period, "copied")
@@ -397,9 +398,9 @@ def symmetric(name: str, Q: np.ndarray) -> Check:
 
 
 def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
-    """Return the changes (5, 3) that the first three channels of W, each held at 1 for ``period`` s, cause in x.
+    """Return the changes (5, 3) of the rigid states by each of the first three channels of W, held at 1 for a period.
 
-    The rows are the rigid states x of the vehicle, which is linearised at mid-envelope.
+    The vehicle is linearised at mid-envelope; ``period`` is in s.
     """
     A, _ = linearise(vehicle.decoupled, *vehicle.centre)
     unit = np.zeros((N_RIGID, 3))
@@ -584,10 +585,10 @@ class StarNorms(NamedTuple):
         )
 
     def start(self, tube: Tube) -> float:
-        """Return the largest level of the parts of the start e = 0 in the ellipsoids; at most 1 means inside (eq. 25).
+        """Split the start e = 0 by channel; return the parts' largest level in their ellipsoids, at most 1 inside.
 
-        The start e - c = -c is the sum of one part for each acting channel: minus the steady response of the mean
-        closed loop to the mid-point of the channel; the last part is the remainder. The split is not in the paper.
+        The start e - c = -c (eq. 25) is the sum of one part for each acting channel: minus the steady response of the
+        mean closed loop to the mid-point of the channel, but the remainder for the last. The paper has no such split.
         """
         acting, mean = np.flatnonzero(tube.columns.any(axis=(0, 1))), tube.A.mean(axis=0)
         terms = np.linalg.solve(mean - np.eye(len(mean)), tube.G.mean(axis=0) * tube.middle).T
@@ -639,7 +640,7 @@ def set_checks(subject: Subject) -> Checks:
 
 
 def lag_feedback(subject: Subject) -> Sequence[Sequence[float]]:
-    """Return the smallest and largest response of the feedback to the actuators' lag, shape (2,) each; or zeros."""
+    """Return the smallest and largest feedback, shape (2,) each, due to the actuators' lag; zeros if none is stated."""
     lag = subject.certificate["tube"]["tightening"].get("lag_feedback")
     return (lag["lower"], lag["upper"]) if lag else ((0.0, 0.0), (0.0, 0.0))
 
