@@ -2,7 +2,7 @@
 
     u = tau F' (x' - x_n' - x_r') + K' x_n' + u_r,   0 < tau <= 1                                             (48), (54)
 
-Primes denote the co-designed model, in which the notch filter is a part. The steps are the model (45), the gain F'
+Primes denote the co-designed model, which includes the notch filter. The steps are the model (45), the gain F'
 (24), the disturbance set W' (47), the invariant set Z' for all factors from tau to 1 (25)-(28), the tightened inputs
 U minus F' Z' (53), and the nominal gains K' (49)-(52).
 """
@@ -48,11 +48,11 @@ from hsv.model.vehicle import Vehicle
 def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) -> DesignResult:
     """Return the adjustable design: co-designed model, gain F', invariant set Z' for tau F', nominal gains K'.
 
-    W' is W with the fault and the parameter bounds scaled by tau (paper eq. 47). Z' is invariant under tau F' and under
-    F', so that tau may change in flight between its value here and 1. The paper's Z' = tau Z would require W' = tau W
-    under F'; the half-widths of tau Z are reported for comparison. The bounds of |u_n| for K' are those in ``inputs``
-    times the ratio of the room about the target's trim within U minus F' Z' to that within U minus F Z for tau = 1
-    (eq. 52, eq. 53).
+    W' is measured like W, but with the fault and the parameter bounds times tau (paper eq. 47), or times the largest
+    of five factors. Z' is invariant under tau F' and under F', so that tau may change in flight between its value here
+    and 1. The paper's Z' = tau Z would require W' = tau W under F'; the half-widths of tau Z are reported for
+    comparison. For K', :func:`relaxed_bound` multiplies the bounds of |u_n| in ``inputs`` by a ratio of tightened
+    inputs (eq. 52, eq. 53).
 
     Arguments and errors are those of :func:`hsv.design.baseline.design_baseline`. DesignError is also raised if
     ``inputs`` has no adjustable factor or an option that an adjustable design does not allow, or if the nominal plan
@@ -169,8 +169,8 @@ def relaxed_bound(
 ) -> np.ndarray:
     """Return the bounds of |u_n| in eq. 52, shape (2,): ``bound`` times a ratio of tightened inputs, rounded.
 
-    The ratio divides the room within ``incomplete``, U minus F' Z', by that within ``complete``, U minus F Z for
-    tau = 1. This room is the distance, by input, from the target's ``trim_input`` to the nearer bound (paper eq. 53).
+    The ratio, by input, is the room within ``incomplete`` (U minus F' Z') over the room within ``complete`` (U minus
+    F Z for tau = 1). A room is the distance from the target's ``trim_input`` to the nearer bound (paper eq. 53).
 
     Raises:
         DesignError: The trim input is not inside the tightened bounds for tau = 1 or for the tau of the design.
@@ -183,7 +183,7 @@ def relaxed_bound(
 
 
 def room_at_one(design: ControlDesign, vehicle: Vehicle, tube: dict[str, Any]) -> np.ndarray:
-    """Return the margins, shape (2,), of the nominal plan to the nearer bound of each input, tightened for tau = 1.
+    """Return the plan's margins, shape (2,), to the nearer bound of each input, tightened for tau = 1; < 0: beyond it.
 
     ``tube`` is the report on the tube of ``design``; it contains the plan, the invariant set and the disturbance set.
 

@@ -27,7 +27,7 @@ class Deviation:
 
     @property
     def ok(self) -> bool:
-        """Whether the two values agree within :data:`RECOMPUTED_DESIGN`."""
+        """Whether the difference, ``scaled``, is at most :data:`RECOMPUTED_DESIGN`."""
         return self.scaled <= RECOMPUTED_DESIGN
 
     def __str__(self) -> str:

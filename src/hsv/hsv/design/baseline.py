@@ -45,8 +45,8 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
         progress: Called with the name of a stage, the number of its parts that are done, and their total number.
 
     Raises:
-        DesignError: A problem has no solution, a solution fails when recomputed, or the nominal plan does not fit into
-            the tightened inputs.
+        DesignError: A problem has no solution, a solution fails when recomputed, a flight diverges or saturates an
+            input, or the nominal plan does not fit into the tightened inputs.
         TrimError: A flight point of ``inputs`` cannot be trimmed.
     """
     tell = progress or (lambda stage, done, total: None)
@@ -185,7 +185,7 @@ def disturbance_columns(inputs: DesignInputs) -> np.ndarray:
 
 
 def _literal(inputs: DesignInputs, bounds: TightenedInputs) -> DesignInputs:
-    """Return ``inputs`` with the largest bounds of |u_n| (35) that keep u_n plus the target's trim in ``bounds``."""
+    """Return ``inputs`` with the largest |u_n| (eq. 35) for which u_n plus the target's trim stays in ``bounds``."""
     target = inputs.nominal.target
     bound = bounds.symmetric(trim(inputs.flown_vehicle.decoupled, target.altitude, target.velocity).input)
     if not bound.min() > 0.0:

@@ -79,7 +79,7 @@ class Plan:
 
     @classmethod
     def of(cls, subject: CertifiedDesign) -> Plan:
-        """Simulate the nominal vehicle with the fault of the design's declared region, and return the plan."""
+        """Return the plan from a flight of the nominal vehicle in the design's region; errors: :meth:`Region.fly`."""
         inputs = subject.inputs
         return cls(subject, Region(subject.design, inputs, incomplete_share(inputs)).fly({}))
 
@@ -108,11 +108,11 @@ class Plan:
         return np.array([self.inflation * np.abs(later - before).max() for later, before in pairs])
 
     def scheduling(self, errors: np.ndarray) -> np.ndarray:
-        """Return by how much ``errors`` of measured altitude (m) and velocity (m/s) widen the disturbance set.
+        """Return by how much errors of measured altitude and velocity, up to ``errors`` (m, m/s), widen the set W.
 
         The nominal model is scheduled with the measured altitude and velocity. An error in them changes the next x_n
-        by [A(p + error) - A(p)] x_n + [B(p + error) - B(p)] u_n. The result, shape (7,), has an entry for each channel:
-        the largest magnitude over the plan and the four combinations of the errors' signs, inflated.
+        by [A(p + error) - A(p)] x_n + [B(p + error) - B(p)] u_n. The result, shape (7,), is the largest magnitude in
+        each channel over the plan and the errors' four sign combinations, inflated; 0 for lost elevator and filter.
         """
         polytope, h = self.subject.design.polytope, self.flight.history
         points = h.state[:, :2]
@@ -129,9 +129,9 @@ class Plan:
         return self.inflation * largest
 
     def remeasured(self, equipment: Mapping[str, Any]) -> np.ndarray:
-        """Return by how much disturbances in flights with ``equipment`` exceed the certified bounds, by channel, or 0.
+        """Return by how much disturbances with ``equipment`` exceed the certified bounds, shape (7,); 0 if they do not.
 
-        Sensor errors move the elevator, and the polytopic model predicts the response only in part. The rest is
+        Sensor errors move the elevator, and the polytopic model predicts the response only in part. Disturbances are
         measured in flights of the nominal vehicle and of 32 corners, and inflated. ``equipment``: sensor parameters.
 
         Raises:
@@ -148,8 +148,8 @@ class Plan:
     def actuators(self, design: ControlDesign) -> tuple[np.ndarray, np.ndarray]:
         """Return the states (k, a) and the commands (k, 2) of the actuators of ``design`` along the plan, SI.
 
-        The tube error is zero. The commands are the plan plus the feedback due to the actuators' lag behind it. Both
-        arrays are deviations from the rest position before the flight.
+        They are those for zero tube error: the commands are the plan plus the feedback due to the actuators' lag behind
+        it. Both arrays are deviations from the rest position before the flight.
         """
         model = ChannelModel(design, self.subject.vehicle)
         commands = self.flight.plan - model.at_rest(self.flight)

@@ -20,11 +20,11 @@ from hsv.model.signals import N_RIGID
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the comparison: one kind of set with its half-widths and the half-range of its feedback by input, SI.
+    """A row of the comparison: half-widths of one kind of set and half-ranges of its feedback, shape (2,), SI.
 
-    ``note``: error message if there is no such set or its feedback needs the whole range of an input. ``size``:
-    geometric mean of the scaled half-widths of the rigid states. ``lower`` and ``upper``, shape (2,): tightened bounds
-    of u_n + u_r, or None.
+    ``half_width``: of all states; for counter-examples, of the rigid ones. ``size``: geometric mean of those of the
+    rigid states, scaled. ``lower`` and ``upper``, shape (2,): tightened bounds of u_n + u_r, or None. ``note``: error
+    message if there is no such set or its feedback needs the whole range of an input.
     """
 
     name: str

@@ -10,11 +10,11 @@ exactly: w = B(p) (P - I) u, with the effectiveness P and the *total* elevator i
 f = Delta - w, comes from linearisation, interpolation, parameters and flexibility.
 
 The structured set represents the rigid part of Delta completely: by three accelerations held over a period, by the lost
-elevator, which acts through the elevator's column B_e(p), and by residuals of altitude and pitch angle. The seventh
+elevator, which acts through the elevator's column B_e(p), and by residuals of altitude and pitch angle. One more
 channel is notch(q_n) - q_n, with q_n the nominal pitch rate. It acts by B(p) F_q, with F_q the pitch-rate column of F.
 
-If the design includes actuators, u in Delta is their mean position over the period, and w is their response to the lost
-elevator. For their lag behind the plan see :mod:`hsv.design.error_system`.
+If the design includes actuators, u in Delta is their mean position over the period, and w is due to their response to
+the lost elevator. For their lag behind the plan see :mod:`hsv.design.error_system`.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ ACCELERATED, REMAINING = [1, 2, 4], [0, 3]
 
 
 def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
-    """Return the change (5, 3) of the rigid states by unit accelerations held over ``period`` (s), at mid-envelope."""
+    """Return the change (5, 3) of the rigid states by each unit acceleration held for ``period`` (s), mid-envelope."""
     A, _ = linearise(vehicle.decoupled, *vehicle.centre)
     unit = np.zeros((N_RIGID, 3))
     unit[ACCELERATED, [0, 1, 2]] = 1.0
@@ -144,7 +144,7 @@ class ChannelModel:
         return e - late, feedback
 
     def lag(self, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
-        """Return the effect of the actuators' lag behind the plan on e (n + 1, states) and the feedback (n + 1, 2)."""
+        """Return the responses of e (n + 1, states) and feedback (n + 1, 2) to the actuators' lag behind the plan."""
         assert self.actuators is not None
         at_rest, design = self.at_rest(flight), self.design
         lag = at_rest + respond(self.actuators, flight.plan - at_rest)[1] - flight.plan
@@ -166,7 +166,7 @@ def decompose(
     lost: np.ndarray,
     through: np.ndarray,
 ) -> Signals:
-    """Return the disturbances of a flight; sums run over columns in a fixed order, with the same bits on every machine.
+    """Return the disturbances of a flight, with the same bits on every machine: sums over columns have a fixed order.
 
     Args:
         polytope: The polytopic model of the design.
@@ -229,7 +229,7 @@ class DisturbanceSet:
     """The structured set (paper eq. 19): each of :data:`CHANNELS` between ``lower`` and ``upper``, shape (7,), SI.
 
     It is computed from the disturbances of some flights; check :meth:`membership` in every other flight. Models of
-    hardware and air append further channels.
+    hardware and air append further channels to both arrays.
     """
 
     lower: np.ndarray
@@ -237,7 +237,7 @@ class DisturbanceSet:
 
     @property
     def centre(self) -> np.ndarray:
-        """Mid-points of the bounds by channel; that of the one-sided fault is not zero and shifts the tube's centre."""
+        """Mid-points of the bounds by channel, seldom zero (the fault is one-sided); they shift the tube's centre."""
         return 0.5 * (self.lower + self.upper)
 
     @property

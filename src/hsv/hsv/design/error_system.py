@@ -110,7 +110,7 @@ def _with_actuators(
 
 
 def union(first: ErrorSystem, *others: ErrorSystem) -> ErrorSystem:
-    """Return the error system that may switch between the vertices of all given systems, with F of the ``first``."""
+    """Return the error system that may switch between the vertices of all systems, with F and F_d of the ``first``."""
     systems = (first, *others)
     A, B, G = (np.concatenate([getattr(s, name) for s in systems]) for name in ("A", "B", "G"))
     return replace(first, A=A, B=B, G=G)

@@ -1,7 +1,7 @@
 """The tube's feedback gain F by linear matrix inequalities over all vertices (paper eq. 22 to eq. 24).
 
-For the error (22) without disturbances, e(k+1) = (A_i + B_i F) e(k), e' N^-1 e decreases at every vertex i if, with
-F = M N^-1,
+Without disturbances, the error (22) is e(k+1) = (A_i + B_i F) e(k). With F = M N^-1, the function e' N^-1 e decreases
+at every vertex i if
 
     [N, (A_i N + B_i M)'; A_i N + B_i M, N] > 0.                                                                   (24)
 
@@ -10,7 +10,7 @@ responses to typical disturbances, the columns of D. The bound is the trace of Z
 
     [Z, D'; D, N] >= 0,   [N, (A_i N + B_i M)', (R N)', M'; ., N, 0, 0; ., ., I, 0; ., ., ., I] >= 0.
 
-R divides the states by their scales; the inputs are in units of theirs.
+R divides the states by their scales; the inputs are in units of theirs. Dots: the transposes of the mirrored blocks.
 """
 
 from __future__ import annotations
@@ -73,9 +73,9 @@ def lyapunov_residuals(closed_loop: np.ndarray, N: np.ndarray, name: str) -> np.
 class FeedbackGain:
     """The feedback gain F = M N^-1 with its evidence.
 
-    ``F`` (m, n) and ``N`` (n, n) in SI, rounded; ``M`` (m, n) = F N. ``residuals`` (r): smallest eigenvalue of eq. 24
-    at each vertex, recomputed with N scaled to the identity. After a step at a vertex, sqrt(e' N^-1 e) is at most
-    (1 - residual) times its value before. ``radii`` (r): closed-loop spectral radii.
+    ``F`` (m, n) and ``N`` (n, n) in SI, rounded; ``M`` (m, n) = F N. ``residuals`` (r): smallest eigenvalue of the
+    matrix in eq. 24 at each vertex, recomputed with N scaled to the identity. After a step at a vertex, without
+    disturbance, sqrt(e' N^-1 e) is at most (1 - residual) times its value before. ``radii`` (r): spectral radii.
     """
 
     F: np.ndarray

@@ -100,7 +100,7 @@ class StateScale(RigidScale):
 
 
 class FilterScale(_Sizes):
-    """Scales of the two states of each section of the notch filter: deviations that weigh as those of the vehicle."""
+    """Scales of the two states of each section of the notch filter: deviations that weigh as much as the vehicle's."""
 
     state_1: Angle = Positive
     state_2: AngleTime = Positive
@@ -202,7 +202,7 @@ class RampInputs(_Table):
 
 
 def _coupling(value: Any) -> Any:
-    """Return a number, which is a multiple of the derived coupling, as text, and any other ``value`` unchanged."""
+    """Return a number, the multiple of the derived coupling, as text ("0.5" too), and any other ``value`` unchanged."""
     try:
         return value if isinstance(value, bool) else repr(float(value))
     except (TypeError, ValueError):
@@ -265,7 +265,7 @@ class AdjustableInputs(_Table):
 class ActuatorInputs(_Table):
     """Names of the actuators that the design includes; None: an ideal actuator.
 
-    Their dynamics add states to the error system. Their position is limited by the stops of the vehicle only.
+    Their dynamics add states to the error system. In place of their own stops, the vehicle's input limits hold.
     """
 
     fuel_equivalence_ratio: str | None = None
@@ -352,7 +352,7 @@ def parse_inputs(table: dict[str, Any]) -> DesignInputs:
     """Return the design inputs in a ``table`` read from TOML, with quantities as texts with units.
 
     Raises:
-        DesignError: A field that is missing, unknown or has a wrong value; the message names it.
+        DesignError: A field is missing, unknown or has a wrong value; the message names it.
     """
     return _validated(DesignInputs, table)
 
@@ -373,7 +373,7 @@ def read_inputs(path: Path) -> DesignInputs:
     """Return the design inputs in a TOML file and the files that it extends.
 
     Raises:
-        DesignError: A file is missing or is not TOML, or a field is wrong.
+        DesignError: A file is missing or is not TOML, files extend each other, or a field is wrong.
     """
     table = follow_extends(str(path), _read, lambda name, why: DesignError(f"{name}: {why}"))
     try:

@@ -1,6 +1,6 @@
 """The polytopic model of a design (paper eq. 10 to eq. 12, eq. 45) and its accuracy between the samples.
 
-The decoupled vehicle is linearised at its trims over p, altitude and velocity, and discretised with held inputs. The
+The decoupled vehicle is linearised at its trims over p = (altitude, velocity) and discretised with held inputs. The
 model is a convex combination of vertices:
 
     x(k+1) = A(p) x(k) + B(p) u(k),   [A(p), B(p)] = sum_i w_i(p) [A_i, B_i],   w_i >= 0, sum_i w_i = 1       (11), (12)
@@ -32,7 +32,7 @@ class DesignModel:
     """The polytopic model of a design as computed (``found``), and a ``report`` on it, ready for JSON.
 
     ``polytope``: the rounded vertices of the design file, for the nine states of the vehicle. ``whole``: for the DM,
-    ``polytope``; for the ECM, not rounded: the filtered pitch rate replaces the true one, and filter states follow.
+    ``polytope``; for the ECM, unrounded, with the filtered pitch rate in place of the true one, then filter states.
     """
 
     found: polytopic.PolytopicModel
@@ -65,6 +65,7 @@ def polytopic_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[Notch
 
     Raises:
         DesignError: Too few samples for the tolerance, no convex hull of the weights, or missing scales.
+        TrimError: The vehicle cannot be trimmed at a sample.
     """
     grid, options, extended = inputs.grid, inputs.tensor_product, inputs.system == "ECM"
     scales = state_scale(inputs, notch), options.input_scale.array()

@@ -61,7 +61,7 @@ class Region:
         return screening_corners(self._bounds, self.share)
 
     def fraction(self) -> list[dict[str, float]]:
-        """Return the parameter changes by flight: none, then those of a quarter of the corners, or of all if few."""
+        """Return the changes by flight: none, then a quarter of the corners, or all with fewer than ten parameters."""
         return fraction(self._bounds, self.share)
 
     def fly(self, corner: Corner) -> Flight:

@@ -3,8 +3,8 @@
     u_n + u_r in {u: minimum - min F e <= u <= maximum - max F e over e in c + Z}                                   (30)
 
 U is not symmetric about trim, and the tube c + Z not about zero, so the two sides of an input have different margins.
-The feedback consists of F e over c + Z, of a part due to filtering the nominal pitch rate, and of a part due to the lag
-of the actuators behind the plan, if the design includes actuators.
+To F e over c + Z, the code adds the feedback due to filtering the nominal pitch rate and, if the design includes
+actuators, that due to their lag behind the plan.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class TightenedInputs:
     upper: np.ndarray
 
     def margins(self, lowest: np.ndarray, highest: np.ndarray) -> np.ndarray:
-        """Return the margins of a plan to both bounds, shape (2, 2): a row per input, lower side first, SI."""
+        """Return the margins, shape (2, 2), from a plan's extremes to the bounds: a row per input, lower first, SI."""
         return np.stack((lowest - self.lower, self.upper - highest), axis=1)
 
     def symmetric(self, trim_input: np.ndarray) -> np.ndarray:

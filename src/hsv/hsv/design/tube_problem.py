@@ -31,7 +31,7 @@ class TubeProblem:
     def columns(self, centre: np.ndarray) -> np.ndarray:
         """Return the columns (r, n, d + 1) by which the disturbances, scaled to at most 1, act on e - ``centre``.
 
-        The last column is constant: the drift of the centre in one step, with all disturbances at their mid-points. In
+        The last column acts always: the drift of the centre in one step, with all disturbances at their mid-points. In
         general, no choice of the centre makes it zero at every vertex.
         """
         A, G = self.system.A, self.system.G
@@ -54,7 +54,10 @@ def bounding_factors(design: ControlDesign) -> list[np.ndarray]:
 
 
 def tube_problem(design: ControlDesign, vehicle: Vehicle, disturbance: DisturbanceSet) -> TubeProblem:
-    """Return the error system of ``design`` with the vertices for all :func:`bounding_factors`, and ``disturbance``."""
+    """Return the error system of ``design`` under ``disturbance``, with the vertices for all :func:`bounding_factors`.
+
+    Its F is that for the smallest factor.
+    """
     model, polytope = ChannelModel(design, vehicle), design.polytope
     gain = design.feedback_gain[:, :N_RIGID]
     systems = [

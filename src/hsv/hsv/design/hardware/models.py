@@ -176,8 +176,8 @@ def with_models(problem: TubeProblem, models: Sequence[Model]) -> TubeProblem:
 def sensors(data: Struct, plan: Plan, reach: float = REACH, of: str = "sensor") -> dict[str, Model]:
     """Return the models of noise, bias, quantisation and latency of sensors, by name; those of size zero are omitted.
 
-    Noise, Gauss-Markov biases, and random biases and scale factors are bounded by ``reach`` standard deviations, and
-    quantisation by half a quantum. Delays are modelled exactly. ``of``: prefix of the names.
+    Noise includes Gauss-Markov biases, and bias includes scale factors along the ``plan``. Random parts are bounded by
+    ``reach`` standard deviations, and quantisation by half a quantum. Delays are exact. ``of``: prefix of the names.
     """
     rigid = slice(0, N_RIGID)
     scale = (np.abs(data.scale) + reach * data.scale_sigma)[rigid]

@@ -2,8 +2,8 @@
 
 Actuators add states. The invariant set is computed as in the design, for all vertices, and the nominal plan of the
 certificate must fit into the inputs tightened by it. The error system is linear: it ignores stops and rate limits of
-actuators. If no error in the set exceeds them, the result also holds with these limits. Otherwise it holds only for the
-same actuators without limits.
+actuators. If no error in the set takes an actuator beyond them, the result also holds with these limits. Otherwise it
+holds only for the same actuators without limits.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Lag = tuple[np.ndarray, np.ndarray] | None
 class Reach:
     """Range of one actuator over the invariant set: positions ``lowest`` to ``highest``, rates up to ``rate``, SI.
 
-    ``stop`` and ``rate_limit``: the largest magnitudes that the actuator can reach; infinite: no limit.
+    ``stop`` and ``rate_limit``: largest permitted magnitudes of position and rate; infinite: no limit.
     """
 
     channel: str
@@ -104,7 +104,7 @@ class Verdict:
     """For a verdict on the limits of actuators: the verdict that ignores the limits. Otherwise None."""
 
     def said(self, units: UnitSystem = UnitSystem.metric) -> str:
-        """Return the margin, or why the design is not certified, in words."""
+        """Return the smallest margin, or why there is no certificate, in words; for limits: the actuators' ranges."""
         if self.without_limits:
             return "; ".join(reach.said(units) for reach in self.reaches) or self.without_limits.said(units)
         if self.room is None or self.shares is None:
@@ -262,10 +262,10 @@ def _start(found: InvariantSet, error: np.ndarray) -> float:
 
 
 def reaches(found: InvariantSet, design: ControlDesign, plan: Plan) -> list[Reach]:
-    """Return the range of positions and rates of each actuator of ``design``, for all errors in the set ``found``.
+    """Return the position and rate ranges of the actuators of ``design`` over all errors in the ellipsoid of ``found``.
 
-    Star norms are ignored: the errors are those of the ellipsoid, about the ``plan``. Positions and rates are evaluated
-    at every substep, where the limits act.
+    The ellipsoid is about the ``plan``; star norms are ignored, and all disturbances within their bounds are included.
+    Positions and rates are evaluated at every substep, where the limits act.
     """
     system, disturbance, known = found.problem.system, found.problem.disturbance, design.actuator_sets
     flown, commands = plan.actuators(design)

@@ -22,8 +22,9 @@ _LONGEST = 10_000
 class CounterExamples:
     """Range of each output row that disturbances reach from zero error, at the fixed vertex where it is widest.
 
-    ``half_range``: half the difference of the outputs that the worst sequence and its opposite reach, SI; ``vertex``:
-    index of the vertex; ``steps``: length of the sequence. One entry per row of :meth:`TubeProblem.output_rows`.
+    ``half_range``: half the difference of the outputs after the worst sequence and after its mirror image about the
+    mid-points of W, SI; ``vertex``: index of the vertex; ``steps``: length of the sequence. One
+    entry per row of :meth:`TubeProblem.output_rows`.
     """
 
     half_range: np.ndarray
@@ -38,8 +39,8 @@ class CounterExamples:
 def counter_examples(problem: TubeProblem) -> CounterExamples:
     """Return the counter-examples of all output rows, from simulations of e(k+1) = A_i e(k) + G_i d(k) with e(0) = 0.
 
-    At a fixed vertex i, an output row c has c e(m) = sum_k c A_i^(m-1-k) G_i d(k). It is largest if each disturbance is
-    at its upper or lower bound, by the sign of its factor. Changing vertices may reach farther; they are not searched.
+    At a fixed vertex i, an output of row c is c e(m) = sum_k c A_i^(m-1-k) G_i d(k). It is largest if each disturbance
+    is at its upper or lower bound, by the sign of its factor. Changing vertices may reach farther; they are not tried.
 
     Raises:
         DesignError: A vertex is not stable: the error has no bound there.

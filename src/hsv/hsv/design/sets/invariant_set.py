@@ -1,7 +1,7 @@
 """The tube's invariant set, in place of eq. 26: an ellipsoid {c + v: v' Q^-1 v <= 1}, which star norms may narrow.
 
-At vertex i the next v is v+ = A_i v + G_i d with |d_j| <= 1; the last d_j is constant, for the drift of the centre c.
-By the S-procedure v stays inside if there are lam and l_j >= 0 with sum l_j <= 1 - lam and
+At vertex i the next v is v+ = A_i v + G_i d with |d_j| <= 1; the last d_j is always 1, for the drift of the centre c.
+By the S-procedure v stays inside if there are lam and l_j >= 0 with sum_j l_j <= 1 - lam and
 
     [lam Q, 0, Q A_i'; 0, diag(l), G_i'; A_i Q, G_i, Q] >= 0.
 
@@ -41,7 +41,7 @@ _INFLATION = 1.002
 
 @dataclass(frozen=True)
 class InvariantSet:
-    """A set centre + Z that the error never leaves, with its evidence; SI.
+    """A set centre + Z that the error does not leave while the disturbances stay in W, with its evidence; SI.
 
     ``centre`` c (n), ``Q`` (n, n), ``contraction`` lam, ``multipliers`` l (r, d + 1). With ``star_norms`` the set is
     the ellipsoid's intersection with theirs; rigid states and feedback then have the smaller of the two half-widths.
@@ -73,7 +73,7 @@ class InvariantSet:
         return bounds
 
     def seen(self) -> TubeSet:
-        """Return ellipsoid and half-widths for the states that the controller knows: rigid states and notch filter."""
+        """Return the set's projection on the states that the controller knows: rigid states and notch filter."""
         n = self.problem.system.seen
         return TubeSet(self.centre[:n], inverse(self.Q[:n, :n]), self.half_width[:n])
 
@@ -85,8 +85,8 @@ class InvariantSet:
     def residuals(self) -> np.ndarray:
         """Return the margin (r) of the module's inequality at each vertex, in place of eq. 27; above zero: it holds.
 
-        It is the smallest eigenvalue of I - M M' with M = L^-1 [A L / sqrt(lam), G / sqrt(l)] and Q = L L', the scaled
-        Schur complement.
+        It is the smallest eigenvalue of I - M M', the inequality's Schur complement with Q = L L' scaled to I, where
+        M = L^-1 [A L / sqrt(lam), G / sqrt(l)].
         """
         columns = self.problem.columns(self.centre) / np.sqrt(self.multipliers)[:, None, :]
         return 1.0 - image(self.Q, "ellipsoid: Q", self.problem.system.A / np.sqrt(self.contraction), columns) ** 2
@@ -151,7 +151,7 @@ def ellipsoid(
         problem: Error system and disturbances.
         state_scale: Half-widths of the five rigid states that weigh equally, SI.
         input_scale: Half-ranges of the feedback on the two inputs that weigh as much, SI.
-        contractions: Values of lam to try.
+        contractions: Values of lam to try; the best ellipsoid of all is returned.
 
     Raises:
         DesignError: For no lam is there a solution that passes when recomputed.

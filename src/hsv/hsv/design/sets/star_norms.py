@@ -63,7 +63,7 @@ class StarNorms:
     def residuals(self, problem: TubeProblem, centre: np.ndarray) -> np.ndarray:
         """Return the margin of the module's inequality, shape (7, d + 1), by row and channel; above zero: it holds.
 
-        It is the smallest eigenvalue over all vertices, Q scaled to the identity; infinite if a channel has no effect.
+        It is the left side's smallest eigenvalue over all vertices, with Q scaled to I; infinite if without effect.
 
         Raises:
             DesignError: A Q is not positive definite.
@@ -82,9 +82,9 @@ class StarNorms:
 
         The error minus the centre is split into terms v, one for each channel. The result is the largest v' Q^-1 v over
         all rows and channels; if it is at most 1, each v lies in its ellipsoid, and the error in the set. For zero
-        error, v is minus the steady response of the mean vertex to the mid-point of the channel; the last channel with
-        an effect takes the remainder. Another ``error`` is added to one v, for each row to that with the smallest
-        result. If no channel has an effect, the result is zero for an error at the centre, else infinite.
+        error, the v of a channel is minus the mean vertex's steady response to the channel's mid-point, but the last
+        channel with an effect takes the remainder. Another ``error`` is added, in each row, to the one v that makes
+        the result smallest. If no channel has an effect, the result is 0 for an error at the centre, else infinite.
         """
         mean = problem.system.A.mean(axis=0)
         G, acting = problem.system.G.mean(axis=0), np.flatnonzero(problem.columns(centre).any(axis=(0, 1)))
@@ -108,7 +108,7 @@ class StarNorms:
         """Check that all ellipsoids are invariant and that e = 0 lies in their sums; return the evidence, for JSON.
 
         Raises:
-            DesignError: An ellipsoid is not invariant, or e = 0 lies outside.
+            DesignError: An ellipsoid is not invariant, or e = 0 could not be shown to lie inside.
         """
         residuals, origin = self.residuals(problem, centre), self.level_at_start(problem, centre)
         if not residuals.min() > 0.0:
@@ -222,7 +222,7 @@ def _solve(A: np.ndarray, g: np.ndarray, row: np.ndarray, contraction: float) ->
 
 
 def _coordinates(A: np.ndarray, g: np.ndarray, contraction: float) -> np.ndarray:
-    """Return T (n, n) such that Q of the mean vertex alone would be near the identity in coordinates z, x = T z."""
+    """Return T (n, n) such that the mean vertex's Gramian is near the identity in the coordinates z of v = T z."""
     held = _outer(g).mean(axis=0, keepdims=True)
     gramian = _gramians(A.mean(axis=0, keepdims=True), held, contraction)[0]
     size = np.sqrt(gramian.diagonal())
