@@ -48,7 +48,7 @@ def inputs_of(name: str) -> DesignInputs:
 
 
 def extended_model(inputs: DesignInputs, coupling: str | float) -> tuple[np.ndarray, np.ndarray]:
-    """Return A (11, 11) and B (11, 2) of the ECM (paper eq. 40) at :data:`BETWEEN`, by zero-order hold.
+    """Return discrete A (11, 11) and B (11, 2) of the extended coupled model (paper eq. 40) at :data:`BETWEEN`.
 
     Args:
         inputs: Inputs of the co-design, with its filter and period.
@@ -61,7 +61,7 @@ def extended_model(inputs: DesignInputs, coupling: str | float) -> tuple[np.ndar
 
 
 def codesigned_model(inputs: DesignInputs) -> tuple[np.ndarray, np.ndarray]:
-    """Return A (11, 11) and B (11, 2) of the co-designed polytopic model at :data:`BETWEEN`."""
+    """Return discrete A (11, 11) and B (11, 2) of the co-designed polytopic model at :data:`BETWEEN`."""
     return polytopic_model(inputs.model, load_vehicle(), _sections(inputs)).whole.at(*BETWEEN)
 
 

@@ -69,10 +69,10 @@ def fly_over(point: Point, progress: Callable[[int], None] = lambda done: None) 
 
 
 def flight_measures(flight: FlightData) -> dict[str, float]:
-    """Return the metrics of a flight and the measures of the study (SI); undefined ones are omitted.
+    """Return the metrics of a flight and further measures (SI); undefined ones are omitted.
 
-    ``rigid_error`` is relative to the half-widths of the baseline's invariant set, so that it can combine different
-    states.
+    All further ones but ``attitude_from_reference`` need 20 s of flight after the fault. ``rigid_error``: the rms tube
+    error over these 20 s, each rigid-body state divided by the half-width of the baseline's invariant set.
     """
     values, state = dict(flight.metrics), flight.history.state
     deviation = np.abs(state - flight.reference)
@@ -99,7 +99,7 @@ def flight_measures(flight: FlightData) -> dict[str, float]:
 
 
 def _settling_time(time: np.ndarray, states: np.ndarray) -> float:
-    """Return the last time (s) at which a state is not :data:`SETTLED`, or else 0; ``states`` has shape (n, m)."""
+    """Return the last ``time`` (s) at which any of ``states``, shape (n, m), is not :data:`SETTLED`; 0 if none."""
     distance = np.abs(states - states[-1])
     moving = np.flatnonzero(np.any(distance > SETTLED * distance.max(axis=0), axis=1))
     return float(time[moving[-1]]) if len(moving) else 0.0

@@ -82,7 +82,7 @@ class SampledLoop:
         return float(self.poles.real.max())
 
     def command_noise(self, noise: np.ndarray) -> np.ndarray:
-        """Return the standard deviations (SI) of the inputs due to white measurement noise with those in ``noise``.
+        """Return the inputs' standard deviations (SI); ``noise`` (9) has those of the states' white measurement noise.
 
         Raises:
             numpy.linalg.LinAlgError: The loop is unstable.
@@ -137,7 +137,7 @@ class Feedback:
         return SampledLoop(A, B, gain, self.period)
 
     def growths(self, vehicle: VehicleParameters, over: Corners) -> np.ndarray:
-        """Return the growth (1/s) by vehicle: the largest at Case 1's start and target, before and after its fault."""
+        """Return, by vehicle, the largest growth (1/s) at Case 1's start and target, before and after its fault."""
         return np.array(
             [
                 max(
@@ -154,9 +154,9 @@ class Feedback:
         return float(self.growths(vehicle, over).max())
 
     def critical_coupling(self, over: Corners = NOMINAL) -> float | None:
-        """Return the multiple kappa of the derived coupling at which the first of the vehicles becomes unstable.
+        """Return the least multiple kappa of the derived coupling at which a vehicle of ``over`` becomes unstable.
 
-        None: all vehicles are stable up to the last of :data:`COUPLING_SCALES`.
+        0: one is unstable even without coupling. None: all are stable at all :data:`COUPLING_SCALES`.
         """
         return stability_limit(lambda kappa: self.growth(load_vehicle().coupled(kappa), over), COUPLING_SCALES)
 
@@ -187,9 +187,9 @@ def crossings(growth: Callable[[float], float], along: Sequence[float], toleranc
 
 
 def stability_limit(growth: Callable[[float], float], along: Sequence[float], tolerance: float = 1e-6) -> float | None:
-    """Return the scalar at which a loop becomes unstable: the first of the :func:`crossings`.
+    """Return the first scalar, in the order of ``along``, at which a loop becomes unstable.
 
-    It takes the same arguments. ``along[0]`` if the loop is unstable there; None if there is no crossing.
+    Arguments are those of :func:`crossings`. None: the loop is stable at all values of ``along``.
     """
     return float(along[0]) if growth(along[0]) >= 0.0 else next(crossings(growth, along, tolerance), None)
 
@@ -197,7 +197,7 @@ def stability_limit(growth: Callable[[float], float], along: Sequence[float], to
 def phase_margins(frequencies: np.ndarray, response: np.ndarray) -> np.ndarray:
     """Return frequency (rad/s) and phase margin (rad) where the ``response`` L crosses unit gain, shape (n, 2).
 
-    The phase margin is the magnitude of the angle to -1. The logarithm of L is interpolated linearly.
+    The phase margin is the magnitude of the angle between L and -1. The logarithm of L is interpolated linearly.
     """
     gain, phase = np.log(np.abs(response)), np.unwrap(np.angle(response))
     i = np.flatnonzero(np.sign(gain[:-1]) != np.sign(gain[1:]))

@@ -54,7 +54,7 @@ class Evidence:
         self.behind = cache(self._behind)
 
     def _behind(self, elevator: str) -> Evidence:
-        """Return this object if ``elevator`` is ideal, else new evidence with it that flies at most 33 vehicles."""
+        """Return this object for the ideal ``elevator``, else evidence with that one, for at most 33 vehicles."""
         if elevator == IDEAL:
             return self
         over = [corner for corner in screening_corners(load_vehicle().uncertainty) if corner in self.over]
@@ -64,13 +64,13 @@ class Evidence:
         return {**flight_parameters(load_scenario(scenario)), **dict((*self._equipment, *changes))}
 
     def _corners(self, scenario: str, *changes: tuple[str, Any]) -> Table:
-        """Return the measures of a scenario, with these parameters changed, flown by all vehicles."""
+        """Return the measures of a scenario by vehicle; ``changes``: names and new values of flat parameters."""
         what = " ".join((scenario, *(f"{name}={value}" for name, value in (*self._equipment, *changes))))
         point = Point(self._values(scenario, changes), self.over)
         return fly_over(point, lambda done: self._progress(what, done, len(self.over)))
 
     def _changed(self, scenario: str, *changes: tuple[str, Any]) -> dict[str, float]:
-        """Return the measures of a scenario, with these parameters changed, flown by the nominal vehicle."""
+        """Return the measures of the nominal vehicle in a scenario; ``changes`` as for :meth:`_corners`."""
         table = fly_over(Point(self._values(scenario, changes), [{}]))
         return {name: float(column[0]) for name, column in table.items()}
 
@@ -100,7 +100,7 @@ class Evidence:
 
 
 def certified(entry: str) -> np.ndarray:
-    """Return the numbers, shape (n,), at ``design:path.to.entry`` of a certificate; a list gives all its items."""
+    """Return the numbers, shape (n,), at ``design:path.to.entry`` of a certificate, from all items of any list."""
     name, _, path = entry.partition(":")
     found = [certificate(name)]
     for key in path.split("."):
@@ -109,7 +109,7 @@ def certified(entry: str) -> np.ndarray:
 
 
 def shown(value: float, unit: str, digits: int = 4) -> str:
-    """Return a number (SI) as text in the paper's unit; an infinite time is written as "not by the end"."""
+    """Return a number (SI) as text in the paper's unit, NaN and infinity as words ("not by the end" for a time)."""
     if not math.isfinite(value):
         return "not defined" if math.isnan(value) else "not by the end" if unit == "s" else "unbounded"
     number, name = to_paper(value, unit)
@@ -117,5 +117,5 @@ def shown(value: float, unit: str, digits: int = 4) -> str:
 
 
 def worst(values: np.ndarray) -> float:
-    """Return the largest of the values of all vehicles; infinite if a value is NaN, as for a lost vehicle."""
+    """Return the largest of ``values``, one per vehicle; infinite if any is NaN, as for a lost vehicle."""
     return float(np.inf) if np.any(np.isnan(values)) else float(values.max())

@@ -67,9 +67,10 @@ def vertices(evidence: Evidence) -> Numbers:
 
 
 def coupling(evidence: Evidence) -> Numbers:
-    """Return the largest changes due to coupling: of an elastic mode's frequency (relative) and of the pitch rate (dB).
+    """Return the largest relative changes of an elastic mode's frequency due to paper-like and derived coupling.
 
-    ``almost`` is the largest frequency change that counts as none: a tenth of the relative distance of the two modes.
+    ``almost``: the largest such change that counts as none, a tenth of the relative distance of the two modes.
+    ``raised``: the largest change (dB) of the pitch rate's response to the elevator due to paper-like coupling.
     """
     vehicle = load_vehicle().decoupled
     structural = {"first": vehicle.natural_frequency_1, "second": vehicle.natural_frequency_2}
@@ -92,7 +93,7 @@ def _rise() -> np.ndarray:
 
 
 def disturbance(evidence: Evidence) -> Numbers:
-    """Return the numbers of flights compared with W, and with ``share`` times W (derived coupling), and the share."""
+    """Return how many flights are compared with W and, for derived coupling, with ``share`` times W; and this share."""
     other = certificate("baseline_derived")
     return {
         "flights": certificate("baseline")["tube"]["flights"]["flights"],
@@ -119,7 +120,7 @@ def box(evidence: Evidence) -> Numbers:
 
 
 def symmetric(evidence: Evidence) -> Numbers:
-    """Return the largest |centre| / half-width over the channels of W, with that channel, and over the states of Z."""
+    """Return the largest |centre| / half-width of W's channels, with the channel, and the largest one of Z's states."""
     tube = tube_of("baseline")
     channels = certificate("baseline")["tube"]["disturbance"]["channels"]
     off = {name: abs(b["upper"] + b["lower"]) / (b["upper"] - b["lower"]) for name, b in channels.items()}
@@ -129,12 +130,12 @@ def symmetric(evidence: Evidence) -> Numbers:
 
 
 def certified_attitude(evidence: Evidence) -> Numbers:
-    """Return the larger half-width (rad) of the invariant set in angle of attack and pitch angle."""
+    """Return the half-width (rad) of the baseline's invariant set in angle of attack or pitch angle, the larger one."""
     return {"attitude": float(tube_of("baseline").half_width[2:4].max())}
 
 
 def input_set(evidence: Evidence) -> Numbers:
-    """Return the widths of the tightened input set U ⊖ FZ, and the nominal inputs' least margins to its bounds, SI."""
+    """Return, by input, the width of the range U ⊖ FZ and the nominal input's smallest distance from its ends, SI."""
     tightening = certificate("baseline")["tube"]["tightening"]
     widths = np.array(tightening["upper"]) - np.array(tightening["lower"])
     rooms = np.minimum(tightening["plan"]["margin_to_lower"], tightening["plan"]["margin_to_upper"])
@@ -156,9 +157,9 @@ def kept_of_level(A: np.ndarray, B: np.ndarray, gain: np.ndarray, shape: np.ndar
 
 
 def nominal_law(evidence: Evidence) -> Numbers:
-    """Return ``kept``, the largest :func:`kept_of_level` of all nominal gains, and values of x_n' P x_n in Case 1.
+    """Return ``kept``, the largest :func:`kept_of_level` of the nominal gains, each with its own ellipsoid.
 
-    P is that of the outermost ellipsoid. ``left`` is the value at the end relative to the ``first``.
+    ``first``, ``highest``: values of x_n' P x_n in Case 1, P of the outermost ellipsoid; ``left``: last / ``first``.
     """
     flown = design("baseline")
     A, B = flown.polytope.A[:, :N_RIGID, :N_RIGID], flown.polytope.B[:, :N_RIGID]
@@ -175,7 +176,7 @@ def nominal_law(evidence: Evidence) -> Numbers:
 
 
 def nominal_inputs(evidence: Evidence) -> Numbers:
-    """Return the largest nominal input relative to its bound in Case 1, nominal vehicle."""
+    """Return the largest ratio of a nominal input |u_n| to its bound in Case 1, flown by the nominal vehicle."""
     flown = design("baseline")
     law = FamilyLaw(nominal_data(flown))
     planned = np.abs([law.step(deviation).input for deviation in flight_of("case1").history.deviation])
@@ -186,7 +187,7 @@ def nominal_inputs(evidence: Evidence) -> Numbers:
 
 
 def seven_modes(evidence: Evidence) -> Numbers:
-    """Return the numbers of elastic and rigid-body modes of the coupled model, and of the rigid body's poles."""
+    """Return how many elastic and how many rigid-body modes the coupled model has, and how many rigid-body poles."""
     found = modes.open_loop_modes("paper_like")
     rigid = [mode for mode in found if mode.natural_frequency < SLOWEST_ELASTIC]
     poles = sum(1 + (mode.pole.imag > 0.0) for mode in rigid)
@@ -194,7 +195,7 @@ def seven_modes(evidence: Evidence) -> Numbers:
 
 
 def underdamped(evidence: Evidence) -> Numbers:
-    """Return the larger elastic damping ratio and by how much (dB) coupling raises the response at each one's peak."""
+    """Return the larger elastic damping ratio, and the rise (dB) due to coupling at the peak of each elastic mode."""
     raised = _rise()
     first, second = (float(np.interp(peak.frequency, modes.FREQUENCIES, raised)) for peak in modes.peaks(()).values())
     return {
@@ -205,10 +206,11 @@ def underdamped(evidence: Evidence) -> Numbers:
 
 
 def coupling_in_pitch_rate(evidence: Evidence) -> Numbers:
-    """Return the pitch rate's shares of three effects of coupling: its sum of squares divided by all rigid states'.
+    """Return the pitch rate's shares of three effects of paper-like coupling, which are scaled changes.
 
-    ``onto_rigid``: of the effect of elastic states on rigid-body ones. ``onto_elastic``: of that of rigid-body states
-    on elastic ones. ``answer``: of the change of the rigid-body states' response to the elevator.
+    A share is the pitch rate's sum of squares divided by that of all rigid-body states. ``onto_rigid``: changes of the
+    entries of A by which elastic states act on rigid-body ones. ``onto_elastic``: of those by which rigid-body states
+    act on elastic ones. ``answer``: of the rigid-body states' responses to the elevator.
     """
     scale = np.array(list(certificate("baseline")["inputs"]["model"]["tensor_product"]["state_scale"].values()))
     models = [modes.linearised(name) for name in ("paper_like", 0.0)]
@@ -226,8 +228,8 @@ def coupling_in_pitch_rate(evidence: Evidence) -> Numbers:
 def falls(evidence: Evidence) -> Numbers:
     """Return by how much (dB) notch filters reduce the peaks of the first and the second elastic mode.
 
-    ``first``, ``second``: by the design's filter. ``least``: the smallest reduction of the first peak over the filter's
-    poles in Figure 3. ``first_centred``, ``second_centred``: by a filter centred at the mode.
+    ``first``, ``second``: by the baseline's filter. ``least``: the smallest reduction of the first peak by a filter of
+    Figure 3. ``first_centred``, ``second_centred``: reduction of either peak by a filter centred at its mode.
     """
     section, at = design("baseline").notch[0], modes.elastic_modes("paper_like")["first"].natural_frequency
     changed = [replace(section, pole_frequency=w) for w in POLE_FREQUENCIES]
@@ -242,11 +244,11 @@ def falls(evidence: Evidence) -> Numbers:
 
 
 def passed(evidence: Evidence) -> Numbers:
-    """Return the effects of the design's filter away from its centre: phase lags (rad) and gains (dB).
+    """Return the effects of the baseline's filter away from its centre: phase lags (rad) and gains (dB).
 
-    ``lag`` is at the rigid-body ``crossover`` of the loop (rad/s), ``slow_lag`` at 1 rad/s; ``second`` is the reduction
-    of the second peak. ``above`` is the magnitude of the gain at ten times the centre, ``unmatched`` the smallest such
-    magnitude of the filters with the other pole frequencies of Figure 3.
+    ``crossover``: that of the rigid body (rad/s) in the loop without filter. ``lag``, ``slow_lag``: the filter's phase
+    lags there and at 1 rad/s. ``second``: the reduction of the second mode's peak. ``above``: the gain's magnitude at
+    ten times the centre. ``unmatched``: the smallest one there with Figure 3's pole frequencies other than the centre.
     """
     section, crossover = design("baseline").notch[0], float(margins(evidence, {}, notched=False)[0, 0])
     slow_lag, lag = -np.angle(notch_response([section], np.array([1.0, crossover])))
@@ -266,8 +268,8 @@ def passed(evidence: Evidence) -> Numbers:
 def unit_circle(evidence: Evidence) -> Numbers:
     """Return how far the zeros of the discrete filter are from the unit circle, and the benefit of undamped zeros.
 
-    ``ours`` is the distance of the design's zeros, ``ideal`` that of undamped ones, which reduce the first peak by
-    ``gained`` (dB) more.
+    ``ours`` is the distance of the baseline's zeros, ``ideal`` that of undamped ones, which reduce the first mode's
+    peak by ``gained`` (dB) more.
     """
     ours = design("baseline").notch[0]
     ideal = replace(ours, zero_damping=0.0)
@@ -291,7 +293,7 @@ def unit_circle(evidence: Evidence) -> Numbers:
 def without_notch(evidence: Evidence) -> Numbers:
     """Return the growths (1/s) of the loops without notch filter, by vehicle, and the margin of the coupling.
 
-    ``margin`` is the critical coupling of the nominal vehicle relative to the paper-like coupling.
+    ``margin``: the coupling at which the nominal vehicle's loop becomes unstable (inf: none), over the paper-like one.
     """
     limit = Feedback.of(design("baseline"), notched=False, hardware=evidence.hardware).critical_coupling()
     return {
@@ -304,7 +306,7 @@ def without_notch(evidence: Evidence) -> Numbers:
 def with_notch(evidence: Evidence) -> Numbers:
     """Return the growths (1/s) of the loops with notch filter, by vehicle, and the filters' centres (rad/s).
 
-    ``retuned`` and ``centre_derived`` belong to ``baseline_derived``, the design for the derived coupling.
+    ``retuned`` and ``centre_derived`` belong to the design ``baseline_derived``, the others to ``baseline``.
     """
     notch, other = design("baseline").notch, design("baseline_derived").notch
     return {
@@ -319,8 +321,8 @@ def with_notch(evidence: Evidence) -> Numbers:
 def margins(evidence: Evidence, corner: Corner, *, notched: bool) -> np.ndarray:
     """Return frequency (rad/s) and phase margin (rad) at the n crossovers of the elevator loop, shape (n, 2).
 
-    The first row, the slowest, is that of the rigid body. Margins of an unstable loop are negative. ``corner`` holds
-    relative changes of the vehicle's parameters.
+    The loop is the baseline's, at Case 1's target without the fault. Frequencies increase; the first crossover is the
+    rigid body's. All margins of an unstable loop are negative. ``corner``: relative changes of vehicle parameters.
     """
     flown = design("baseline")
     # The grid is fine near the modes, where the loop gain barely reaches 1.
@@ -335,8 +337,8 @@ def margins(evidence: Evidence, corner: Corner, *, notched: bool) -> np.ndarray:
 def phase_margin(evidence: Evidence) -> Numbers:
     """Return by how much (rad) the notch filter raises phase margins, with the loop broken at the elevator.
 
-    ``gained``: the rise of the smallest of all margins, by vehicle. ``rigid``: the rise at the rigid-body crossover,
-    nominal vehicle, where the margin without the filter counts as positive even if the loop is unstable.
+    ``gained``: the rise of the smallest margin of all crossovers, by vehicle. ``rigid``: the rise at the rigid-body
+    crossover of the nominal vehicle; the margin without the filter counts as positive there, even if unstable.
     """
     pairs = [
         [margins(evidence, corner, notched=notched)[:, 1] for notched in (False, True)] for corner in evidence.over
@@ -347,9 +349,9 @@ def phase_margin(evidence: Evidence) -> Numbers:
 
 
 def less_uncertainty(evidence: Evidence) -> Numbers:
-    """Return the largest disturbance in Case 1 with notch filter, divided by that without, for two channels of W.
+    """Return, for two channels of W, the largest disturbance in Case 1 with notch filter divided by that without.
 
-    ``pitch_nominal`` is the quotient of the pitch acceleration for the nominal vehicle alone.
+    The vehicles are those of ``evidence`` in :func:`fraction`; ``pitch_nominal``: pitch acceleration, nominal one only.
     """
     over = [corner for corner in fraction(load_vehicle().uncertainty) if corner in evidence.over]
     a, b = (largest_disturbances(scenario, over) for scenario in ("case1", "case1_no_notch"))
@@ -384,9 +386,9 @@ def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.
 
 
 def conforms(evidence: Evidence) -> Numbers:
-    """Return the largest differences (dB, deg) between the responses of the co-designed model and the ECM (eq. 40).
+    """Return the largest differences (dB, deg) of the co-designed model from the extended coupled model (eq. 40).
 
-    ``low_magnitude`` is the largest difference in magnitude below ``rigid`` (rad/s).
+    They are those of the response of filtered pitch rate to elevator; ``low_magnitude``: below ``rigid`` (rad/s) only.
     """
     frequencies, inputs = CODESIGN_FREQUENCIES, inputs_of("adjustable")
     low = frequencies < RIGID
@@ -399,7 +401,7 @@ def conforms(evidence: Evidence) -> Numbers:
 
 
 def stabilises(evidence: Evidence) -> Numbers:
-    """Return 1 minus the largest closed-loop spectral radius over all nominal gains and vertices."""
+    """Return 1 minus the largest closed-loop spectral radius over all nominal gains and vertices of ``adjustable``."""
     flown = design("adjustable")
     A, B = flown.polytope.A, flown.polytope.B
     radius = max(float(spectral_radii(A + B @ gain).max()) for gain in flown.nominal_gains)
@@ -408,10 +410,11 @@ def stabilises(evidence: Evidence) -> Numbers:
 
 @cache
 def sets(evidence: Evidence) -> Numbers:
-    """Return half-widths of sets divided, state by state, by those of Z; Z is the invariant set for W under F'.
+    """Return half-widths of invariant sets divided, state by state, by those of Z.
 
-    ``measured``, ``halved``: of the invariant sets under F' for W' and for W / 2. ``flown``: of Z', the shipped
-    design's set; ``mean``: the mean of ``flown``. ``flown_scaled``: ``flown`` divided by tau, to compare Z' with tau Z.
+    Z is the set under the adjustable design's gain F', at tau = 1, for the complete W. ``measured``, ``halved``: sets
+    under F' for W' and for W / 2. ``flown``: Z', the design's own set; ``mean``: the mean of ``flown`` over the states.
+    ``flown_scaled``: ``flown`` divided by tau, to compare Z' with tau Z.
     """
     flown, inputs, ones = design("adjustable"), inputs_of("adjustable"), np.ones(N_RIGID)
     complete, incomplete = (
@@ -440,7 +443,7 @@ def relaxed(evidence: Evidence) -> Numbers:
 
 
 def adjustable_step(evidence: Evidence) -> Numbers:
-    """Return tau, and the settling time of velocity in Case 1 with the adjustable design, divided by the baseline's."""
+    """Return tau, and the velocity's settling time in Case 1, nominal vehicle: adjustable design over baseline."""
     values = {**read_parameters(find_design("adjustable")), **load_scenario("case1").parameters()}
     tables = fly_over(Point(values, [{}])), evidence.corners("case1")
     adjustable, baseline = (float(table["velocity_settling_time"][0]) for table in tables)
@@ -473,7 +476,7 @@ def _tau() -> float:
 
 
 def rmpc_flexible(evidence: Evidence) -> Numbers:
-    """Return the number of gains of robust MPC, and how many of them lose the vehicle at derived coupling."""
+    """Return how many gains robust MPC has, and with how many the nominal vehicle is lost at derived coupling."""
     changes = ("vehicle.model", "CM"), ("vehicle.coupling", "derived")
     gains = range(len(design("baseline").nominal_gains))
     lost = [evidence.changed(FAMILY, ("robust_mpc.gain_index", gain), *changes)["diverged"] for gain in gains]
@@ -481,7 +484,7 @@ def rmpc_flexible(evidence: Evidence) -> Numbers:
 
 
 def rmpc_altitude(evidence: Evidence) -> Numbers:
-    """Return the altitude error (m) at the end of Case 1 under robust MPC with its last gain."""
+    """Return the magnitude (m) of the altitude error at the end of Case 1 under robust MPC with its last gain."""
     last = ("robust_mpc.gain_index", len(design("baseline").nominal_gains) - 1)
     return {"last_error": abs(evidence.changed(FAMILY, last)["altitude_end_error"])}
 

@@ -162,7 +162,7 @@ class _Measured:
     numbers: dict[str, Any]
 
     def readings(self, row: Row, what: str, actuators: str) -> list[Reading]:
-        """Return the readings of a row: a single one, or one for each kind of vehicle that the row names."""
+        """Return a row's readings: one if it has ``vehicle``, ``beyond`` or no ``flight``; else by ``vehicles``."""
         most, least = (None if limit is None else self.named(limit) for limit in (row.at_most, row.at_least))
         if row.vehicle or not row.flight or row.beyond is not None:
             asked = {what: row.vehicle or "nominal"}
@@ -181,8 +181,8 @@ class _Measured:
     def value(self, row: Row, vehicle: Vehicle) -> float:
         """Return the number (SI) that a row measures for a kind of vehicle: uncertain, nominal or worst.
 
-        The worst value over all vehicles is the smallest if the row has a lower threshold, else the largest, which is
-        infinite if a vehicle has no value. A row with ``beyond`` counts the vehicles that exceed it or have no value.
+        The worst value over all vehicles is the smallest if the row has ``at_least``, else the largest, which is
+        infinite if any is NaN. Unless uncertain, ``beyond`` means the number of vehicles whose value is larger or NaN.
         """
         if vehicle == "uncertain":
             return float(self._of_flights(row, self.evidence.uncertain))

@@ -118,9 +118,9 @@ def figure_05() -> Figure:
 
 
 def figure_08() -> Figure:
-    """Draw the Bode diagram, elevator to filtered pitch rate, of the co-designed model and of the ECM (eq. 40).
+    """Draw the Bode diagram, elevator to filtered pitch rate, of the co-designed and the extended coupled model.
 
-    The ECM is drawn with its coupling and without.
+    The latter (ECM, eq. 40) is drawn with its coupling and without.
     """
     inputs = inputs_of("adjustable")
     curves = (

@@ -46,7 +46,7 @@ class Panel(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """A controller and its scenarios: one, or first with uncertain and then with nominal parameters."""
+    """A controller with its scenarios: only one, or two, first with uncertain, then with nominal parameters."""
 
     label: str
     color: str
@@ -134,7 +134,7 @@ def histories(
 def _panel(
     axis: Axes, panel: Panel, drawn: Sequence[tuple[FlightData, Any]], window: Zoom | None, reference: bool
 ) -> None:
-    """Draw one quantity of several flights, each with its line style, with the fault and perhaps the commands."""
+    """Draw one quantity of several flights, each in its style, and the fault; ``reference``: the commands, too."""
     unit, first = to_paper(1.0, panel.unit)[0], drawn[0][0]
     lines = [(flight.time, getattr(flight.history, panel.array), style) for flight, style in drawn]
     for time, values, style in [*lines, *([(first.time, first.reference, _COMMAND)] if reference else [])]:

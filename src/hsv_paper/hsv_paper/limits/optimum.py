@@ -54,7 +54,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Problem:
-    """The problem of the least scalar s. Unknowns: s, the states at the ends of N periods, the inputs held over each.
+    """Minimisation of a scalar s. Unknowns: s, the states at the ends of N periods, the inputs held over each period.
 
     Args:
         period, period_slope: The lengths of the periods in seconds are period + s period_slope, shape (N,).
@@ -220,7 +220,7 @@ class _Local:
         self._bound()
 
     def _bound(self) -> None:
-        """Write equations and bounds as rows of one matrix; unknown z: lower <= z - slope (change of s) <= upper."""
+        """Write equations and bounds as rows of one matrix; for z, lower <= z - slope (change of s) <= upper."""
         problem, point, n, size = self._problem, self._point, len(self._point.input), self._equations.shape[1]
         sizes = np.concatenate((np.tile(STATE_SCALE, n), np.tile(INPUT_SCALE, n), [1.0]))
         value = np.concatenate((point.state[1:].ravel(), point.input.ravel(), [point.scalar]))

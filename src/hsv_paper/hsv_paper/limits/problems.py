@@ -46,7 +46,7 @@ def transfer(vehicle: VehicleParameters, periods: int, *, settling: bool, rest: 
     """Return the problem of the least time s, in seconds, of the transfer from Case 1's start to its target.
 
     Args:
-        periods: Number of periods of equal length, with held inputs, within that time.
+        periods: Number of periods of equal length, with held inputs, within s.
         settling: Whether s is the time until altitude and velocity stay within 2 % of their total changes; the vehicle
             is at rest after ``rest`` times s more. Otherwise s is the time until rest.
     """
@@ -65,7 +65,7 @@ def transfer(vehicle: VehicleParameters, periods: int, *, settling: bool, rest: 
 
 
 def free_states(vehicle: VehicleParameters, start: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return lower and upper bounds (N + 1, 9) of states that begin at ``start`` (9) and keep to the model's range."""
+    """Return lower and upper bounds (N + 1, 9) of the states: first ``start`` (9), then angles in the model's range."""
     low = np.full((periods + 1, N_STATES), -np.inf)
     high = -low
     low[:, 2:4], high[:, 2:4] = -vehicle.angle_limit, vehicle.angle_limit
@@ -119,7 +119,7 @@ def at_trim(problem: Problem) -> Point:
 
 
 def static_limit(vehicle: VehicleParameters, points: np.ndarray) -> float:
-    """Return the least effectiveness with which a trim exists at one of ``points`` (M, 2): altitude m, velocity m/s."""
+    """Return the least effectiveness for a trim at one of ``points`` (M, 2), altitude m, velocity m/s; inf if none."""
     least = np.inf
     for altitude, velocity in points:
         try:
@@ -140,8 +140,8 @@ def turning_limit(vehicle: VehicleParameters, delay: float, resolution: float = 
     """Return the least effectiveness with which the elevator at its stop turns the vehicle's nose down.
 
     It is found by bisection of flights, without optimisation. After the ``delay`` (s) the elevator goes to its stop,
-    and the fuel, whose thrust lifts the nose, is shut off. The nose has turned when the angle of attack is back at that
-    of the trim.
+    and the fuel, whose thrust lifts the nose, is shut off. The nose has turned when it falls and the angle of attack is
+    back at that of the trim, within 20 s and within the model's range. The result is 1 if no effectiveness suffices.
     """
     before, kept = trim(vehicle, *TARGET), round(delay / PERIOD)
     stop = np.array([vehicle.fuel_equivalence_ratio_minimum, vehicle.elevator_deflection_maximum])

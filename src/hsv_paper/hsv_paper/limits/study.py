@@ -49,12 +49,12 @@ class Optimum:
 
     @property
     def change(self) -> float:
-        """Change (%) of the optimal scalar from one mesh to the other."""
+        """Magnitude (%) of the change of the optimal scalar from one mesh to the other."""
         return 100.0 * abs(self.other.scalar / self.found.scalar - 1.0)
 
 
 def fastest_transfer(vehicle: VehicleParameters, periods: int, *, settling: bool) -> Optimum:
-    """Return the fastest transfer, with inputs held over ``periods`` equal intervals until it ends or settles."""
+    """Return the optimum of :func:`hsv_paper.limits.problems.transfer`; ``periods`` is a multiple of 100."""
     first, half, whole = (problems.transfer(vehicle, n, settling=settling) for n in (COARSE, periods // 2, periods))
     coarse = first.solve(problems.straight(first, GUESS), 10.0 * TOLERANCE)
     coarser = half.solve(coarse.finer(periods // 2 // COARSE), TOLERANCE)
@@ -83,9 +83,9 @@ def fault_row(fault: Optimum, delay: float) -> dict[str, Any]:
 def corner_limits(
     vehicle: VehicleParameters, envelope: Vehicle, over: Sequence[Corner], delays: tuple[float, ...]
 ) -> np.ndarray:
-    """Return the least effectiveness by vehicle and condition, shape (vehicles, 2 + delays).
+    """Return the least effectiveness for each condition, shape (vehicles, 2 + number of delays).
 
-    Conditions: a trim at the target exists; one in the envelope exists; after each delay, the nose can be turned down.
+    Conditions: a trim at the target; one at any of nine points of the envelope; nose turned down after each delay (s).
     """
     points = problems.envelope_points(envelope)
     rows = []
@@ -151,9 +151,9 @@ def run(scope: Scope) -> Outcome:
 
 
 def settling_times(flight: Flight) -> np.ndarray:
-    """Return the settling times (s) of altitude and velocity, in this order; infinite if unsettled at the fault.
+    """Return the settling times (s) of altitude and velocity before the fault, shape (2,); infinite if unsettled.
 
-    Settled means within 2 % of the distance from the first state to the last reference, from then on until the fault.
+    Settled: within 2 % of the distance from first state to last reference until the fault or, without one, the end.
     """
     before = flight.time < (np.inf if flight.fault_start is None else flight.fault_start - 1e-9)
     target = flight.reference[-1, :2]

@@ -55,12 +55,12 @@ def elevator(bandwidth: float, delay: float = 0.0) -> Hardware:
 
 
 def growth(case: Controller, hardware: Hardware, over: Corners = NOMINAL) -> float:
-    """Return the largest growth (1/s) of all vehicles, at Case 1's start and target, before and after the fault."""
+    """Return the largest growth (1/s) of vehicles ``over`` at Case 1's start and target, before and after its fault."""
     return replace(case.loop, hardware=hardware).growth(case.vehicle, over)
 
 
 def tolerated_delay(case: Controller, hardware: Hardware, over: Corners = NOMINAL) -> float | None:
-    """Return the delay (s) at which the loop becomes unstable; None if it is longer than all of :data:`DELAYS`."""
+    """Return the least delay (s) at which a loop of ``over`` is unstable; None if all are stable at :data:`DELAYS`."""
     return stability_limit(lambda delay: growth(case, replace(hardware, delay=delay), over), DELAYS)
 
 
@@ -78,7 +78,7 @@ def rms(case: Controller, hardware: Hardware, sensors: str) -> float:
 
 
 def stability(case: Controller, over: Corners) -> dict[str, Any]:
-    """Return table cells with the ranges of elevator bandwidth in which the loop is stable."""
+    """Return table cells: elevator bandwidths at which the nominal vehicle's loop, then all of ``over``, are stable."""
     cells: dict[str, Any] = {"case": case.label}
     for which, vehicles, along in (("nominal", NOMINAL, BANDWIDTHS), ("worst", over, BANDWIDTHS[::2])):
 

@@ -102,7 +102,7 @@ def sweep(
 def columns_of(tables: Sequence[Table]) -> Columns:
     """Return the columns (SI) of one controller from the tables of its flights, one table per point.
 
-    The metrics of a lost flight are NaN, and if any flight of a point is lost, the worst metrics are, too.
+    They are shares of flights and magnitudes of metrics: nominal (NaN if lost) and worst (NaN if any flight is lost).
     """
     rows = []
     for table in tables:
@@ -154,7 +154,7 @@ def draw_losses(figure: Figure, x: np.ndarray, results: Mapping[Controller, Colu
 
 
 def legend(figure: Figure, *, shares: bool) -> None:
-    """Add a legend of controllers and line styles; ``shares`` adds the styles of panel (a), shares of flights."""
+    """Add a legend of controllers and line styles; ``shares``: also for the shares of flights in panel (a)."""
     controllers, _ = figure.axes[0].get_legend_handles_labels()
     nominal = "nominal vehicle; (a): flown to the end" if shares else "nominal vehicle"
     styles: Any = {"-": nominal, "--": "worst corner"} | ({":": "(a): not a second at the limits"} if shares else {})
