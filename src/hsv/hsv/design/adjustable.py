@@ -149,11 +149,11 @@ def _report(
 
 
 def certified_loops(design: ControlDesign, vehicle: Vehicle, effectiveness: float) -> np.ndarray:
-    """Return the closed-loop state matrices (r, n, n) of error and notch filter that must share a Lyapunov function.
+    """Return the state matrices, shape (r, n, n), of the closed loops that must share a Lyapunov function.
 
     There is one for each combination of tube factor (the smallest, then 1; 1 alone if they are equal), elevator
     effectiveness (1, then ``effectiveness``) and vertex, in the order of nested loops: the vertex varies fastest.
-    n: five rigid states, then those of the filter.
+    The n states are the errors of the five rigid states, then those of the filter.
     """
     polytope, model = design.polytope, ChannelModel(design, vehicle)
 

@@ -237,7 +237,7 @@ class DisturbanceSet:
 
     @property
     def centre(self) -> np.ndarray:
-        """Mid-points of the bounds by channel, seldom zero (the fault is one-sided); they shift the tube's centre."""
+        """Mid-points of the bounds by channel; if not zero, as for the one-sided fault, they shift the centre."""
         return 0.5 * (self.lower + self.upper)
 
     @property
@@ -282,7 +282,7 @@ def widened(lower: np.ndarray, upper: np.ndarray, factor: float) -> tuple[np.nda
 
 @dataclass(frozen=True)
 class Extremes:
-    """Smallest and largest values of c quantities over flights, and the indices (c) of the flights that have them."""
+    """Extremes of c quantities over flights, and the indices of the flights that have them; shape (c,) each."""
 
     lower: np.ndarray
     upper: np.ndarray

@@ -160,7 +160,7 @@ class FeedbackInputs(_Table):
 
 
 class NominalInputs(_Table):
-    """Inputs of the nominal gains K (eq. 32 to 35), one for each of the ``scales`` of x_n(0) = start - target."""
+    """Inputs of the nominal gains K (eq. 32 to 35): one gain for each of the ``scales`` of x_n(0) = start - target."""
 
     interpolated: bool | None = None
     """True: the gain is interpolated between two ellipsoids. False or None: it is switched."""
@@ -340,7 +340,7 @@ class DesignInputs(_Table):
     def error_scale(self) -> np.ndarray:
         """Return the scales of the errors, shape (5 + 2 m,), for the rigid states and the m filter sections, SI.
 
-        Those of the rigid states are the scales of F. Those of the two states of a section are the scale of the pitch
+        Those of the rigid states are those for F. Those of the two states of a section are the scale of the pitch
         rate divided by the pole frequency, and by its square: roughly the amplitudes that this pitch rate excites.
         """
         rigid = self.feedback.state_scale.array()
@@ -406,7 +406,7 @@ def with_tau(inputs: DesignInputs, tau: list[float]) -> DesignInputs:
 
 
 def find_inputs(name: str) -> Path:
-    """Return the path of a design's TOML file; ``name``: a path, a name in ``HSV_DESIGN_PATH`` or of a shipped design.
+    """Return the path of a design's TOML file; ``name``: a path, or a name in HSV_DESIGN_PATH or of a shipped one.
 
     Raises:
         DesignError: There is no such file.

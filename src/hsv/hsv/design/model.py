@@ -42,7 +42,7 @@ class DesignModel:
 
 
 def state_scale(inputs: ModelInputs, notch: Sequence[NotchSection]) -> np.ndarray:
-    """Return the scales (n) of the states of the model, SI: of the nine states, and for the ECM of the filter states.
+    """Return the scales (n) of the states of the model, SI: the nine states' and, for the ECM, the filter states'.
 
     Raises:
         DesignError: The scales of the filter are missing.

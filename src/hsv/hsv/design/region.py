@@ -1,6 +1,6 @@
 """The declared region of a design: the flights over which its disturbances are measured (paper eq. 17, eq. 19, eq. 47).
 
-    W = {d: lower <= d <= upper},   from the extremes of the channels d of Delta in the flights, which are widened.
+    W = {d: lower <= d <= upper},   with the extremes of the channels d of Delta in the flights as bounds, widened.
 
 W'(tau) is the same set for flights with tau times the fault and tau times the parameter bounds. The flights are
 simulated with the full closed loop: the coupled vehicle, the notch filter, the gains of the design, its step command or
@@ -78,7 +78,7 @@ class Region:
         over: Sequence[Corner],
         progress: Callable[[int], None] = lambda done: None,
     ) -> list[Result]:
-        """Simulate the flights of the corners ``over`` and return ``job`` of each, in order; errors of :meth:`fly`."""
+        """Simulate the flights of corners ``over`` and return the results of ``job``, in order; errors: :meth:`fly`."""
         return fly_perturbed(self._parts, over, lambda corner, flight: job(_checked(corner, flight)), progress)
 
 
@@ -97,7 +97,7 @@ def _checked(corner: Corner, flight: Flight) -> Flight:
 class RegionResult:
     """Extremes over all flights, SI: of ``channels``, and by state of f (``remainder``), w (``fault``) and ``delta``.
 
-    ``lag_feedback``: feedback due to the actuators' lag behind the plan, by input; 0 if ideal. ``flights``: how many.
+    ``lag_feedback``: feedback due to the actuators' lag behind the plan, by input; 0 if ideal. ``flights``: number.
     """
 
     flights: int

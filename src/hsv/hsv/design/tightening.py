@@ -74,7 +74,7 @@ def left_by(
 
 
 def plan_bounds(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray) -> PlanBounds:
-    """Return bounds of other nominal plans, within which the disturbance set should hold; flights have to confirm it.
+    """Return bounds for other nominal plans, within which the disturbance set should hold; flights have to confirm it.
 
     Another plan may hold a large input for a long time that the certified plans reach only briefly. Its input range is
     therefore the range in the certified plans, both ends of which are lowered by 5 % of its width. The range of the

@@ -36,7 +36,7 @@ _SHOWN = (
 
 @dataclass(frozen=True)
 class Tube:
-    """The invariant set (``found``), the tightened ``bounds``, the bounds of other plans, and a ``report`` for JSON."""
+    """The invariant set (``found``), tightened ``bounds``, bounds for other plans (``plan``), ``report`` for JSON."""
 
     found: InvariantSet
     bounds: TightenedInputs
