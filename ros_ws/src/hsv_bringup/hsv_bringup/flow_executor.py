@@ -30,8 +30,8 @@ class FlowExecutor(SingleThreadedExecutor):
     published in the same process has usually arrived when its subscription is asked. If it has not (with another
     middleware), the executor waits for it with the wait set of the base class.
 
-    Messages on latched topics are rare: their subscriptions are left to the wait set. Only raw ones, such as the
-    recorder's, are swept nevertheless, so that a message is recorded as it arrives.
+    Messages on latched topics are rare: their subscriptions are left to the wait set. Raw ones among them, such as
+    the recorder's, are swept nevertheless, so that a message is recorded as it arrives.
     """
 
     def __init__(self) -> None:

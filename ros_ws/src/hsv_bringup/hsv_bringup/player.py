@@ -78,7 +78,7 @@ class PlayerNode(ProcessNode):
         return self._begins + played - time.monotonic()
 
     def _end(self) -> None:
-        """Finish if the subscribers have received everything, else log their topics (DDS drops a hung subscriber)."""
+        """Finish if all subscribers have received everything, else log the slow topics. DDS drops hung subscribers."""
         slow = [t for t, p in self._outputs.items() if not p.wait_for_all_acked(Duration(seconds=0.25))]
         if not slow:
             self.finish(0)
@@ -88,7 +88,7 @@ class PlayerNode(ProcessNode):
 
 
 def _instants(bag: Bag, topics: Sequence[str]) -> list[tuple[int, list[tuple[str, bytes]]]]:
-    """Return the instants (ns) in order, each with its messages (topic, bytes); step topics last, as recorded."""
+    """Return the instants (ns) in order, each with its messages (topic, bytes); step topics last, in recorded order."""
     gathered: dict[int, list[tuple[str, bytes]]] = {}
     order = [bag.name_of(role) for role in TOPICS]
     for topic in sorted(topics, key=lambda name: order.index(name) if name in order else -1):

@@ -39,7 +39,7 @@ class TubeNode(BlockNode):
         self._mode = EffectivenessMode.HEALTHY
 
     def start_run(self, run: Run) -> None:
-        """Reset the tube status for a new run, which starts inside the tube."""
+        """Reset the tube status for a new run: the error counts as inside the tube, the elevator as healthy."""
         super().start_run(run)
         self._outside = False
         self._mode = EffectivenessMode.HEALTHY

@@ -197,7 +197,7 @@ class LockstepNode(ProcessNode):
         return {}
 
     def _watching(self, seen: Sequence[TopicEndpointInfo], topic: str, linked: Mapping[str, str]) -> int:
-        """Return the number of endpoints in ``seen`` that can match ``topic`` but whose nodes are not in ``linked``."""
+        """Return the number of viewers' endpoints in ``seen``: able to match ``topic``, of nodes not ``linked``."""
         strangers = [e for e in seen if full_name(e.node_name, e.node_namespace) not in linked.values()]
         pairs = [(STEP, e.qos_profile) if topic in self._outputs else (e.qos_profile, STEP) for e in strangers]
         return sum(
@@ -250,7 +250,7 @@ class PeerNode(LockstepNode):
         return self._run if self._announced else None
 
     def poll(self) -> None:
-        """Announce this node as ready for an announced run once all links are matched; before, log what is missing."""
+        """Announce this node as ready for an announced run once its links match; until then log what is missing."""
         if self._announced:
             return
         if self._run is None:

@@ -59,7 +59,7 @@ class Recorded(NamedTuple):
 
 @dataclass(frozen=True)
 class Figure:
-    """A measured ratio of two run times: ``ours`` divided by ``theirs``."""
+    """A measured ratio of times: that of the measured work, ``ours``, to that of a reference, ``theirs``."""
 
     name: str
     what: str
@@ -214,7 +214,7 @@ def against_c(repeats: int) -> list[Figure]:
 
 
 def against_imports(repeats: int) -> list[Figure]:
-    """Measure the processor time of commands against that of a Python process that only imports numpy.
+    """Measure processor times of hsv --help and hsv simulate case1 against a Python process that only imports numpy.
 
     Raises:
         RunError: There is no ``hsv`` on the search path, or a command failed.

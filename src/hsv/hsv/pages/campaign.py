@@ -181,7 +181,7 @@ def relative(factor: Factor) -> bool:
 
 
 def histogram(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return counts, shape (b,), and edges, shape (b + 1,), of a histogram of finite ``values``; b <= :data:`BINS`."""
+    """Return counts, shape (b,), and edges, shape (b + 1,), of a histogram of the finite ``values``; b <= ``BINS``."""
     values = values[np.isfinite(values)]
     distinct = np.unique(values.round(9))
     bins: int | np.ndarray = min(BINS, max(10, 2 * round(np.sqrt(len(values)))))

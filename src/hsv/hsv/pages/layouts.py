@@ -16,7 +16,7 @@ COLOURS = ("#0072b2", "#d55e00", "#57606a")
 
 
 def foxglove_layout(name_of: Callable[[str], str]) -> str:
-    """Return the layout as JSON.
+    """Return the layout for Foxglove and Lichtblick as JSON text.
 
     Args:
         name_of: Function that maps the default name of a topic to its name in the displayed graph.

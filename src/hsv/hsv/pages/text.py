@@ -15,7 +15,7 @@ SYSTEMS = {UnitSystem.metric: "SI, degrees", UnitSystem.si: "strict SI", UnitSys
 def quantity(value: float | None, unit: str, digits: int = 5, *, signed: bool = False, share: bool = False) -> Markup:
     """Return ``value`` (in the SI ``unit``) with its unit as HTML in all systems of units; a dash for None.
 
-    A positive ``signed`` value has a plus sign; a ``share`` is in percent except in strict SI.
+    With ``signed``, a positive value has a plus sign; with ``share``, the value is in percent except in strict SI.
     """
     if value is None:
         return Markup("–")
