@@ -1,8 +1,9 @@
 """Actuators of the vehicle: published sets, their parameters, and the data with which ``core/actuators.h`` moves them.
 
-An ideal actuator reaches its command at once. If all are ideal, the command is not delayed and no fault of an actuator
-or effector acts, the vehicle receives the command itself, limited by the stops. Otherwise actuators and vehicle are
-advanced by substeps of a quarter of the control period; over a substep, an effector is held at its mean position.
+An ideal actuator reaches its command at once. The vehicle receives the command itself, limited by the stops, while all
+actuators are ideal, no command arrives later than at the start of its period, and no fault of an actuator or effector
+acts. Otherwise actuators and vehicle are advanced by substeps, at most a quarter of the control period long; over a
+substep, an effector is held at its mean position.
 """
 
 from __future__ import annotations

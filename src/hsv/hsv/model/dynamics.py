@@ -28,8 +28,8 @@ _COMPLEX_STEP = 1e-40
 class VehicleParameters(NamedTuple):
     """All constants of the equations of motion and the limits of inputs and angles, SI (kg, m, s, N, rad).
 
-    Coefficients are annotated with their table in a vehicle file (:mod:`hsv.model.vehicle`) and their unit. They are
-    zero if the equations of a vehicle do not contain them. Parker's parameters describe a slice 0.3048 m deep.
+    Coefficients are annotated with their table in a vehicle file (:mod:`hsv.model.vehicle`) and their unit. Those that
+    a vehicle's equations do not contain are zero or as in :data:`AT_REST`. Parker's vehicle is a slice 0.3048 m deep.
     """
 
     mass: Annotated[float, "rigid_body", "kg"] = 0.0
@@ -125,7 +125,8 @@ class VehicleParameters(NamedTuple):
         """Return the vehicle with relative changes applied, e.g. ``{"mass": 0.1}`` for +10 %.
 
         Raises:
-            QuantityError: A parameter is unknown, or a change is not finite or not above -100 %.
+            QuantityError: A parameter is unknown, or not in this vehicle's equations while its change is not 0; or a
+                change is not finite or not above -100 %.
         """
         changes, names = {}, self.form.names
         for name, change in perturbation.items():
@@ -301,8 +302,9 @@ def transitions(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the final states, shape (N, 9), of N independent transitions, and their derivatives, shape (N, 9, 12).
 
-    Transition i starts from ``state[i]``, shape (9,), and holds ``inputs[i]``, shape (2,), for ``period[i]`` (s).
-    The last axis is the 9 initial states, 2 inputs and period; the complex step makes derivatives exact to rounding.
+    Transition i starts from ``state[i]``, shape (9,), and holds ``inputs[i]``, shape (2,), for ``period[i]`` (s) in
+    ``substeps[i]`` classical Runge-Kutta steps. The derivatives are with respect to the 9 initial states, the 2 inputs
+    and the period (last axis); by the complex step they are exact to rounding.
     """
     end, changes = np.empty((len(period), N_STATES)), np.empty((len(period), N_STATES, N_STATES + N_INPUTS + 1))
     lib.hsv_transitions(

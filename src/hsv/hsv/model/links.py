@@ -2,11 +2,11 @@
 
 One link leads from the sensors to filter, nominal trajectory and controller, the other from the controller to the fault
 injector. In every step each link transmits one message, for which the loop waits; only its payload can be late or lost.
-The receiver uses the last payload that arrived. Payloads sent before the flight equal the first one (sensors) or the
-input of the trim (controller).
+The receiver uses the most recently sent of the payloads that have arrived. Payloads sent before the flight equal the
+first one (sensors) or the input of the trim (controller).
 
-In a corrupted payload one of the 64 bits of one number is flipped. The receiver detects this by a checksum, or if the
-number is not finite or beyond :data:`LARGEST`; the payload is then lost.
+In a corrupted payload one of the 64 bits of one number is flipped. The receiver detects this by a checksum, if there is
+one, or if the number is not finite or beyond :data:`LARGEST`; the payload is then lost.
 
 The computing time of the controller is split: whole periods delay the command link; the rest is the time within a
 period at which the actuators receive the command, see :func:`computation`.

@@ -87,8 +87,8 @@ class PlantResult(NamedTuple):
     """The true state of a step and its measurement, shape (9,) each, with forces, effectors and air.
 
     ``effector`` has fuel and elevator, ``air`` the wind forward and up (m/s) and the density relative to the model's,
-    as last held before the step. ``forces`` follow from the state and these: lift (N), drag (N), thrust (N), pitching
-    moment (N m) and dynamic pressure (Pa).
+    as last held before the step. ``forces`` follow from the state, these and faults of the engine: lift (N), drag (N),
+    thrust (N), pitching moment (N m) and dynamic pressure (Pa).
     """
 
     step: int
@@ -124,7 +124,8 @@ class Plant:
             initial: Trim that gives the initial state and input.
             period: Control period T (s).
             steps: Number of control periods of the flight.
-            substeps: Runge-Kutta steps per control period while the actuators are ideal.
+            substeps: Runge-Kutta steps per control period while the vehicle receives the command itself, see
+                :mod:`hsv.model.actuators`.
             equipment: Values of :data:`EQUIPMENT_PARAMETERS`, and the seed; by default the equipment is ideal.
         """
         self.vehicle = vehicle
@@ -149,7 +150,7 @@ class Plant:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
-        """Return the plant that the values of :attr:`PARAMETERS` describe; missing ones have their defaults."""
+        """Return the plant with the given values of :attr:`PARAMETERS`; others are the named vehicle's or defaults."""
         v = validate(PLANT_PARAMETERS, values)
         nominal, initial = initial_trim(values)
         vehicle = nominal.perturbed({n: v[f"vehicle.perturbation.{n}"] for n in COEFFICIENT_UNITS})
@@ -169,7 +170,7 @@ class Plant:
         return other
 
     def is_ideal(self, scheduled: Sequence[ScheduledFault]) -> bool:
-        """Return whether equipment and air are ideal and none of the ``scheduled`` faults changes that."""
+        """Return whether equipment and air are ideal, no command is late, and all ``scheduled`` faults are of the command."""
         data = self.data
         ideal = data.actuators.ideal and data.sensors.ideal and data.link.ideal and data.atmosphere.still
         return ideal and data.late == 0.0 and all(row.fault.kind.side == COMMAND for row in scheduled)

@@ -59,7 +59,7 @@ def trim(
     ``where`` describes the condition in error messages; by default they state it in SI units.
 
     Raises:
-        TrimError: There is no equilibrium, or only one outside the input limits.
+        TrimError: The condition is impossible, or it has no equilibrium, or only one outside the input limits.
     """
     if not where:
         where = f"altitude = {altitude:.6g} m, velocity = {velocity:.6g} m/s"
@@ -104,10 +104,10 @@ def trim_at(
 
 
 def check_equilibrium(where: str, size: float, u: np.ndarray, vehicle: VehicleParameters) -> None:
-    """Check that the imbalance ``size`` is small and the input ``u``, shape (2,), within the limits of ``vehicle``.
+    """Check that the imbalance ``size`` is below :data:`CONVERGED`, and ``u``, shape (2,), within the input limits.
 
     Raises:
-        TrimError: The imbalance is too large or an input outside; the message names ``where`` and the reason.
+        TrimError: The imbalance is too large or an input is outside; the message names ``where`` and the reason.
     """
     if not size < CONVERGED:
         raise TrimError(f"{where}: no equilibrium there, expected a condition inside the trimmable envelope")

@@ -7,7 +7,7 @@ in its ``pyproject.toml``::
     glider = "my_vehicles:glider.toml"
 
 Scenarios and design inputs then select it by ``vehicle = "glider"``. A file that is not registered is selected by its
-path relative to the folder of the scenario, ``vehicle = "glider.toml"``. A file may extend another one
+path relative to the folder of the scenario or inputs, ``vehicle = "glider.toml"``. A file may extend another one
 (:mod:`hsv.base.files`). The package of a registered vehicle is located, not imported: reading data runs no code.
 """
 
@@ -166,7 +166,7 @@ class Vehicle:
         """Return the canonical name of a choice of inertial coupling: a set, or a multiple of the derived set as text.
 
         Args:
-            coupling: A name, a number or its text; empty: the first set.
+            coupling: A name, a number or its text; empty, or ``paper_like`` for a rigid vehicle: the first set.
 
         Raises:
             QuantityError: There is no such set, or the number is not between 0 and :data:`MAX_COUPLING`.
@@ -234,7 +234,7 @@ class Vehicle:
         Missing values are taken from the registered vehicle called ``vehicle.name``.
 
         Raises:
-            ParameterError: A value is wrong; the message names its parameter.
+            ParameterError: A value is wrong, or missing for a ``vehicle.name`` that is a path; the message names it.
             VehicleError: Values are missing, and no vehicle of that name is registered.
         """
         if lacking := missing_parameters(values):
@@ -271,7 +271,7 @@ class Vehicle:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of all parameters except the name; empty for the default vehicle, as in old designs."""
+        """SHA-256 of all parameters except the name; empty if it is that of the default vehicle, as in old designs."""
         own, default = (_digest(vehicle) for vehicle in (self, load_vehicle()))
         return "" if own == default else own
 
@@ -293,7 +293,7 @@ def missing_parameters(values: Mapping[str, Any]) -> list[str]:
 
 
 def named_parameters(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parameters of the vehicle called ``vehicle.name`` in ``values``, or of the default vehicle.
+    """Return the parameters of the vehicle called ``vehicle.name`` in ``values``; without a name, of the default one.
 
     Raises:
         VehicleError: There is no vehicle of that name.
@@ -328,7 +328,7 @@ def _registered(name: str) -> Vehicle:
 
 
 def vehicle_label(name: str) -> str:
-    """Return the name of a vehicle given by name or path."""
+    """Return the name of a vehicle given by name or path: of a path, the file name without its suffix."""
     return Path(name).stem if is_path(name) else name
 
 
@@ -336,7 +336,7 @@ def vehicle_tables(name: str) -> Tables:
     """Return the contents of a vehicle file, by name or path, merged over the files that it extends.
 
     Raises:
-        VehicleError: The file, or a file that it extends, is missing or is not TOML.
+        VehicleError: The file, or a file that it extends, is missing or not TOML, or the files extend each other.
     """
     return follow_extends(name, _read, lambda file, why: VehicleError(f"vehicle {vehicle_label(file)!r}: {why}"))
 

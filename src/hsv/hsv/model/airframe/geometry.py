@@ -25,7 +25,7 @@ EIGENVALUE = 1.8751040687119611
 class Cantilever:
     """A uniform Euler-Bernoulli cantilever and its first mode, normalised to unit modal mass.
 
-    The deflection is w(s, t) = shape(s) * eta(t) with eta in kg^0.5 m, the unit of the vehicle's elastic coordinates.
+    The deflection at distance s from the clamp is w(s, t) = shape(s) * eta(t); eta (kg^0.5 m) is an elastic coordinate.
     """
 
     length: float
@@ -89,7 +89,7 @@ class Airframe:
 
     @property
     def nozzle(self) -> float:
-        """The x coordinate (m) of the nozzle, from the centre of gravity."""
+        """The x coordinate (m) at which the engine ends and the nozzle ramp begins, from the centre of gravity."""
         return self.inlet - self.engine
 
     @property

@@ -113,7 +113,7 @@ class FaultInjector:
         return other
 
     def reset(self) -> None:
-        """Reset to the schedule: undo what was injected or cleared in flight."""
+        """Return to step 0 and to the schedule, without what was injected or cleared in flight."""
         self.known = list(self.scheduled)
         self._next = 0
         self._rows = self.rows((COMMAND,))
@@ -128,7 +128,7 @@ class FaultInjector:
         return fault_rows(sides, self.known, self.period, earlier)
 
     def parameters(self) -> dict[str, list[str] | list[float]]:
-        """Return the faults known now, those injected or cleared in flight included, as :data:`FAULT_PARAMETERS`."""
+        """Return the faults known now, as injected and cleared in flight, as values of the parameters ``fault.*``."""
         if not self.known:
             return {"fault.channels": ["none"]}
         return {

@@ -300,10 +300,10 @@ class Fault:
         return cls(channel, kind, tuple(given[p.name] for p in table))
 
     def check_period(self, period: float) -> None:
-        """Check that a fault that repeats periodically does so no faster than the control ``period`` (s).
+        """Check that the fault's ``intermittent_period``, unless it is 0, is at least the control ``period`` (s).
 
         Raises:
-            ParameterError: Its period is shorter than that; the message names the parameter.
+            ParameterError: It is shorter; the message names the parameter.
         """
         cycle = self.parameters.get("intermittent_period", math.inf)
         if cycle < period:

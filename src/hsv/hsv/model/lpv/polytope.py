@@ -49,7 +49,7 @@ def _spline(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return the coefficients, shape (4, s - 1, r), of not-a-knot cubic splines through s points, highest power first.
 
     Spline i has the values ``y[:, i]`` at ``x``. Two points give a line, three a parabola; with more, the third
-    derivative is continuous at the second and the second last (de Boor, A Practical Guide to Splines, ch. IV).
+    derivative is continuous at the second and second last point (de Boor, A Practical Guide to Splines, ch. IV).
     """
     n = len(x)
     step = np.diff(x)
@@ -89,8 +89,9 @@ def evaluate(weights: Struct, values: np.ndarray) -> np.ndarray:
 class Polytope:
     """A discrete-time polytopic model (paper eq. 12) scheduled by altitude (m) and velocity (m/s).
 
-    ``A`` (r, n, n) and ``B`` (r, n, m) are ordered by altitude, then velocity: the weight of vertex i * r_velocity + j
-    is weight i of ``altitude`` times weight j of ``velocity``. The scheduling variables are clamped to the breakpoints.
+    The r vertices ``A`` (r, n, n) and ``B`` (r, n, m) are ordered by altitude, then velocity: if ``velocity`` has s
+    weights, the weight of vertex i * s + j is weight i of ``altitude`` times weight j of ``velocity``. Altitude and
+    velocity are clamped to the breakpoints.
     """
 
     A: np.ndarray
@@ -121,7 +122,7 @@ class Polytope:
         )
 
     def at(self, altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return A (n, n) and B (n, m) at ``altitude`` (m) and ``velocity`` (m/s)."""
+        """Return A (n, n) and B (n, m) at ``altitude`` (m) and ``velocity`` (m/s), clamped to the breakpoints."""
         h, v = evaluate(self.altitude, np.array([altitude])), evaluate(self.velocity, np.array([velocity]))
         A, B = np.zeros(self.A.shape[1:]), np.zeros(self.B.shape[1:])
         for weight, A_i, B_i in zip(np.outer(h, v).flat, self.A, self.B, strict=True):

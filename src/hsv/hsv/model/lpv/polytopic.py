@@ -39,10 +39,11 @@ _FREQUENCIES = np.logspace(-2.0, 2.0, 200)
 class PolytopicModel:
     """A polytopic model of a vehicle, and ``exact``, the continuous-time model that it approximates.
 
-    ``whole`` has the states of ``exact``: the nine, or with a filter the nine with the filtered pitch rate instead of
-    the true one, then the filter's states. ``polytope`` is its part with the nine states and the true pitch rate;
-    without a filter, it is ``whole``. ``samples``, for altitude and for velocity: k breakpoints, and weights (k, v) of
-    v vertices. ``singular_values``: those of :func:`tensor_product`, or empty.
+    The states of ``exact`` are the vehicle's nine; with a filter, the filtered pitch rate replaces the true one and the
+    filter's states follow. ``whole`` is the discrete-time polytope with these states, ``polytope`` the one with the
+    nine states and the true pitch rate; without a filter they are the same. ``samples`` has, for altitude and for
+    velocity, breakpoints, shape (k,), and the v weights there, shape (k, v). ``singular_values`` are those of
+    :func:`tensor_product`, or empty.
     """
 
     vehicle: Vehicle
@@ -55,11 +56,12 @@ class PolytopicModel:
     singular_values: Sequence[np.ndarray]
 
     def accuracy(self, judged: Polytope, scales: tuple[np.ndarray, np.ndarray]) -> dict[str, float]:
-        """Compare ``judged`` with ``exact``, sampled, over the envelope; return its largest errors, by name.
+        """Return the largest errors, by name, of ``judged`` on a grid over the envelope against ``exact`` in discrete time.
 
-        The relative error at a point is the Frobenius norm of the error of [A, B] over that of [A - I, B], both scaled.
-        Bode plots from all inputs to all states are compared where it is largest and on a coarser grid. The result also
-        has the number of points, the smallest weight, and the largest deviation of a sum of weights from one.
+        The relative error at a point is the Frobenius norm of the difference of [A, B] divided by that of the exact
+        [A - I, B], both scaled. Bode plots from all inputs to all states are compared where the relative error is
+        largest and on a coarser grid. The result also has the number of points, the smallest weight, and the largest
+        deviation of a sum of weights from one.
 
         Args:
             judged: Polytopic model with the states of ``whole``.

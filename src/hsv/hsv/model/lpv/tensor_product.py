@@ -28,8 +28,8 @@ def tensor_product(
 ) -> tuple[Polytope, tuple[Samples, Samples], list[np.ndarray]]:
     """Return a polytopic model, with few vertices and a tight hull, of discrete-time samples on a grid (paper eq. 11).
 
-    The other two results are pairs, for altitude and for velocity: breakpoints with weights; and singular values,
-    relative to the largest, of the matrix whose rows are the samples at one altitude, or at one velocity.
+    The second and third result have an entry for altitude and one for velocity: the breakpoints with the weights there;
+    and the singular values, relative to the largest, of the matrix whose row i holds all samples at breakpoint i.
 
     The higher-order singular value decomposition is applied to the scaled [A - I, B]; with A in place of A - I the
     ranks would depend on the sampling period.
@@ -41,7 +41,7 @@ def tensor_product(
         velocities: Increasing velocities (m/s), shape (n_v,).
         state_scale: Scales of the states (SI), shape (n,).
         input_scale: Scales of the inputs (SI), shape (m,).
-        tolerance: Singular values below this share of the largest are discarded; the rank r is the number of the rest.
+        tolerance: Singular values up to this share of the largest are discarded; the rank r is the number of the rest.
         functions: Basis of the model in each variable: the constant and r - 1 ``"singular"`` functions, which have the
             smallest total error, or ``"polynomial"`` functions up to degree r - 1, which at a low rank distribute the
             error more evenly over small and large entries.
@@ -135,7 +135,7 @@ def relaxed(weights: np.ndarray, least: float) -> np.ndarray:
 
 
 def _start(basis: np.ndarray) -> np.ndarray:
-    """Return a first Q (r, r) for :func:`_smallest_simplex`: through r points of ``basis``, enlarged to enclose all."""
+    """Return a first Q (r, r) for :func:`_smallest_simplex`: r rows of ``basis`` as vertices, moved to enclose all."""
     s, r = basis.shape
     chosen = np.round(0.5 * (1.0 - np.cos(np.pi * np.arange(r) / (r - 1))) * (s - 1)).astype(int)
     if np.linalg.matrix_rank(basis[chosen]) < r:
