@@ -189,7 +189,7 @@ def crossings(growth: Callable[[float], float], along: Sequence[float], toleranc
 def stability_limit(growth: Callable[[float], float], along: Sequence[float], tolerance: float = 1e-6) -> float | None:
     """Return the first scalar, in the order of ``along``, at which a loop becomes unstable.
 
-    Arguments are those of :func:`crossings`. None: the loop is stable at all values of ``along``.
+    Arguments as for :func:`crossings`. ``along[0]`` if it is unstable there; None if stable at all values of ``along``.
     """
     return float(along[0]) if growth(along[0]) >= 0.0 else next(crossings(growth, along, tolerance), None)
 

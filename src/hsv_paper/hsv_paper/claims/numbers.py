@@ -145,7 +145,7 @@ def input_set(evidence: Evidence) -> Numbers:
 def kept_of_level(A: np.ndarray, B: np.ndarray, gain: np.ndarray, shape: np.ndarray) -> float:
     """Return the largest ratio of x' P x after a step to that before it, under u = K x, over all vertices and states.
 
-    Below 1, x' P x decreases. It is the maximum over the whole polytope, because x' P x is convex.
+    Below 1, x' P x decreases in every step. The ratio is the maximum over the whole polytope, because x' P x is convex.
 
     Args:
         A: (r, n, n) state matrices of the vertices.
@@ -247,8 +247,8 @@ def passed(evidence: Evidence) -> Numbers:
     """Return the effects of the baseline's filter away from its centre: phase lags (rad) and gains (dB).
 
     ``crossover``: that of the rigid body (rad/s) in the loop without filter. ``lag``, ``slow_lag``: the filter's phase
-    lags there and at 1 rad/s. ``second``: the reduction of the second mode's peak. ``above``: the gain's magnitude at
-    ten times the centre. ``unmatched``: the smallest one there with Figure 3's pole frequencies other than the centre.
+    lags there and at 1 rad/s. ``second``: the reduction of the second mode's peak. ``above``: |gain| in dB at ten times
+    the centre. ``unmatched``: the smallest one there with Figure 3's pole frequencies other than the centre.
     """
     section, crossover = design("baseline").notch[0], float(margins(evidence, {}, notched=False)[0, 0])
     slow_lag, lag = -np.angle(notch_response([section], np.array([1.0, crossover])))
@@ -291,7 +291,7 @@ def unit_circle(evidence: Evidence) -> Numbers:
 
 
 def without_notch(evidence: Evidence) -> Numbers:
-    """Return the growths (1/s) of the loops without notch filter, by vehicle, and the margin of the coupling.
+    """Return the growths (1/s) of the baseline's loops without notch filter, by vehicle, and the coupling's margin.
 
     ``margin``: the coupling at which the nominal vehicle's loop becomes unstable (inf: none), over the paper-like one.
     """
@@ -413,8 +413,8 @@ def sets(evidence: Evidence) -> Numbers:
     """Return half-widths of invariant sets divided, state by state, by those of Z.
 
     Z is the set under the adjustable design's gain F', at tau = 1, for the complete W. ``measured``, ``halved``: sets
-    under F' for W' and for W / 2. ``flown``: Z', the design's own set; ``mean``: the mean of ``flown`` over the states.
-    ``flown_scaled``: ``flown`` divided by tau, to compare Z' with tau Z.
+    under F' for W', measured with smaller uncertainty and fault, and for W / 2. ``flown``: Z', the design's own set;
+    ``mean``: mean of ``flown`` over the states. ``flown_scaled``: ``flown`` divided by tau, to compare Z' with tau Z.
     """
     flown, inputs, ones = design("adjustable"), inputs_of("adjustable"), np.ones(N_RIGID)
     complete, incomplete = (

@@ -162,7 +162,7 @@ class _Measured:
     numbers: dict[str, Any]
 
     def readings(self, row: Row, what: str, actuators: str) -> list[Reading]:
-        """Return a row's readings: one if it has ``vehicle``, ``beyond`` or no ``flight``; else by ``vehicles``."""
+        """Return a row's readings: one per ``vehicles``; a single one with ``vehicle``, ``beyond`` or no flight."""
         most, least = (None if limit is None else self.named(limit) for limit in (row.at_most, row.at_least))
         if row.vehicle or not row.flight or row.beyond is not None:
             asked = {what: row.vehicle or "nominal"}

@@ -60,7 +60,7 @@ class Problem:
         period, period_slope: The lengths of the periods in seconds are period + s period_slope, shape (N,).
         substeps: Number of Runge-Kutta steps of each period, shape (N,).
         inputs, inputs_slope: The bounds of the inputs are inputs + s inputs_slope, shape (2, N, 2), lower ones first.
-        states: Bounds of the states, shape (2, N + 1, 9), lower ones first. Equal ones fix an input or a state.
+        states: Bounds of the states, shape (2, N + 1, 9), lower ones first. Equal bounds fix a state or an input.
         at_rest: Whether the last state must be an equilibrium with the last input.
         scalar: Range of s.
         cost: Weight of s against the defects, which are relative to :data:`STATE_SCALE`.

@@ -226,7 +226,7 @@ def ramp(scope: Scope) -> Outcome:
 def draw_growth(
     axis: Axes, kappas: np.ndarray, loop: Feedback, over: Corners, widths: tuple[float, float], **style: Any
 ) -> None:
-    """Draw the growth of a loop over the coupling: solid for the nominal vehicle, dashed for the worst of ``over``."""
+    """Draw the growth of a loop over the coupling: solid for the nominal vehicle, first of ``over``, dashed: worst."""
     values = np.array([loop.growths(load_vehicle().coupled(kappa), over) for kappa in kappas.tolist()])
     axis.plot(kappas, values[:, 0], linewidth=widths[0], **style)
     axis.plot(kappas, values.max(axis=1), "--", linewidth=widths[1], color=style["color"])
