@@ -51,7 +51,7 @@ def input_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarra
 
 
 def flight_data(bag: Bag) -> FlightData:
-    """Return the flight in ``bag`` at the common steps of state, nominal and command; RecordingError if none."""
+    """Return the flight in ``bag`` at the common steps of state, nominal and command, or raise a RecordingError."""
     rows = joined(bag, (STATE, NOMINAL, COMMAND))
     state, nominal, command = rows[STATE], rows[NOMINAL], rows[COMMAND]
     status = bag.columns(ACTUATOR)

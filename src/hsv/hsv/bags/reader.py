@@ -57,8 +57,9 @@ class Loss:
 class Bag:
     """A recorded run: its topics, messages, attachments and custom data.
 
-    All times are simulated times in nanoseconds. The time of a message of a step topic is its stamp; the time of
-    another message is the stamp of the last step received before it. Damaged parts are skipped; see :attr:`loss`.
+    All times are simulated times in nanoseconds. The time of a message of a step topic is its stamp; that of another
+    message is its log time if the recorder used simulated time, otherwise the latest stamp received by then. Damaged
+    parts are skipped; see :attr:`loss`.
 
     Methods accept the name of a topic in the bag, such as ``/veh1/hsv/state``, or its role, such as ``hsv/state``. They
     raise a RecordingError if the topic is not in the bag, or a message does not fit its definition.
@@ -67,7 +68,8 @@ class Bag:
         path: A bag directory, or a file in it to read alone.
 
     Raises:
-        RecordingError: The bag does not exist, is not an MCAP file, cannot be read, or is not of this project.
+        RecordingError: The bag does not exist, is not an MCAP file, cannot be read, is not of this project, or has
+            another interface version.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -103,7 +105,7 @@ class Bag:
         self._check()
 
     def name_of(self, role: str) -> str:
-        """Return the name of the topic in ``role``, or its default name if it is not in the bag."""
+        """Return the name of the topic in ``role``, by default the one in :attr:`namespace`; a full name as it is."""
         return self.roles.get(role) or resolved(role, self.namespace)
 
     @cached_property
@@ -129,7 +131,7 @@ class Bag:
         return list(zip(self.times(topic).tolist(), self._data(self.name_of(topic)), strict=True))
 
     def recorded(self) -> Iterator[tuple[str, Message]]:
-        """Yield (topic, MCAP record) of all messages, also of undecodable topics, in the order of their log times."""
+        """Yield (topic name, MCAP record) of all intact messages, also of undecodable topics, in order of log time."""
         topics = ([(topic, message) for message in messages] for topic, messages in self._messages.items())
         return merge(*topics, key=lambda found: found[1].log_time)
 
@@ -167,7 +169,7 @@ class Bag:
             raise RecordingError(f"{self.path}: attachment {name}: {error}, expected text") from None
 
     def constants(self, topic: str) -> dict[str, ConstValue]:
-        """Return the constants in the recorded definition of a topic's type."""
+        """Return {name: value} of the constants in the recorded definition of a topic's type."""
         return {name: value for name, _, value in self.types.fielddefs[self._topic(topic).type][0]}
 
     def constant(self, topic: str, name: str) -> ConstValue:
@@ -251,7 +253,7 @@ class Bag:
             topics.update((name, replace(topic, count=len(self._messages[name]))) for name, topic in topics.items())
 
     def _read_file(self, scan: Scan, unpacker: Unpacker) -> tuple[int, int, int, dict[str, Any]]:
-        """Add the contents of a file.
+        """Add the contents of the file in ``scan`` to the bag.
 
         Returns:
             Numbers of messages read, of messages of unknown topics, and of attachments; and the metadata of rosbag2.

@@ -21,7 +21,7 @@ RECOVERED = {"recovered": "true"}
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """Result of a recovery; ``path`` is the new bag's directory, or the original's if it needed no recovery."""
+    """Result of a recovery of ``bag``; ``path`` is the new bag's directory, or its own if it needed no recovery."""
 
     bag: Bag
     path: Path
@@ -32,15 +32,15 @@ class Recovery:
 def recover(path: Path | str, target: Path | None = None) -> Recovery:
     """Write a new bag with all intact data of a truncated or damaged bag; the original is not modified.
 
-    The new bag has one file with summary and indexes, and metadata.yaml. A complete bag is not copied.
+    The new bag has one file with summary and indexes, and metadata.yaml. An intact bag that has it is not copied.
 
     Args:
         path: A bag directory, or a file in it to recover alone.
-        target: The new bag directory; default: the original's name with ``_recovered``, in the same folder.
+        target: The new bag directory; default: the original's name with ``_recovered``, next to the original.
 
     Raises:
         RecordingError: The recorder of the bag still runs, nothing of the bag can be read (see
-            :class:`hsv.bags.reader.Bag`), the target exists, or there is no space left.
+            :class:`hsv.bags.reader.Bag`), the target exists, or it cannot be written.
     """
     with _exclusively(find_files(Path(path))[0]):
         bag = Bag(path)
@@ -62,7 +62,7 @@ def recover(path: Path | str, target: Path | None = None) -> Recovery:
 def finalise(directory: Path) -> None:
     """Complete the bag of a killed recorder in place.
 
-    The new file replaces the old one only when it is complete, so that an interrupted call leaves the bag unchanged.
+    The new file replaces the old one only when it is complete, so that an interrupted call loses no data.
 
     Raises:
         RecordingError: The recorder of the bag still runs, nothing of the bag can be read, the bag is damaged, or there
@@ -98,7 +98,7 @@ def _has_its_metadata(bag: Bag, messages: int) -> bool:
 
 @contextmanager
 def _exclusively(files: list[Path]) -> Iterator[None]:
-    """Lock ``files`` during the context; a RecordingError says that their recorder still runs."""
+    """Lock ``files`` during the context; a RecordingError says that one is being recorded or cannot be opened."""
     with ExitStack() as stack:
         for file in files:
             try:

@@ -28,9 +28,10 @@ def naming(names: Mapping[str, str], namespace: str) -> dict[str, str]:
 def roles(topics: Mapping[str, str], custom_data: Mapping[str, str], source: str) -> dict[str, str]:
     """Return the names of a bag's topics by role, given their types by name; ``source`` is for error messages.
 
-    A role has the topic that the bag's custom data name for it, or else the one with the default name in the graph's
-    namespace. If most step topics are found in this way, a role still without a topic gets the only remaining one of
-    its type, if there is exactly one. Refuse a wrong type, and topics of two graphs if no namespace is recorded.
+    A role has the topic that the bag's custom data name for it; if they name none, the one with the default name in the
+    graph's namespace. If most step topics are found in this way, a role ``hsv/...`` without a topic gets the remaining
+    one of its type, if there is exactly one. A RecordingError refuses a topic of a wrong type in a role, and a bag with
+    topics of two graphs and no recorded namespace.
     """
     remapped = _remapped(custom_data)
     found = {role: name for role, name in remapped.items() if name in topics}
@@ -51,7 +52,7 @@ def roles(topics: Mapping[str, str], custom_data: Mapping[str, str], source: str
 
 
 def namespace_of(names: Mapping[str, str]) -> str:
-    """Return the namespace of most of a bag's topics, given their ``names`` by role; default: ``/``."""
+    """Return the most frequent namespace of a bag's topics, given their ``names`` by role; default: ``/``."""
     spaces = [
         name.removesuffix(f"/{role}") or ROOT
         for role, name in names.items()

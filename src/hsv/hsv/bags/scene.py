@@ -65,7 +65,7 @@ def write_scene(bag: Bag, target: Path, exaggeration: float | None = None) -> No
 
 
 def _channels(writer: Writer, bag: Bag) -> dict[str, int]:
-    """Register every topic with ``writer``; return the channel ids by topic."""
+    """Register the topics of ``bag`` and of the scene with ``writer``; return the channel ids by topic."""
     topics = list(bag.topics.values())
     for name, message in ((SCENE_TOPIC, scene(0)), (TRANSFORMS_TOPIC, frame_transforms(Sample(*[0.0] * 6), 0))):
         schema = message.get_schema()

@@ -43,8 +43,8 @@ def joined(bag: Bag, topics: Sequence[str]) -> dict[str, Columns]:
 def expected_stamps(bag: Bag) -> NDArray[np.int64]:
     """Return the stamps (ns) of all steps that a complete bag contains.
 
-    These are the steps that the plant announced on /hsv/run, up to the last state of the flight. Without an
-    announcement they end with the last recorded step.
+    These are the steps that the plant announced on /hsv/run; without an announcement, those up to the last recorded
+    one. If a recorded state ends the flight (finished or diverged), its step is the last, unless more are recorded.
 
     Raises:
         RecordingError: A message does not fit its definition, or the number of steps or the period is out of range.
@@ -74,7 +74,7 @@ def _announced(bag: Bag) -> tuple[float, int] | None:
 
 
 def _numbered(bag: Bag) -> tuple[float, int] | None:
-    """Return period (s) and last step from the numbers of the recorded steps, or None without a step after step 0."""
+    """Return period (s) and last step inferred from the recorded steps; None if no step after step 0 is recorded."""
     last: tuple[float, int] | None = None
     for topic, stamps in _stamps(bag).items():
         steps = bag.columns(topic).get("step", np.array([], np.uint64))

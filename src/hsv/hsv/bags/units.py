@@ -48,7 +48,7 @@ class Units:
 
 
 def units_of(definition: str, types: Typesdict, message_type: str) -> dict[str, Units]:
-    """Return the units of every field of a type by field path, from its recorded and its parsed definition."""
+    """Return units by field path: the fields of a type from ``types``, units from comments in its ``definition``."""
     comments = _comments(definition, message_type)
     found: dict[str, Units] = {}
 

@@ -105,7 +105,7 @@ class BagWriter:
         """Write a message in CDR with the simulated time ``time_ns`` as log time, and by default also as publish time.
 
         Raises:
-            RecordingError: The topic was not added, or the file cannot be written (no space left).
+            RecordingError: The topic was not added, or a full chunk cannot be written, see :meth:`flush`.
         """
         if topic not in self._channels:
             raise RecordingError(f"topic {topic}: not in the bag, expected one that was added before")

@@ -21,7 +21,7 @@ from hsv.flight.campaign.summary import Results
 
 @dataclass(frozen=True)
 class ReplayedFlight:
-    """A replayed flight: its outcomes in the campaign and in the replay (SI), and the bag of the replay."""
+    """A replayed flight: its outcomes in the campaign and in the replay (SI), and the bag of a replay over DDS."""
 
     flight: int
     recorded: Outcome
@@ -30,7 +30,7 @@ class ReplayedFlight:
 
     @property
     def differing(self) -> list[str]:
-        """Names of the outcomes in which any bit differs."""
+        """Names of the outcomes that are not equal, without tolerance; two NaN are equal."""
         return [name for name in self.recorded if not _same(self.recorded[name], self.repeated.get(name))]
 
 
@@ -60,6 +60,7 @@ def replay_over_dds(
     Raises:
         CampaignError, DesignError: There is no such flight, or the design file has changed since or is missing.
         ParameterError: The results name code or a design in another folder, but are not trusted.
+        RecordingError: ``bag`` exists already or cannot be made.
         RunError: A process failed; its last error line is in the message.
     """
     from hsv.bags.flight import equipment_topics, flight_data, flight_fingerprint, measurement_errors

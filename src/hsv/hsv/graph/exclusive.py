@@ -22,11 +22,11 @@ HOST = "127.0.0.1"
 
 
 def ros_domain() -> int:
-    """Return the ROS domain of this process, in which nodes can find each other.
+    """Return the ROS domain of this process (0 by default) after checking that nodes in it can find each other.
 
     Raises:
-        ParameterError: ROS_DOMAIN_ID is not a decimal number up to :data:`LAST_DOMAIN` (rcl would read 025 as octal,
-            and -1 as 0), discovery is switched off, or the loopback network interface is down.
+        ParameterError: ROS_DOMAIN_ID is not a decimal number up to :data:`LAST_DOMAIN`, without sign or leading zero
+            (rcl would read 025 as octal, and -1 as 0), discovery is off, or the loopback network interface is down.
     """
     text = os.environ.get("ROS_DOMAIN_ID") or "0"
     if not re.fullmatch(r"0|[1-9][0-9]*", text) or int(text) > LAST_DOMAIN:
@@ -43,7 +43,7 @@ def ros_domain() -> int:
 
 
 def claim(kind: str, domain: int, name: str) -> socket.socket | None:
-    """Reserve a name for one process of this machine; return the open claim, or None if another process has it.
+    """Reserve a name for one process of this machine; return the open claim, or None if the name is taken.
 
     Args:
         kind: What is named: ``node``, ``topic``, or ``domain`` for the namespace of a run.

@@ -65,8 +65,8 @@ def executable(node: NodeDescription) -> Path:
 def become(node: NodeDescription, words: Sequence[str], namespace: str = "") -> NoReturn:
     """Replace this process by the executable of ``node``, with the arguments ``words`` and in ``namespace`` if given.
 
-    Ctrl-C and SIGTERM stay blocked until the node handles them (:func:`hsv.base.processes.take_signals`). During its
-    imports they would end it with a traceback.
+    Ctrl-C and SIGTERM stay blocked until the node handles them (:func:`hsv.base.processes.take_signals`), because
+    during its imports they would end it with a traceback.
 
     Raises:
         KeyboardInterrupt: An interrupt during an import of this process had been postponed.
@@ -122,7 +122,8 @@ class Launcher:
             arguments: ROS arguments of every node.
             on_step: Called with the number of every step that the plant reports.
             on_line: Called with a node's name and a text: an output line that reports no step, or a warning.
-            wait_timeout: Idle time (s, at least HUNG_AFTER) at which a process fails the run; in flight, only the last.
+            wait_timeout: Time (s, at least HUNG_AFTER) without progress after which a process fails the run: until
+                the first step any except the live view, then only the last.
             namespace: Namespace of all nodes.
         """
         self._nodes = list(nodes)
@@ -196,9 +197,9 @@ class Launcher:
             time.sleep(_LOOK)
 
     def stop(self) -> None:
-        """End all processes with SIGINT, then SIGTERM, then SIGKILL.
+        """End all processes with SIGINT; send SIGTERM, then SIGKILL, to those that still run.
 
-        The plant is signalled first, so that the recorder receives everything.
+        They are signalled in reverse start order, the plant before the recorder, which so receives everything.
         """
         for number, grace in ((signal.SIGINT, GRACE), (signal.SIGTERM, GRACE / 5), (signal.SIGKILL, GRACE)):
             running = [p for p in reversed(self._processes) if p.popen.poll() is None]
@@ -258,7 +259,7 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
     The nodes of two runs would receive each other's messages, and both runs would fail.
 
     Raises:
-        RunError: Another run has claimed both, or a node already publishes a topic of one of ``nodes``.
+        RunError: Another run has this namespace in this domain, or a node publishes a topic of one of ``nodes``.
         ParameterError: ROS_DOMAIN_ID is invalid, or nodes cannot find each other, see :func:`ros_domain`.
     """
     domain = ros_domain()
@@ -275,7 +276,7 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
 
 
 def _ending(process: _Process, code: int) -> str:
-    """Return text on a process's end: the signal, or the exit code with its last ``[FATAL]`` or non-``[INFO]`` line."""
+    """Return how a process ended: signal, or exit code and last ``[FATAL]`` line, else last non-``[INFO]`` line."""
     if process.reader:
         process.reader.join(1.0)
     if code < 0:

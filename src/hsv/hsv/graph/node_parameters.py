@@ -1,4 +1,4 @@
-"""The parameters of every node: those of its component and of its infrastructure, and which may change in flight."""
+"""Parameters of every node: of its component and of its infrastructure; and those that may change in flight."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ _TRUTH = {"true": True, "false": False}
 
 
 def find(name: str) -> tuple[NodeDescription, Parameter]:
-    """Return (node, parameter) for the ``name`` of a parameter that may change in flight: full name or last part."""
+    """Return (node, parameter) of a parameter that may change in flight, by its full name or the part after the dot."""
     found = [entry for full, entry in SETTABLE.items() if name in (full, full.rpartition(".")[2])]
     if len(found) != 1:
         names = ", ".join(SETTABLE) + did_you_mean(name, SETTABLE)

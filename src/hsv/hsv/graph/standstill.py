@@ -25,7 +25,7 @@ class Standstill:
         self._seconds = 0.0
 
     def look(self, value: object) -> float:
-        """Return the time (s) for which ``value`` was the same in successive calls; call this a few times a second."""
+        """Return the time (s) since ``value`` last changed; a gap between two calls counts as at most 1 s."""
         now = time.monotonic()
         self._seconds += min(now - self._looked, _LONGEST_GAP)
         self._looked = now
@@ -37,7 +37,7 @@ class Standstill:
 def processor_time(pid: int) -> float | None:
     """Return the processor time (s) that process ``pid`` has used in all threads; None if it cannot be determined.
 
-    The resolution is 1 ns: a node that only waits uses about 10 µs each time that it wakes up, a stopped node none.
+    The resolution of 1 ns tells a node that only waits, which uses about 10 µs at each wake-up, from a stopped one.
     """
     clock = ctypes.c_int()
     if ctypes.CDLL(None).clock_getcpuclockid(pid, ctypes.byref(clock)):

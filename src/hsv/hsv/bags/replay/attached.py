@@ -94,7 +94,7 @@ def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
 def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
     """Return the parameters of the nodes in a recorded run, with the changes in flight of faults, tau and commands.
 
-    A ``design`` file replaces the attached design. A RecordingError says that parameters are missing or wrong.
+    A ``design`` file replaces the attached design. Missing or wrong parameters raise a RecordingError or DesignError.
     """
     for name in (DESIGN, SCENARIO):
         if name not in bag.attachments:
@@ -156,7 +156,7 @@ def broken_off(bag: Bag) -> bool:
 
 
 def refuse_vacuous(bag: Bag) -> None:
-    """Raise a RecordingError if the controller was active for less than ten seconds: a replay would prove nothing."""
+    """Raise a RecordingError if commands differ from reference inputs for less than 10 s: a replay proves nothing."""
     command, nominal = joined(bag, (COMMAND, NOMINAL)).values()
     deviation = input_columns(command) - input_columns(nominal, "reference_input.")
     active = np.abs(deviation).max(axis=1, initial=0.0) > ACTIVE_INPUT

@@ -52,7 +52,7 @@ class Process:
 
     @property
     def restarts(self) -> bool:
-        """Whether every step starts from the recorded state and input of the previous step, as for the plant."""
+        """Whether every step starts from the previous step's state and actuator messages; only the plant's does."""
         return self.node.block is VEHICLE
 
     @property
@@ -110,7 +110,7 @@ class _Replica:
         """Whether the plant has reported the end of the flight."""
 
     def step(self, inputs: Mapping[str, bytes]) -> dict[str, bytes]:
-        """Step the component with ``inputs`` by topic (none for the plant at step 0); return and keep its outputs."""
+        """Step the component with ``inputs`` by topic (no delayed ones at step 0); return and keep its outputs."""
         signals = Signals()
         for topic, message in inputs.items():
             self._inputs[topic].unpack(message, signals)
@@ -160,15 +160,15 @@ def fly(
     recorded: Mapping[str, Track] = NOTHING,
     limit: int | None = None,
 ) -> dict[str, Track]:
-    """Fly the loop in this process and return its messages by step topic, without the ``recorded`` commands.
+    """Fly the loop in this process; return the messages of the stepped nodes, by topic, without those ``recorded``.
 
     Args:
         types: Definitions of the messages.
         controller: Name of the controller that closes the loop.
         values: Parameters of the nodes.
-        progress: Called with the progress.
-        recorded: Recorded commands of a controller that is an external node.
-        limit: Number of steps of a run that was broken off; None: the flight ends as planned.
+        progress: Called with a title, the number of steps flown, and the number of all.
+        recorded: Recorded commands of a controller that is an external node, by topic.
+        limit: Maximum number of steps, for a run that was broken off; None: as many as the plant's parameters give.
     """
     replicas = [_Replica(process, values, types) for process in processes_of(controller, estimated(values)).values()]
     plant = next(replica for replica in replicas if replica.process.restarts)
@@ -179,7 +179,7 @@ def fly(
 def _step(
     replicas: Sequence[_Replica], recorded: Mapping[str, Track], steps: int, progress: Callable[[int, int], None]
 ) -> dict[str, Track]:
-    """Step ``replicas`` message by message as the graph does, until the flight ends; return their outputs.
+    """Step ``replicas`` message by message as the graph does, at most ``steps`` times; return their outputs by topic.
 
     Topics in ``recorded`` are taken from there, also if a replica publishes them.
     """
