@@ -20,7 +20,7 @@ from hsv.model.vehicle import Vehicle, load_vehicle
 class Check:
     """The result of one check: the ``value`` found, a description of the ``expected`` one, and whether they agree.
 
-    A design that fails a ``required`` check must not fly; other checks only show that it differs from its certificate.
+    A design that fails a ``required`` check must not fly; before a flight, another failing check is only a warning.
     ``fields`` are the paths of the fields of the certificate that the check covers.
     """
 

@@ -152,7 +152,8 @@ class ControllerClass(Protocol):
     """The class of a controller: its parameters and its constructor.
 
     An instance has either a ``kernel``, a :class:`StepKernel`, or the methods ``reset`` and ``step``. A step returns
-    the unsaturated input, fuel equivalence ratio and elevator deflection (rad); the bench limits it.
+    the unsaturated input, fuel equivalence ratio and elevator deflection (rad); the bench limits it. An instance of
+    :class:`Controller` is used as it is.
     """
 
     PARAMETERS: tuple[Parameter, ...]
@@ -161,7 +162,7 @@ class ControllerClass(Protocol):
     def from_parameters(self, values: Mapping[str, Any], design: ControlDesign | None) -> Any:
         """Return a controller for a flight with the flat parameters ``values``; ``design`` is None if it has no design.
 
-        ``values`` lacks :data:`hsv.control.controllers.HIDDEN_PARAMETERS` unless the class is part of this library.
+        ``values`` lacks :data:`hsv.control.controllers.HIDDEN_PARAMETERS`, except for a shipped controller's name.
         """
 
 

@@ -505,7 +505,7 @@ def read_parameters(path: Path) -> dict[str, Any]:
     """Return the flat parameters that the ROS 2 parameter file at ``path`` sets for all nodes, in section ``/**``.
 
     Raises:
-        DesignError: The file is missing, or it has no parameters for all nodes.
+        DesignError: The file cannot be read, or :func:`parse_parameters` refuses it.
     """
     try:
         text = read_text(path)
@@ -518,7 +518,7 @@ def parse_parameters(text: str, source: str) -> dict[str, Any]:
     """Return the flat parameters for all nodes in the ``text`` of a ROS 2 parameter file.
 
     Raises:
-        DesignError: There are no such parameters; the message names ``source``.
+        DesignError: There are no such parameters, or :func:`parse_sections` fails; the message names ``source``.
     """
     if flat := parse_sections(text, source).get("/**"):
         return flat
@@ -529,7 +529,7 @@ def parse_sections(text: str, source: str) -> dict[str, dict[str, Any]]:
     """Return the flat parameters in the ``text`` of a ROS 2 parameter file, by section; ``"/**"`` is for all nodes.
 
     Raises:
-        DesignError: There are no parameters, or one occurs twice; the message names ``source``.
+        DesignError: It is not YAML, has no parameters or one of them twice; the message names ``source``.
     """
     try:
         tree = parse_yaml(text)

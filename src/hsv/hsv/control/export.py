@@ -138,7 +138,7 @@ def step_bounds(design: ControlDesign) -> dict[str, StepBound]:
 
 
 def constant(name: str, struct: Struct) -> list[str]:
-    """Return C code for ``struct``, whose type is in ``core.h``: it defines the arrays, then the constant ``name``.
+    """Return the C definitions for ``struct``, of a type in ``core.h``: first its arrays, then the constant ``name``.
 
     An array is named after the path of its field, e.g. ``tube_data_notch_A``.
     """

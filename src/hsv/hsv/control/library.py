@@ -290,7 +290,10 @@ class LibraryClass:
             raise ParameterError(f"controller = {name!r}: {error}") from error
 
     def _check(self) -> None:
-        """Refuse a block without the inputs and outputs of a controller; otherwise adopt its parameters."""
+        """Refuse a block whose inputs and outputs are not those of a controller; otherwise adopt its parameters.
+
+        The last inputs of :data:`CONTROLLER_INPUTS` may be missing.
+        """
         # The size of the last input is that of the notch filter.
         size = self.block.inputs[-1].size if self.block.inputs else 0
         _check_signals("inputs", self.block.inputs, _inputs(size)[: len(self.block.inputs)])

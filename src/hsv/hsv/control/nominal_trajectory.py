@@ -27,7 +27,7 @@ NOMINAL_PARAMETERS = (
 
 
 class NominalResult(NamedTuple):
-    """Nominal step: x_r (9), u_r (2), x_n (9), u_n (2), gain K (2, 9), its family index (0: outermost) and status."""
+    """Nominal step: x_r (9), u_r (2), x_n (9), u_n (2); gain K (2, 9), its index as in :class:`LawResult`, status."""
 
     reference: np.ndarray
     reference_input: np.ndarray

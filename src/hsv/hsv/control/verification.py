@@ -278,7 +278,7 @@ class NominalWeights:
 
     @classmethod
     def of(cls, subject: Subject) -> NominalWeights:
-        """Return the nominal problem of a certificate, with weights that make a cost an integral over time, in s."""
+        """Return the nominal problem of a design, with weights that make a cost an integral over time, in s."""
         polytope, inputs = subject.design.polytope, subject.certificate["inputs"]["nominal"]
         scales = sizes(inputs["state_scale"], STATE_NAMES[:N_RIGID]), sizes(inputs["input_scale"], INPUT_NAMES)
         psi, sigma = (subject.design.period * np.diag(scale**-2.0) for scale in scales)
@@ -289,7 +289,7 @@ class NominalWeights:
     def cost(self, K: np.ndarray, Q: np.ndarray) -> float:
         """Return the smallest gamma_n (eq. 32) that satisfies eq. 34 at every vertex, for K (2, 5) and Q (5, 5).
 
-        Eq. 34 then reads gamma_n (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K with A_c = A + B K.
+        By its Schur complement, eq. 34 reads gamma_n (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K with A_c = A + B K.
 
         Raises:
             DesignError: x' Q^-1 x does not decrease at a vertex.
@@ -425,8 +425,8 @@ class ErrorSystem(NamedTuple):
 def error_system(design: ControlDesign, vehicle: Vehicle, tau: np.ndarray, effectiveness: float = 1.0) -> ErrorSystem:
     """Return the error system (eq. 22, 23) for the feedback tau F, with notch filter and actuators in the state.
 
-    The feedback uses the filtered pitch rate q_f = C_s s + D_s q. It drives the actuators, which act on the vehicle by
-    their mean position over a period, C_a a + D_a u.
+    The feedback uses the filtered pitch rate q_f = C_s s + D_s q, with s the state of the filter. Its output u drives
+    the actuators, with state a, which act on the vehicle by their mean position over a period, C_a a + D_a u.
 
     Args:
         design: Design with vertices, F, notch filter and actuators.
@@ -475,7 +475,7 @@ class Tube:
 
     Its set is the ellipsoid (e - c)' Q^-1 (e - c) <= 1 with ``c`` (n) and ``Q`` (n, n). The disturbance set W is a box
     with mid-point ``middle`` (7) and half-widths ``half`` (7). The r closed loops are those of all vertices, at each
-    extreme factor tau.
+    of the extreme :func:`factors` tau; the F of the first, the smallest, is that of ``rows`` and of the bounds.
     """
 
     def __init__(self, subject: Subject, design: ControlDesign, field: str) -> None:
@@ -511,7 +511,7 @@ class Tube:
 
     @property
     def feedback(self) -> np.ndarray:
-        """Half-ranges (2) of F e over the set, F Z of eq. 30; narrowed by star norms, if stated."""
+        """Half-ranges (2) of F e over the set (F Z, eq. 30) at the smallest tau; narrowed by star norms, if stated."""
         F = self.system.F
         return self._narrowed(np.sqrt(np.sum((F @ self.Q) * F, axis=1)), slice(N_RIGID, None))
 
@@ -541,8 +541,8 @@ class Tube:
     def tightened(self, lag: Sequence[Sequence[float]] = ((0.0, 0.0), (0.0, 0.0))) -> np.ndarray:
         """Return the lower and upper bounds (2 each) of u_n + u_r: U minus the range of the feedback (eq. 30).
 
-        Eq. 53 prints a plus instead. ``lag`` is the minimum and maximum (2 each) of the feedback that arises because
-        the actuators lag behind the plan.
+        The feedback is that at the smallest tau. Eq. 53 prints a plus instead. ``lag`` is the minimum and maximum (2
+        each) of the feedback that arises because the actuators lag behind the plan.
         """
         middle = self.system.F @ self.c + self.system.F_d @ self.middle
         half = self.feedback + np.abs(self.system.F_d) @ self.half
@@ -856,8 +856,8 @@ def preflight(design: ControlDesign, certificate: str = "") -> str:
     a common Lyapunov function (eq. 24), and so has every K (eq. 34). The invariant set monitored in flight is the
     certified one, it contains e = 0, and it is invariant at every vertex under the feedback in flight. Actuators, range
     of tau, ``nominal.filtered`` and ``nominal.interpolated`` are as certified. If one of these or any other required
-    check fails, the design is refused. Other differences from the certificate are a warning, and so is a missing
-    certificate if none is named and none lies next to the design.
+    check fails, the design is refused. Of the other failing checks, the first is the warning. A missing certificate is
+    a warning, too, if none is named and none lies next to the design.
 
     Args:
         design: The design to check.
