@@ -40,7 +40,7 @@ def fly(scenario: Scenario | str) -> Flight:
 
     Raises:
         ScenarioError: A field or the design is wrong; the message names it.
-        RunError: A custom controller failed; the message names it and the step.
+        RunError: A custom controller failed; the message names it, and the step if known.
     """
     return fly_components(assemble_flight(load(scenario) if isinstance(scenario, str) else scenario))
 

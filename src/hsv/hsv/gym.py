@@ -267,7 +267,7 @@ class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
 
 class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
-    """Several :class:`TrackEnv`, simulated side by side by the core; each step has the same bits as alone.
+    """Several :class:`TrackEnv`, simulated side by side by the core; each step has the same bits as if simulated alone.
 
     A reset with one seed gives environment i that seed plus i. Flights that are simulated side by side have a common
     step: when one of them diverges, the others are truncated, and all begin anew in the next step. Flights that the

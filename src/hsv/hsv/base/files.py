@@ -89,7 +89,7 @@ def read_bytes(path: Path, max_bytes: int | None = None) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Return the text in the file ``path``, without a byte order mark and with Unix line ends."""
+    """Return the UTF-8 text in the file ``path``, at most 4 MiB, without a byte order mark and with Unix line ends."""
     try:
         return read_bytes(path, MAX_BYTES).decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
@@ -100,7 +100,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     """Return the tables in a TOML text.
 
     Raises:
-        DocumentError: The text is not TOML, too long or nested too deep.
+        DocumentError: The text is not TOML, too long or nested too deep, or an integer in it is too long.
     """
     _check_length(text)
     if found := _LONG_KEY.search(text):
@@ -113,7 +113,7 @@ def parse_json(text: str | bytes) -> Any:
     """Return the value in a JSON text.
 
     Raises:
-        DocumentError: The text is not JSON, too long or nested too deep, or a key occurs twice in an object.
+        DocumentError: The text is not JSON, too long or nested too deep, a key occurs twice, or an integer is too long.
     """
     _check_length(text)
     return _parsed(text, partial(json.loads, object_pairs_hook=_without_duplicates))
@@ -123,8 +123,8 @@ def parse_yaml(text: str) -> Any:
     """Return the value in a YAML text, built from Python's basic types only.
 
     Raises:
-        DocumentError: The text is not YAML, too long or nested too deep, a key occurs twice in a mapping, or aliases
-            expand to too many values.
+        DocumentError: The text is not YAML, too long or nested too deep, a key occurs twice in a mapping, an integer is
+            too long, or there are too many values, with aliases expanded.
     """
     _check_length(text)
     try:

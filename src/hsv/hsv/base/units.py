@@ -156,7 +156,7 @@ def duration_in_words(seconds: float) -> str:
 
 
 def si_unit_of(text: object) -> str:
-    """Return the SI base units of the quantity ``text``, or ``"1"`` if it has no unit or is not a quantity."""
+    """Return the SI base units of the quantity ``text``, or ``"1"`` if it has no known unit or is not a quantity."""
     try:
         base = _squared(_number_and_unit(text)[1] if isinstance(text, str) else "")[1]
     except ValueError:

@@ -170,7 +170,7 @@ class Plant:
         return other
 
     def is_ideal(self, scheduled: Sequence[ScheduledFault]) -> bool:
-        """Return whether equipment and air are ideal, no command is late, and only commands have faults."""
+        """Return whether equipment and air are ideal, no command is late, and ``scheduled`` has command faults only."""
         data = self.data
         ideal = data.actuators.ideal and data.sensors.ideal and data.link.ideal and data.atmosphere.still
         return ideal and data.late == 0.0 and all(row.fault.kind.side == COMMAND for row in scheduled)

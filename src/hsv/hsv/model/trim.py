@@ -51,7 +51,7 @@ def trim(
     acceleration: float = 0.0,
     where: str = "",
 ) -> Trim:
-    """Return the equilibrium at ``altitude`` (m) and ``velocity`` (m/s) (paper eq. 5), to machine precision.
+    """Return the equilibrium at ``altitude`` (m) and ``velocity`` (m/s) (paper eq. 5), by Newton's method.
 
     V sin(theta - alpha) = ``climb_rate`` (m/s) and dV/dt = ``acceleration`` (m/s^2), both zero by default. The angle of
     attack is constant, the pitch rate is zero, and the elastic modes are at rest.
@@ -90,7 +90,7 @@ def trim_at(
     """Return the equilibrium at a condition given by numbers (SI) or texts with units, see :func:`trim`.
 
     Raises:
-        QuantityError: A text cannot be read.
+        QuantityError: A text is not a finite quantity with a unit of the right dimension.
         TrimError: See :func:`trim`; the message repeats the condition as it was given.
     """
     units = {"altitude": "m", "velocity": "m/s", "climb_rate": "m/s", "acceleration": "m/s^2"}
@@ -126,7 +126,7 @@ INITIAL_PARAMETERS = (
 
 
 def initial_trim(values: Mapping[str, object]) -> tuple[VehicleParameters, Trim]:
-    """Return the nominal vehicle and the initial trim of a flight, from the parameters of its plant."""
+    """Return the nominal vehicle and the initial trim of a flight, given values of the plant's parameters."""
     v = validate(INITIAL_PARAMETERS, values)
     vehicle = Vehicle.from_parameters(values)
     vehicle.check_envelope(INITIAL_PARAMETERS, v)

@@ -159,7 +159,7 @@ class FaultInjector:
         """End the active faults of ``channel`` and of type ``kind``; empty: all channels, all types.
 
         Returns:
-            The first step without them: the next step, or the one after it if all are faults of sensors.
+            The first step without them: the next step, or the one after it if only faults of sensors end.
 
         Raises:
             ParameterError: The channel or the kind is unknown.

@@ -209,7 +209,7 @@ def bode(response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def bode_difference(response: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the absolute differences of magnitude (dB) and phase (deg, at most 180) of two complex responses.
 
-    Two responses of zero count as equal: no input has an effect on the elastic states of a rigid vehicle.
+    Two responses of zero, such as those of the elastic states of a rigid vehicle, count as equal.
     """
     ratio = np.divide(response, expected, out=np.ones_like(response), where=(response != 0.0) | (expected != 0.0))
     return np.abs(20.0 * np.log10(np.abs(ratio))), np.abs(np.degrees(np.angle(ratio)))

@@ -56,7 +56,7 @@ class PolytopicModel:
     singular_values: Sequence[np.ndarray]
 
     def accuracy(self, judged: Polytope, scales: tuple[np.ndarray, np.ndarray]) -> dict[str, float]:
-        """Return the largest errors of ``judged``, by name, against the discretised ``exact`` over the envelope.
+        """Return the largest errors of ``judged``, by name, against the discretised ``exact`` on a grid of points.
 
         The relative error at a point is the Frobenius norm of the difference of [A, B] divided by that of the exact
         [A - I, B], both scaled. Bode plots from all inputs to all states are compared where the relative error is
