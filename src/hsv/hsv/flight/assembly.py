@@ -38,12 +38,12 @@ _FIELDS = {
 
 
 def scenario_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the flat parameters of ``scenario`` and of its custom controller, whose class is imported."""
+    """Return the flat parameters of ``scenario`` and of its custom controller, if any; import that class."""
     return scenario.parameters() | own_parameters(scenario)
 
 
 def own_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the flat parameters of a custom controller, whose class is imported; empty for a shipped one or a node."""
+    """Return the custom controller's flat parameters, importing its class; empty for a shipped controller or a node."""
     if scenario.controller in SHIPPED_CONTROLLERS:
         return {}
     if scenario.controller.startswith(NODE):
@@ -63,7 +63,7 @@ def design_parameters(scenario: Scenario) -> dict[str, Any]:
 
 
 def flight_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the flat parameters of the design, overridden by those of ``scenario``; :func:`assemble` checks them."""
+    """Return the parameters of ``scenario`` and its design (the scenario's prevail); :func:`assemble` checks them."""
     return {**design_parameters(scenario), **scenario_parameters(scenario)}
 
 
@@ -100,7 +100,7 @@ def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> 
 
 @contextmanager
 def blamed_on(scenario: Scenario) -> Iterator[None]:
-    """Turn errors of components into a ``ScenarioError`` that names fields of the scenario, not parameters."""
+    """Turn an ``HsvError`` of this context into a ``ScenarioError`` that names a scenario's fields, not parameters."""
     try:
         yield
     except HsvError as error:
@@ -117,10 +117,10 @@ def uncovered_of(
 ) -> list[str]:
     """Return a message for each property of ``scenario`` that the certificate does not cover; empty if all are covered.
 
-    The default ``certificate`` is in the file next to the scenario's design, if that file exists.
+    Without a ``certificate``, that in the file next to the scenario's design is used, if that file exists.
 
     Raises:
-        DesignError: The scenario's design does not exist, or its certificate cannot be read.
+        DesignError: No ``certificate`` is given, and the design does not exist or its certificate cannot be read.
     """
     if certificate is None and scenario.design:
         path = certificate_path(find_design(scenario.design))

@@ -170,7 +170,7 @@ LOOP = (VEHICLE, NOTCH_FILTER, NOMINAL_TRAJECTORY, CONTROLLER, FAULT_INJECTOR)
 
 
 def steps(components: Components) -> Iterator[Signals]:
-    """Simulate ``components`` from the start and yield the signals after every step, always in the same object."""
+    """Simulate ``components`` until the flight ends; yield the signals after every step, always in the same object."""
     signals = Signals()
     for block in LOOP:
         getattr(components, block.name).reset()

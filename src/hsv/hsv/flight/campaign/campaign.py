@@ -68,7 +68,7 @@ class Factor(Distribution):
 class Campaign:
     """A campaign: everything that its flights depend on, except the code of a controller in Python.
 
-    With the same code, equal campaigns give equal results, byte for byte.
+    With the same code, equal campaigns give equal results, byte for byte; with a solver in flight, on one machine only.
     """
 
     scenario_name: str
@@ -93,7 +93,7 @@ class Campaign:
 
     @cached_property
     def scenario(self) -> Scenario:
-        """The scenario with every distribution at its mean and without other variation."""
+        """The scenario from which the samples deviate, with the mean in place of every distribution."""
         return scenario_at_means(self.table, self.scenario_name)[0]
 
     @cached_property
@@ -130,8 +130,8 @@ class Campaign:
     def draw(self, flights: range) -> tuple[np.ndarray, np.ndarray]:
         """Return the samples, shape (flights, factors), in the factors' units, and their seeds, shape (flights,).
 
-        Every uniform sample has its own seed, so that it can be drawn alone. With the other methods, the seed of every
-        sample is the campaign's; corners do not depend on it.
+        With the method ``uniform``, every sample is drawn with a seed of its own. With the other methods, the seed of
+        every sample is the campaign's; corners do not depend on it.
         """
         d, seeds = len(self.factors), np.full(len(flights), self.seed, np.uint64)
         if self.method == "uniform":
@@ -155,14 +155,14 @@ class Campaign:
 
     @cached_property
     def _hypercube(self) -> np.ndarray:
-        """The Latin hypercube, 0 to 1, shape (flights, factors); each factor's strata are shuffled over all flights."""
+        """The Latin hypercube for all flights of the campaign: values from 0 to 1, shape (flights, factors)."""
         from scipy.stats import qmc
 
         return np.asarray(qmc.LatinHypercube(len(self.factors), seed=self.seed).random(self.samples))
 
     @property
     def batch(self) -> int:
-        """Number of flights in each batch but the last; the flights of a batch are flown and stored together."""
+        """Number of flights that are flown and stored together as a batch; the last batch may have fewer."""
         low, high = _BATCH_LIMITS
         return max(low, min(high, self.samples // _BATCHES // low * low))
 
@@ -209,7 +209,7 @@ class Campaign:
         return found
 
     def difference(self, other: Campaign) -> str:
-        """Return a text on the first setting in which ``other`` differs from this campaign; empty if they are equal."""
+        """Return the first setting in which ``other`` ("here") differs from this campaign ("there"); empty: none."""
         for field in fields(self):
             mine, theirs = getattr(self, field.name), getattr(other, field.name)
             if mine != theirs:
@@ -228,16 +228,16 @@ def plan(
     commit: str = "unknown",
     factors: Mapping[str, tuple[object, object]] | None = None,
 ) -> Campaign:
-    """Return the campaign that varies a vehicle's uncertain parameters, a scenario's distributions and ``factors``.
+    """Return the campaign that varies the vehicle's uncertain parameters, the scenario's distributions and ``factors``.
 
     Args:
         scenario_name: Name of a shipped scenario, or path of a TOML file.
         method: One of :data:`METHODS`; ``"corners"`` flies all combinations of the factors' least and largest values.
         samples: Number of flights; ignored for corners.
-        seed: Seed from which samples are drawn; the seeds of the flights depend on it, too.
-        scale: Factor on the bounds of the uncertain parameters (section 5.1 of the paper); with 0 they do not vary.
+        seed: Seed from which samples, except corners, are drawn; the seeds of the flights depend on it, too.
+        scale: Factor on the vehicle's bounds of uncertain parameters (section 5.1 of the paper), not on distributions.
         commit: Git commit of the program.
-        factors: Least and largest value of other fields or of uncertain parameters, by name, as in a scenario file.
+        factors: Least and largest value, as in a scenario file, of fields or uncertain parameters, by name.
 
     Raises:
         CampaignError, ScenarioError, DesignError: A setting is wrong; the message names it.
@@ -303,7 +303,7 @@ def _check_ends(campaign: Campaign) -> None:
 
 
 def _commands_to_same_goals(table: dict[str, Any], name: str, starts: Mapping[str, float]) -> list[dict[str, Any]]:
-    """Return the scenario's commands with a new change at t = 0, from the varied initial values to the same targets.
+    """Return the commands with one step at t = 0, replacing any there, from varied initial values to the same targets.
 
     ``starts`` has the varied initial values by name: ``altitude`` (m), ``velocity`` (m/s), or only one of them.
     """

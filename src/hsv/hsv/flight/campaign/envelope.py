@@ -59,7 +59,7 @@ class Envelope:
         return cls(np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape), np.zeros(windows))
 
     def add(self, flight: FlightData, steps: int) -> None:
-        """Add a flight with a planned length of ``steps`` steps; a diverged flight covers fewer windows."""
+        """Add a flight, planned for ``steps`` steps, to the windows that it reached before its end or divergence."""
         curves = signals(flight)
         rows = curves.shape[1]
         starts = window_starts(steps, len(self.count))
@@ -82,7 +82,7 @@ class Envelope:
 
     @property
     def mean(self) -> np.ndarray:
-        """Mean over the ``count`` flights of a window, shape (windows, signals); NaN if there are none."""
+        """Mean of every signal in every window, shape (windows, signals); NaN where ``count`` is 0."""
         with np.errstate(invalid="ignore"):
             return np.where(self.count[:, None] > 0.0, self.total / np.maximum(self.count, 1.0)[:, None], np.nan)
 
@@ -100,7 +100,7 @@ class Envelope:
 
 @lru_cache(maxsize=8)
 def window_starts(steps: int, windows: int = WINDOWS) -> np.ndarray:
-    """Return the first step of each window (at most ``windows``) of a flight of ``steps`` steps."""
+    """Return the first steps of the windows, at most ``windows``, into which ``steps`` steps are divided."""
     starts = np.unique(np.linspace(0, steps + 1, windows, endpoint=False).astype(int))
     starts.setflags(write=False)
     return starts

@@ -62,14 +62,14 @@ class Executor:
         """Fly batches; yield the number and the result of each, in any order. ``label`` names a batch in messages.
 
         Raises:
-            RunError: A batch crashes a worker, a worker cannot start or has another program, or the scheduler is lost.
+            RunError: A batch crashes a worker, a worker cannot start or has another version, or the scheduler is lost.
         """
         for batch in batches:
             yield batch, job(text, batch)
 
 
 class _PoolExecutor(Executor, ABC):
-    """Flies the batches in a pool of workers, and calls ``notice`` if no result comes for :data:`NOTICE` seconds."""
+    """Flies batches in a pool of workers; after :data:`NOTICE` s without a result, calls ``notice`` once per cause."""
 
     def __init__(self, notice: Notice) -> None:
         self._notice = notice
@@ -101,7 +101,7 @@ class _PoolExecutor(Executor, ABC):
                 future.cancel()
 
     def _alone(self, job: Job, text: str, batch: int, label: Callable[[int], str]) -> bytes:
-        """Fly a batch with no other batch in flight, to learn whether it crashes its worker; return its result."""
+        """Return the result of a batch that flies with no other in flight; a ``RunError`` if its worker dies twice."""
         for _ in range(2):  # the first failure may be that of an idle worker process
             future = self._submit(job, text, batch)
             try:
@@ -223,7 +223,7 @@ def _to_file(job: Job, campaign: Path, batch: int) -> bytes:
 
 
 class DaskExecutor(_PoolExecutor):
-    """Flies the batches on the workers of a Dask scheduler, which repeats those of a lost worker on another worker."""
+    """Flies the batches on the workers of a Dask scheduler, which gives those of a lost worker to another one."""
 
     def __init__(self, client: Any, notice: Notice = lambda words: None) -> None:
         super().__init__(notice)
@@ -264,7 +264,7 @@ class DaskExecutor(_PoolExecutor):
 
 @contextmanager
 def make_executor(workers: int, scheduler: str = "", notice: Notice = lambda words: None) -> Iterator[Executor]:
-    """Yield an executor for the workers of a Dask scheduler, or for worker processes on this machine.
+    """Yield an executor that uses the workers of a Dask scheduler, worker processes on this machine, or this process.
 
     Args:
         workers: Number of processes: 0 for one per processor, 1 to fly in this process. Must be 0 with a scheduler.
@@ -274,6 +274,7 @@ def make_executor(workers: int, scheduler: str = "", notice: Notice = lambda wor
     Raises:
         CampaignError: The number or the address is not admissible, no scheduler answers at the address, it has no
             workers, or one of them does not answer, lacks the library or has another version of it.
+        RunError: A worker process cannot be started.
     """
     if not 0 <= workers <= 4096:
         raise CampaignError(f"workers = {workers}: expected 0 to 4096")

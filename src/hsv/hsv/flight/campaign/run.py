@@ -93,8 +93,8 @@ def run_campaign(
     ``progress`` is called with the number of finished flights, including those that were in the store before.
 
     Raises:
-        CampaignError: The store holds another campaign, is in use, or cannot be written.
-        RunError: A batch crashes a worker, a worker cannot start or has another program, or the scheduler is lost.
+        CampaignError: The store holds another campaign, is in use or damaged, or cannot be written.
+        RunError: A batch crashes a worker, a worker cannot start or has another version, or the scheduler is lost.
     """
     with store.opened(restart=restart) as finished:
         batches = plan.batches
@@ -146,7 +146,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 @contextmanager
 def writing(path: Path, temporary: Path | None = None) -> Iterator[None]:
-    """Convert system errors to a ``CampaignError`` that names ``path``, and remove an incomplete ``temporary`` file."""
+    """Turn an ``OSError`` of this context into a ``CampaignError`` that names ``path``; then remove ``temporary``."""
     try:
         yield
     except OSError as error:

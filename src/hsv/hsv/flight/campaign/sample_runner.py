@@ -96,7 +96,7 @@ class SampleRunner:
                 yield from map(self._fly_alone, components)
 
     def fly_unchanged(self) -> Flight:
-        """Fly the scenario with every distribution at its mean and without other variation."""
+        """Fly the scenario from which the samples deviate, with the mean in place of every distribution."""
         return fly(self._variants.unchanged)
 
     def level(self, flight: FlightData) -> float | None:
@@ -104,7 +104,7 @@ class SampleRunner:
         return self._levels.worst(flight)
 
     def outcome(self, flown: FlownSample) -> Outcome:
-        """Return a flight's results by column: how it ended, and :data:`OUTCOMES` and fingerprint if no crash."""
+        """Return a flight's results by column; if its controller crashed, there is nothing but how it ended."""
         if isinstance(flown, ControllerError):
             return {"diverged": False, "crashed": str(flown)}
         flight, level = flown
@@ -182,8 +182,8 @@ def sample_runner(text: str) -> SampleRunner:
 def fly_batch(text: str, batch: int) -> bytes:
     """Fly a batch of the campaign with this ``text``; return the same as :meth:`SampleRunner.fly_batch`.
 
-    If the controller is in a shared library, the flights run in the child process that loads it. If the library
-    crashes, all flights of the batch are flown again, each with a new child process.
+    If the controller is in a shared library, the batch is flown in the child process that loads it. If the library
+    crashes there, all flights of the batch are flown again one by one, in a new child process after each crash.
     """
     runner = sample_runner(text)
     if isinstance(runner.controller, LibraryController):

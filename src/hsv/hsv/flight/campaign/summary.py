@@ -34,7 +34,7 @@ TUBE_LIMIT = 1.0
 
 @dataclass(frozen=True)
 class Share:
-    """``within`` of ``flights``: how many flights finish and keep ``limit`` (SI), or finish if ``limit`` is None."""
+    """The number ``within`` of the ``flights`` that finish and keep ``limit`` (SI), or just finish if it is None."""
 
     name: str
     limit: float | None
@@ -54,7 +54,8 @@ class WorstFlight:
     """One of the worst flights: ``ratio`` is the largest ratio of a metric to its limit, ``limit`` names this metric.
 
     If the flight did not finish, ``limit`` is ``crashed`` or ``diverged``, and ``ratio`` is infinite, as for an
-    undefined metric. Without limits, ``ratio`` is 0 and ``limit`` is empty. ``sample`` is in SI units, by factor.
+    undefined metric. Limits of 0 are ignored; if there are no others, ``ratio`` is 0 and ``limit`` is empty.
+    ``sample`` is in SI units, by factor.
     """
 
     flight: int
@@ -77,7 +78,7 @@ class Results:
 
     @property
     def flyable(self) -> bool:
-        """Whether flights can be repeated: the controller is a registered one or a node, or the file is trusted."""
+        """Whether flights may be repeated: the controller is not code that the file names, or the file is trusted."""
         return self.trust or not names_code(self.campaign.scenario.controller)
 
     @cached_property
@@ -150,7 +151,7 @@ class Results:
 
 
 def limits(results: Results) -> dict[str, float]:
-    """Return the limits (SI) by metric: those of the scenario, and that of the tube level if it is recorded."""
+    """Return the limits (SI) by metric: those of the scenario, and 1 for the tube level if any flight has one."""
     stated = dict(results.campaign.scenario.limits)
     if np.any(np.isfinite(results.column("tube_level"))):
         stated["tube_level"] = TUBE_LIMIT
@@ -193,7 +194,7 @@ def clopper_pearson(count: int, n: int, confidence: float = CONFIDENCE) -> tuple
 
 
 def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
-    """Return the ``number`` worst flights: crashed, then diverged (earliest first), then largest ratio to a limit."""
+    """Return the ``number`` worst flights: crashed, diverged (earliest first), then by largest ratio to a limit."""
     stated = {name: limit for name, limit in limits(results).items() if limit > 0.0}
     diverged, crashed, end = results.column("diverged"), results.crashed, results.column("end_time")
     ratios = np.zeros((len(diverged), len(stated) or 1))
