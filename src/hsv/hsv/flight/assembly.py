@@ -38,7 +38,7 @@ _FIELDS = {
 
 
 def scenario_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the flat parameters of ``scenario`` and of its custom controller, if any; import that class."""
+    """Return the flat parameters of ``scenario`` and of its custom controller, if any, importing its class."""
     return scenario.parameters() | own_parameters(scenario)
 
 

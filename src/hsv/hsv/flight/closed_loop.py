@@ -44,14 +44,14 @@ class Components:
 
 
 def fly(components: Components) -> Flight:
-    """Return the flight of ``components`` from the initial trim of the plant for its duration, or until divergence.
+    """Return the flight of ``components`` from the plant's initial trim to the end of its duration, or to divergence.
 
     The core calls back into Python for a nominal law that optimises in flight and for a custom Python controller.
     Flights with such a block run one at a time, because the block has a single state. With a controller in a shared
     library the loop runs in a child process, one flight at a time.
 
     Raises:
-        ControllerError: A custom controller failed; the message names it and the step.
+        ControllerError: A custom controller failed; the message names it and, if known, the step.
         ParameterError: The controller is a separate node.
     """
     rows = components.plant.steps + 1
@@ -65,9 +65,9 @@ def fly(components: Components) -> Flight:
 
 
 def is_ideal(components: Components) -> bool:
-    """Return whether hardware, links and air are ideal, all faults are of the command, and no estimator is enabled.
+    """Return whether equipment, links and air are ideal, all faults are of the command, and no estimator is enabled.
 
-    The controller then receives the true state.
+    The controller then receives the true state, and its commands are not late.
     """
     injector = components.fault_injector
     ideal = components.plant.is_ideal(injector.known) and injector.link.ideal
@@ -76,12 +76,12 @@ def is_ideal(components: Components) -> bool:
 
 @contextmanager
 def watched(controller: Controller, rows: int) -> Iterator[tuple[History, Callable[..., Any]]]:
-    """Yield a history of ``rows`` steps in shared memory, and a function that requests flights into it.
+    """Yield a history of ``rows`` steps in shared memory, and a function that sends requests to the child process.
 
-    The requests go to the child process of the ``controller``, which is in a shared library.
+    The child process has the shared library of the ``controller``, and writes its flights to the history.
 
     Raises:
-        ControllerError: The child process crashed or made no progress; the message names the step.
+        ControllerError: The child process crashed or made no progress; the message names the step, if one has begun.
     """
     library = controller.library
     with library.sharing(rows * History.numbers()) as memory:

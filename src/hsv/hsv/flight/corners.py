@@ -51,7 +51,7 @@ def screening_corners(bounds: Mapping[str, float], share: float = 1.0) -> list[C
     """Return the nominal vehicle, then 32 corners of ``share`` times the ``bounds``, in a fixed order.
 
     The signs of the corners are the 16 rows of a Hadamard matrix and their opposites, for at most 15 parameters. Any
-    three parameters occur in all combinations of their signs.
+    three parameters occur in all combinations of their signs. With fewer than eight parameters, corners repeat.
     """
     runs = hadamard(16)[:, 1 : 1 + len(bounds)]
     rows = share * np.vstack((runs, -runs)) * np.array(list(bounds.values()))

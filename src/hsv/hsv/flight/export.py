@@ -1,4 +1,4 @@
-"""The vehicle of a scenario, with its equipment, faults and reference, as a block of ``hsv_block.h`` in C."""
+"""The vehicle of a scenario, with its equipment, faults and reference, as a C block with the API of ``hsv_block.h``."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def exported_vehicle(scenario: Scenario) -> ExportedBlock:
 
 
 def scenario_header(components: Components) -> str:
-    """Return the header with the numbers of a scenario, as structs of core.h."""
+    """Return the text of the C header with a scenario's numbers, in structs of core.h and arrays."""
     plant, injector = components.plant, components.fault_injector
     payloads = injector.link_state()
     lines = [

@@ -55,8 +55,8 @@ def fingerprint(flown: np.ndarray) -> str:
 def as_published(found: str | None, scenario: Scenario | None, design_hash: str) -> bool | None:
     """Return True if ``found``, the fingerprint of a flight, is published, for whichever scenario; else False or None.
 
-    False: a different fingerprint is published for this ``scenario`` with the design whose digest is ``design_hash``.
-    None: no fingerprint is published for the two, or the flight has none.
+    False: another fingerprint is published for ``scenario``, as shipped, with the design of digest ``design_hash``.
+    None: no fingerprint is published for the two, the scenario was changed or is None, or the flight has none.
     """
     if any(found == entry["fingerprint"] for entry in _table().values()):
         return True

@@ -35,7 +35,7 @@ class History(_Matrices):
 
     @classmethod
     def empty(cls, rows: int, *, estimated: bool = True) -> History:
-        """Return a history of ``rows`` uninitialised steps; ``estimated``: with memory for an estimated state."""
+        """Return a history of ``rows`` uninitialised steps; ``estimated``: with memory for :attr:`estimate`."""
         numbers = cls.numbers() if estimated else SIGNAL_COLUMNS + AUXILIARY_COLUMNS
         return cls.over(np.empty(rows * numbers), rows, estimated=estimated)
 
@@ -50,9 +50,9 @@ class History(_Matrices):
 
     @classmethod
     def over(cls, memory: np.ndarray, rows: int, *, estimated: bool = True) -> History:
-        """Return a history of ``rows`` steps in ``memory``, whose last axis holds the flattened matrices in succession.
+        """Return a history of ``rows`` steps in ``memory``, whose last axis has the flattened matrices in succession.
 
-        Further axes of ``memory`` come first in each matrix; ``estimated``: as for :meth:`empty`.
+        Leading axes of ``memory`` also lead the shape of each matrix; ``estimated``: as for :meth:`empty`.
         """
         matrices, start = [], 0
         for width in (SIGNAL_COLUMNS, AUXILIARY_COLUMNS, N_STATES)[: 3 if estimated else 2]:
@@ -77,7 +77,7 @@ class History(_Matrices):
 
     @property
     def estimate(self) -> np.ndarray:
-        """The state that the controller receives, measured or, with an estimator, estimated; shape (n + 1, 9)."""
+        """The state that the controller receives: the true, the measured or the estimated one; shape (n + 1, 9)."""
         return self.state if self.estimated is None else self.estimated
 
     def columns(self) -> dict[str, np.ndarray]:

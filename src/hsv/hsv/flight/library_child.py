@@ -48,7 +48,7 @@ class LoadedLibrary:
         yield self._memory.numbers(numbers)
 
     def request(self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, **_: Any) -> Any:
-        """Return the result of the method ``name`` with ``arguments`` and the keywords in ``kept``; drop all others."""
+        """Return the result of the method ``name`` with ``arguments`` and the keywords ``kept``; ignore others."""
         return getattr(self, name)(*arguments, **(kept or {}))
 
     def describe(self, symbol: str) -> CBlock:
@@ -85,7 +85,7 @@ class LoadedLibrary:
             raise
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Return the result of a ``function`` that uses the library in this process."""
+        """Return the result of ``function(*arguments)``, which uses the library in this process."""
         return function(*arguments)
 
 

@@ -53,7 +53,10 @@ def not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, float]) -> l
 
 
 def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float], system: UnitSystem) -> str:
-    """Return one line: whether a flight kept its limits, which it did not keep, and which criteria have no limit."""
+    """Return one line: whether a flight kept its limits, which it did not keep, and which criteria have no limit.
+
+    Other metrics without a limit are counted. If the scenario has no limits, the line says only that.
+    """
     text = limits_kept(judged, system)
     words = criteria_not_judged(judged, metrics, system)
     if others := len(not_judged(judged, metrics)) - len(words):

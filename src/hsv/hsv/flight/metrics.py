@@ -120,7 +120,7 @@ CURVES = 10
 
 @dataclass(frozen=True)
 class FlightData:
-    """A simulated or recorded flight for the steps k = 0 ... n, from which metrics are computed; SI."""
+    """The signals of a simulated or recorded flight in the steps k = 0 ... n, from which metrics are computed; SI."""
 
     time: np.ndarray
     """Simulated time (n + 1), s"""
@@ -144,7 +144,7 @@ class FlightData:
         """The ten signals from which metrics are computed, shape (10, n + 1), SI.
 
         Rows: altitude error; velocity error; angle of attack; pitch angle; rates of the two elastic modes; the two
-        inputs; absolute differences of angle of attack and of pitch angle from x_r + x_n.
+        commands u; absolute differences of angle of attack and of pitch angle from x_r + x_n.
         """
         return self._evaluated[0]
 
@@ -162,7 +162,7 @@ class FlightData:
 def _metrics(flight: FlightData) -> dict[str, float]:
     """Return the metrics of a flight, SI, by name, in the order of :data:`METRICS`.
 
-    Metrics that the flight does not define are omitted, such as those of a fault in a flight without one.
+    Metrics that the flight does not define are omitted, such as those of a fault, unless one starts after step 0.
     """
     values: dict[str, float] = {}
     time, curves = flight.time, flight.curves
@@ -200,7 +200,7 @@ def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
     """Return rise time (s), settling time (s) and overshoot (share of the step) of a step response, by name.
 
     ``time`` (s) and ``error``, the tracking error, have shape (n,); the first error is the size of the step. A time is
-    omitted if the response does not rise or settle. Without a step the result is empty.
+    omitted if the response does not rise or settle. Without a step, or if n < 2, the result is empty.
     """
     if len(time) < 2 or abs(error[0]) < 1e-6:
         return {}

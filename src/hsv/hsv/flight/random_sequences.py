@@ -27,14 +27,14 @@ _WIDEST = 32
 def random_sequences(
     A: np.ndarray, columns: np.ndarray, centre: np.ndarray, Q: np.ndarray, sequences: int, steps: int, seed: int
 ) -> dict[str, Any]:
-    """Return the largest levels that random sequences reach, overall and by start and kind; 1 is the boundary.
+    """Return the largest levels that random sequences reach: overall, and for each start by kind; 1 is the boundary.
 
     The result repeats ``sequences``, ``steps`` and ``seed``. Its bits do not depend on the number of threads.
 
     Args:
-        A: (r, n, n) closed loops at the vertices, between which the sequences switch.
-        columns: (r, n, d + 1) change of e - ``centre`` in a step by each of d disturbances at 1; last, a constant.
-        centre: (n) centre of the ellipsoid.
+        A: (r, n, n) matrices of the closed loop at the r vertices; they act on e - ``centre``.
+        columns: (r, n, d + 1) changes of e - ``centre`` in a step: by each of d disturbances at 1, then a constant one.
+        centre: (n,) centre of the ellipsoid.
         Q: (n, n) its matrix; the level of an error e is (e - centre)' Q^-1 (e - centre).
         sequences: Number of sequences.
         steps: Number of steps of each sequence.

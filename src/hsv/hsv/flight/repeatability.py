@@ -49,10 +49,11 @@ def scenario_of(name: str) -> Scenario:
 
 
 def findings(scenario: Scenario) -> Iterator[Finding]:
-    """Fly ``scenario`` in every way that must give the same flight, and yield the findings.
+    """Fly ``scenario`` twice, after a reset, from a copied state and under load; yield a finding for each.
 
     Raises:
-        ScenarioError, RunError: The scenario cannot be flown, or the controller failed in the first flight.
+        ScenarioError, ParameterError: The scenario cannot be flown, or not in one process.
+        RunError: The controller failed in the first flight.
     """
     parts = assemble_flight(scenario)
     first = fly(parts)

@@ -22,7 +22,7 @@ def along_filter(notch: Struct, rate: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def lag_response(
     polytope: Polytope, gain: np.ndarray, notch: Struct, actuators: Struct, scheduled: np.ndarray, lag: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the responses of the error e, shape (k, n), and the feedback, shape (k, 2), to ``lag``, in closed loop.
+    """Return the closed loop's responses to ``lag``: the error e, shape (k, n), and the feedback to it, shape (k, 2).
 
     The error starts at zero. Its n states are those of the rigid body (five), the notch filter and the actuators.
 

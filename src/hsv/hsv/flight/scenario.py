@@ -221,7 +221,7 @@ def _own_text(name: str) -> str:
 
 
 def scenario_table(text: str, name: str) -> dict[str, Any]:
-    """Return the contents of a scenario's TOML ``text``; a vehicle given by name alone becomes a table."""
+    """Return the contents of a scenario's TOML ``text``, as a table; a vehicle given by name alone becomes one, too."""
     try:
         table = parse_toml(text)
     except DocumentError as error:

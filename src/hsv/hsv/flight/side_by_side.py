@@ -37,7 +37,8 @@ class FlightGroup:
 
         There must be 2 to :func:`hsv.core.lanes` flights, each with a nominal law and a controller of the core. They
         may differ only in vehicle, seed, initial state, faults, reference, gains, and the numbers of sensors, links and
-        air. The histories of all lanes, ``rows`` steps each (default: the whole flight), must not exceed 64 MiB.
+        air, but not in the vehicle's angle limit, in :func:`is_ideal`, or in whether there is wind or an engine
+        fault. The histories of all lanes, ``rows`` steps each (default: the whole flight), must not exceed 64 MiB.
         """
         of_the_core = all(each.controller.in_core and each.nominal_trajectory.law.in_core for each in components)
         if not 1 < len(components) <= lanes() or not of_the_core:
@@ -67,7 +68,7 @@ class TubeLevels:
     """Computes levels in a design's invariant set, for flights with a tube law and the notch filter of the design."""
 
     def __init__(self, parts: Components) -> None:
-        """Take the set from the controller in ``parts``, the components of the flights, if it is a tube law."""
+        """Take the set of a tube law in ``parts`` that flies with its design's notch filter; else there is none."""
         law, notch = parts.controller, parts.notch_filter
         tube = law.design.tube if isinstance(law, TubeLaw) and notch.sections == law.design.notch else None
         self.set: Struct | None = None
@@ -111,7 +112,7 @@ def fly_perturbed(
 
 
 def _shared(components: Components) -> tuple[Any, ...]:
-    """Return the data that must be equal in all flights that are simulated side by side."""
+    """Return the data of a flight that must be equal in all flights that are simulated side by side."""
     plant, notch, tube = components.plant, components.notch_filter, components.controller.kernel
     data, nominal = plant.data, components.nominal_trajectory.data
     engine = any(row.fault.kind.side == ENGINE_SIDE for row in components.fault_injector.known)

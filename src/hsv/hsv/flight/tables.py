@@ -25,7 +25,7 @@ from hsv.model.vehicle import DEFAULT_VEHICLE, Vehicle, load_vehicle, parse_vehi
 
 @contextmanager
 def renamed(old: str, new: str) -> Iterator[None]:
-    """Turn a ``ParameterError`` into a ``ScenarioError``, with ``old`` in the message replaced by ``new``."""
+    """Turn a ``ParameterError`` into a ``ScenarioError``, with the first ``old`` in its message replaced by ``new``."""
     try:
         yield
     except ParameterError as error:
@@ -47,7 +47,7 @@ class Reading:
         return found
 
     def number(self, parameter: Parameter, value: object, name: str) -> float:
-        """Return the ``value`` of a ``parameter`` in a file (SI), or the mean of a distribution in its place."""
+        """Return the ``value`` (SI) that a file gives a ``parameter``, or the mean of a distribution in its place."""
         if not isinstance(value, dict):
             return read_number(parameter, value, name)
         drawn = self.distribution(value, parameter.unit or "1", name, whole=parameter.whole)
@@ -247,7 +247,7 @@ class FaultTable(Table):
 
 
 class Breakpoints(NamedTuple):
-    """Breakpoints of the piecewise-linear reference: times (s), altitudes (m), velocities (m/s); equal times: step."""
+    """Breakpoints of the piecewise-linear reference: times (s; equal at a step), altitudes (m) and velocities (m/s)."""
 
     times: tuple[float, ...]
     altitudes: tuple[float, ...]
@@ -257,7 +257,7 @@ class Breakpoints(NamedTuple):
 def breakpoints(altitude: float, velocity: float, commands: Sequence[CommandTable]) -> Breakpoints:
     """Return the breakpoints of the reference from ``altitude`` (m) and ``velocity`` (m/s) along the ``commands``.
 
-    A step at t = 0 is a single breakpoint: the reference begins with the value after the step.
+    A step has two breakpoints; at t = 0 it has only one, because the reference begins with the value after the step.
     """
     rows: list[tuple[float, float, float]] = []
     for time in sorted({t for c in commands for t in (c.start, c.end)} or {0.0}):

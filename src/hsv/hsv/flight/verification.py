@@ -56,11 +56,11 @@ def region(subject: Subject, design: ControlDesign, share: float) -> Components:
 
 
 class Disturbances(NamedTuple):
-    """Disturbances, tube error and feedback to the actuators' lag in a flight, one row per step, SI.
+    """Disturbances, tube error, and the feedback's response to the actuators' lag in a flight; one row per step, SI.
 
     ``channels``, shape (n, 7), are the disturbances in the order of :data:`~hsv.control.verification.CHANNELS`.
     ``error``, shape (n + 1, states), is the tube error e, less its response to the lag of the actuators behind the
-    plan u_r + u_n. ``lag``, shape (n + 1, 2), is the response of the feedback to this lag.
+    plan u_r + u_n. ``lag``, shape (n + 1, 2), is the response of the feedback to this lag, 0 without actuators.
     """
 
     channels: np.ndarray
@@ -72,10 +72,11 @@ def disturbances(subject: Subject, flight: Flight) -> Disturbances:
     """Return the disturbances in a flight (eq. 13 to 18), its tube error (eq. 22) and the response to actuator lag.
 
     The disturbance is Delta(k) = x(k+1) - [x_r(k+1) + d_r(k)] - A(p) (x - x_r) - B(p) (u - u_r), where p is the
-    altitude and velocity of step k. The fault contributes the lost elevator deflection times the elevator's column of
-    B(p). The rigid part of the rest is expressed by three accelerations, constant over a period, and by the residuals
-    of altitude and pitch angle. With actuators, u and the lost deflection in Delta are mean positions over a period.
-    Another channel is the change of the nominal pitch rate by the notch filter, 0 if the design filters that rate.
+    altitude and velocity of step k. One channel is the lost elevator deflection (actuator input minus command); Delta
+    contains it times the elevator's column of B(p). The rigid part of the rest is expressed by three accelerations,
+    constant over a period, and two residuals, of altitude and pitch angle. With actuators, u and the contribution of
+    the lost deflection to Delta are computed from mean positions over a period. The remaining channel is not part of
+    Delta: the change of the nominal pitch rate by the notch filter, 0 if the design filters that rate.
     """
     design, vehicle, h = subject.design, subject.vehicle, flight.history
     notch, plan = discretise(design.notch, design.period), flight.plan
@@ -207,7 +208,7 @@ def flight_checks(subject: Subject) -> Checks:
 
 
 def _worst(subject: Subject, field: str, flown: Sequence[Evidence]) -> Checks:
-    """Yield the checks that no flight exceeds the extremes that the certificate's ``field`` states for all corners."""
+    """Yield the checks of the flights' levels (at most 1) and disturbances against the certificate's, in ``field``."""
     stated, allowance = subject.stated(field), 1.0 + TOLERANCES["flights"].relative
     yield at_most(f"{field}: level", max(f.level for f in flown), min(1.0, stated["worst_level"] * allowance))
     ratio = stated["disturbance_membership"]["worst_ratio"] * allowance
@@ -247,7 +248,9 @@ def bounding_corners(subject: Subject) -> list[Corner]:
 def scenario_checks(
     subject: Subject, scenario: Scenario, over: Sequence[Corner] = ({},), progress: Progress = lambda *_: None
 ) -> Checks:
-    """Fly ``scenario`` with each change in ``over``; check level (eq. 26), disturbances (eq. 19) and plan (eq. 30).
+    """Fly ``scenario`` with each vehicle in ``over``; check level (eq. 26), disturbances (eq. 19) and plan (eq. 30).
+
+    Vehicles are given by relative changes. With actuators, the feedback's response to their lag is checked, too.
 
     Raises:
         DesignError: The controller is not the tube law, a flight diverged, or an input was limited.

@@ -104,7 +104,7 @@ class SampleRunner:
         return self._levels.worst(flight)
 
     def outcome(self, flown: FlownSample) -> Outcome:
-        """Return a flight's results by column; if its controller crashed, there is nothing but how it ended."""
+        """Return a flight's results by column, or only how it ended if its controller crashed."""
         if isinstance(flown, ControllerError):
             return {"diverged": False, "crashed": str(flown)}
         flight, level = flown

@@ -44,20 +44,20 @@ class Subject:
 
     @cached_property
     def scenario(self) -> Scenario:
-        """The scenario itself, without faults of the campaign."""
+        """The scenario itself, with its own faults and without those of the campaign."""
         return parse_scenario(self.text, self.name)
 
     def start(self, moment: Moment) -> float:
-        """Return the time (s) at which a fault starts."""
+        """Return the time (s) at which a fault with the time of occurrence ``moment`` starts."""
         return rounded(moment.share * self.scenario.duration)
 
     def file(self, moment: Moment, vehicle: int, fault: TriedFault | None = None, value: float = 0.0) -> str:
-        """Return the text of the scenario file of a flight with one fault, or without a fault.
+        """Return the text of a flight's scenario file, with one fault or none in place of its own, and no limits.
 
         After the start of the fault, the flight lasts for the share :data:`OBSERVED` of the scenario's duration.
 
         Args:
-            moment: Time of occurrence of the fault.
+            moment: Time of occurrence of the fault; it also sets the duration of the flight without a fault.
             vehicle: Index in :attr:`vehicles`.
             fault: The fault; None for the flight with which the others are compared.
             value: Value of the parameter that is the severity of the fault.
@@ -76,7 +76,7 @@ class Subject:
 
 @dataclass(frozen=True)
 class Case:
-    """One controller with one fault at one time. Its batch has all severities on all vehicles, and a bisection."""
+    """One controller with one fault at one time: all severities on all vehicles, a bisection on the nominal vehicle."""
 
     subject: Subject
     fault: str

@@ -65,11 +65,11 @@ class TriedFault:
 
     @property
     def resolution(self) -> float:
-        """Resolution of the bisection in severity: :data:`RESOLUTION`, but at least a change of an integer by 1."""
+        """Gap in severity at which the bisection ends: :data:`RESOLUTION`, or that of adjacent integers if larger."""
         return max(RESOLUTION, 1.0 / abs(self.worst - self.harmless) if self.whole else 0.0)
 
     def value(self, severity: float) -> float:
-        """Return the parameter's value at a ``severity`` from 0 to 1."""
+        """Return the parameter's value, rounded if it is an integer, at a ``severity`` from 0 to 1."""
         # Both formulas are exact at severities 0 and 1.
         if self.geometric:
             value = self.harmless ** (1.0 - severity) * self.worst**severity

@@ -56,10 +56,10 @@ class FlownFault:
 
 @dataclass(frozen=True)
 class Boundary:
-    """The largest survived and the smallest lost severity (0 to 1) of a fault on the nominal vehicle.
+    """The severities (0 to 1) of a fault between which the loss of the nominal vehicle begins, found by bisection.
 
-    ``survived`` is None if even severity 0 is lost, and ``lost`` is None if all flown severities are survived. If a
-    severity is lost but a larger one survived, the larger one does not count: ``survived`` is always below ``lost``.
+    ``lost`` is the smallest severity that was lost, None if all flown severities were survived. ``survived`` is the
+    largest severity below it that was survived, None if even 0 was lost; larger ones that were survived do not count.
     """
 
     survived: float | None
@@ -107,7 +107,7 @@ class SubjectRunner:
 
 
 def distances(flight: FlightData, without: FlightData, start: float) -> tuple[float, float, float | None]:
-    """Return the largest deviations of attitude (rad) and altitude (m), and the recovery time (s) or None.
+    """Return the largest deviations of attitude (rad) and altitude (m), and the recovery time (s; None: no recovery).
 
     ``flight`` is compared from ``start`` (s), the start of the fault, with the flight ``without`` the fault. If one of
     them ends early, the common steps are compared.
@@ -132,7 +132,7 @@ def boundary(
 
     Args:
         survives: Flies with a severity, and returns whether the flight survives.
-        known: Results of flights so far, by severity.
+        known: Whether the flights so far survived, by severity.
         resolution: Largest permitted difference between the two severities.
         at: Returns the nearest severity that can be flown, because some parameters are integers.
     """
