@@ -162,7 +162,7 @@ class ControllerClass(Protocol):
     def from_parameters(self, values: Mapping[str, Any], design: ControlDesign | None) -> Any:
         """Return a controller for a flight with the flat parameters ``values``; ``design`` is None if it has no design.
 
-        ``values`` lacks :data:`hsv.control.controllers.HIDDEN_PARAMETERS`, except for a shipped controller's name.
+        ``values`` lacks :data:`hsv.control.controllers.HIDDEN_PARAMETERS` unless the controller is a shipped one.
         """
 
 

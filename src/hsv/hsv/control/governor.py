@@ -182,7 +182,7 @@ class Governor:
         return half
 
     def _corner(self, corners: Sequence[Corner], leg: Leg, half: int, name: str, beginning: Beginning) -> Corner:
-        """Return the earliest corner at which ``leg`` can end, with a blend of half-width ``half``, given in steps."""
+        """Find by bisection the earliest corner at which ``leg`` can end; ``half`` is the blend's half-width, steps."""
         begin = self._steps(corners[-1].time)
 
         def end(length: int) -> Corner:

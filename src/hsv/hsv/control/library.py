@@ -237,7 +237,7 @@ def library_record(controller: str) -> LibraryRecord | None:
     """Return the data to store for a scenario's ``controller``, or None if it is not in a library or FMU.
 
     Raises:
-        ParameterError: The library cannot be read.
+        ParameterError: The library cannot be read or has no such controller.
     """
     place = library_place(controller)
     if place is None:

@@ -57,7 +57,7 @@ class LinearModel:
 
     @property
     def poles(self) -> list[Mode]:
-        """The modes of A, fastest first."""
+        """The modes of A, one for each pair of complex poles, highest natural frequency first."""
         return modes(self.A)
 
     def in_units(self, system: UnitSystem) -> LinearModel:

@@ -35,7 +35,7 @@ class LawResult:
     """Result of a nominal law: u_n (2), the gain K (2, 9) used, its index in the family, and the status of the step.
 
     The index counts from 0, the outermost ellipsoid; ``NOT_IN_FAMILY`` marks a gain that is not of the family. In an
-    interpolated family, gain and index are those of the smallest ellipsoid with x_n, and u_n is interpolated.
+    interpolated family, gain and index are those of the smallest ellipsoid with x_n, but u_n is interpolated.
     """
 
     input: np.ndarray

@@ -258,7 +258,7 @@ def _in_steps(times: np.ndarray, period: float) -> np.ndarray:
 
 
 def _evaluate(instants: np.ndarray, commands: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return altitude and velocity (r, 2) at the integer ``steps`` (r), and their slopes (r, 2) right after, per step.
+    """Return altitude and velocity (r, 2) at the integer ``steps`` (r), and their change per step (r, 2) from there on.
 
     The corners have the times ``instants`` (b), in steps, and the altitudes and velocities ``commands`` (b, 2).
     """
