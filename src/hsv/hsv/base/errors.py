@@ -30,7 +30,7 @@ class ScenarioError(HsvError, ValueError):
 
 
 class DesignError(HsvError, ValueError):
-    """A design, its inputs or a controller parameter that is missing or wrong, or a problem without a solution."""
+    """A design, its inputs or a controller parameter that is missing or wrong, or a design that cannot be computed."""
 
 
 class GovernorError(HsvError, ValueError):

@@ -1,4 +1,4 @@
-"""Parameters: each component has a table, from which nodes declare its parameters and files are checked."""
+"""Parameters: each component has one table of its parameters, with which nodes declare them and files are checked."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ def trim_at(
 
 
 def check_equilibrium(where: str, size: float, u: np.ndarray, vehicle: VehicleParameters) -> None:
-    """Check that the imbalance ``size`` is below :data:`CONVERGED`, and ``u``, shape (2,), within the input limits.
+    """Check that the imbalance ``size`` is below :data:`CONVERGED` and the input ``u``, shape (2,), within its limits.
 
     Raises:
         TrimError: The imbalance is too large or an input is outside; the message names ``where`` and the reason.

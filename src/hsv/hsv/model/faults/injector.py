@@ -113,7 +113,7 @@ class FaultInjector:
         return other
 
     def reset(self) -> None:
-        """Return to step 0 and to the schedule, without what was injected or cleared in flight."""
+        """Go back to step 0 and to the schedule, without what was injected or cleared in flight."""
         self.known = list(self.scheduled)
         self._next = 0
         self._rows = self.rows((COMMAND,))
