@@ -222,7 +222,7 @@ def controller_node(controller: str) -> NodeDescription:
     """Return the node of a controller by its name in a scenario.
 
     Raises:
-        ParameterError: The name of an external node lacks package or executable.
+        ParameterError: The name of an external node is neither ``node:package/executable`` nor ``node:`` alone.
     """
     if not controller.startswith(NODE):
         return CONTROLLERS.get(controller, CONTROLLER)
@@ -285,7 +285,7 @@ def checked_namespace(text: str) -> str:
     """Return a namespace with its leading slash.
 
     Raises:
-        ParameterError: The text is not a namespace by the rules of ROS 2.
+        ParameterError: The text is not a namespace by the rules of ROS 2, or exceeds :data:`LONGEST_NAMESPACE`.
     """
     name = text if text.startswith("/") else f"/{text}"
     if name != ROOT and not re.fullmatch(r"(/[A-Za-z_][A-Za-z0-9_]*)+", name):

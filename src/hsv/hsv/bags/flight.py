@@ -108,7 +108,7 @@ def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def held(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return {link: mask, shape (n,)} of the steps, if any, at which its output, but not its input, repeats the last.
+    """Return {link: mask, shape (n,)} of the steps, if any, where a link's output repeats and its input does not.
 
     The links are ``measurement`` (state to measurement) and ``command`` (command to actuator command).
     """

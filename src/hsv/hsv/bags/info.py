@@ -140,7 +140,7 @@ def parameters_in_words(fault: dict[str, Any], written: Callable[[float, str], s
 
     Args:
         fault: Entry of ``faults`` in :func:`describe`.
-        written: Function that formats a number with its SI unit (empty if none or unknown); not used for rad/s.
+        written: Function that formats a number with its SI unit (empty if none or unknown); not called for rad/s.
     """
     given = fault["parameters"]
     try:

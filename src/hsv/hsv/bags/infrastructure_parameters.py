@@ -1,6 +1,6 @@
 """Parameters of the nodes' infrastructure: lockstep, pace, recorder, live view and peer emulator.
 
-The tables of :mod:`hsv.graph.node_parameters` also have the parameters of all components, so that module imports all.
+The tables of :mod:`hsv.graph.node_parameters` also have the parameters of all components, which it has to import.
 A node imports only this module and its own component, so that it starts faster.
 """
 

@@ -65,8 +65,8 @@ class Structure:
             ``header.stamp.sec`` or ``state.altitude``. A text includes its closing zero.
         lengths: Offset and value of the length of every text and sequence, by path.
         size: Size of :attr:`dtype`, bytes.
-        complete: Whether dtype has all fields but empty lists of texts or messages; else it ends before a non-empty one
-            or wide text.
+        complete: Whether dtype has all fields, except empty lists of texts or messages; else it ends before a non-empty
+            one or wide text.
     """
 
     def __init__(self, store: Typesdict, message_type: str, message: bytes) -> None:
@@ -113,7 +113,7 @@ class Structure:
 
         The size is 1 for a number, :data:`VARYING` for a sequence of numbers, and n for n consecutive numbers; their
         path is that of the first, or of the nested message that contains them. A MessageError names a field that the
-        definition lacks or that is no such number.
+        definition lacks or that is of another kind.
         """
         names, formats, offsets = list(self._places), [], []
         for path, size in chosen.values():

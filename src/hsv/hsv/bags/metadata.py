@@ -70,10 +70,7 @@ def usual_qos(depth: int = 10, *, latched: bool = False) -> Qos:
 
 
 def recorded_qos(text: str, *, latched: bool) -> Qos:
-    """Return the first quality of service in an MCAP channel (YAML).
-
-    Usual values replace missing or unknown ones, or all if the description as such is invalid.
-    """
+    """Return an MCAP channel's first quality of service (YAML); usual values replace missing ones, all if invalid."""
     usual = usual_qos(latched=latched)
     try:
         first, *_ = parse_yaml(text)
@@ -170,7 +167,7 @@ def file_names(values: Mapping[str, Any]) -> list[str]:
 
 
 def message_counts(values: Mapping[str, Any]) -> dict[str, int]:
-    """Return the number of messages in each file for which the metadata state it, by the file's name in them."""
+    """Return {file name in the metadata: number of messages} for each file of which the metadata state the number."""
     files = values.get("files")
     entries = [entry for entry in files if isinstance(entry, dict)] if isinstance(files, list) else []
     counts = {str(entry.get("path")): entry.get("message_count") for entry in entries}

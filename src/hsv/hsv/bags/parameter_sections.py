@@ -24,7 +24,7 @@ class ParameterSections:
 
     @classmethod
     def gathered(cls, values: Mapping[str, Mapping[str, Any]]) -> Self:
-        """Return the parameters in ``values``, {node: {name: value}}; those that do not differ by node are shared."""
+        """Return the parameters in ``values``, {node: {name: value}}; those equal in all their nodes are shared."""
         differing = differences(values)
         shared = {name: value for flat in values.values() for name, value in flat.items() if name not in differing}
         own = {node: {name: flat[name] for name in differing if name in flat} for node, flat in values.items()}

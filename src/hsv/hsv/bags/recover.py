@@ -21,7 +21,7 @@ RECOVERED = {"recovered": "true"}
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """Result of a recovery of ``bag``; ``path`` is the new bag's directory, or its own if it needed no recovery."""
+    """Result of a recovery of ``bag``; ``path`` is the directory of the new bag, or of ``bag`` if it needed none."""
 
     bag: Bag
     path: Path

@@ -29,9 +29,9 @@ def roles(topics: Mapping[str, str], custom_data: Mapping[str, str], source: str
     """Return the names of a bag's topics by role, given their types by name; ``source`` is for error messages.
 
     A role has the topic that the bag's custom data name for it; if they name none, the one with the default name in the
-    graph's namespace. If most step topics are found in this way, a role ``hsv/...`` without a topic gets the remaining
-    one of its type, if there is exactly one. A RecordingError refuses a topic of a wrong type in a role, and a bag with
-    topics of two graphs and no recorded namespace.
+    graph's namespace. If most step topics are found in this way, a role ``hsv/...`` without a topic gets the topic of
+    its type that is left, if there is exactly one. A RecordingError refuses a topic of a wrong type in a role, and a
+    bag with topics of two graphs and no recorded namespace.
     """
     remapped = _remapped(custom_data)
     found = {role: name for role, name in remapped.items() if name in topics}

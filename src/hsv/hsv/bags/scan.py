@@ -83,7 +83,7 @@ class Scan:
             position = end
 
     def _next(self, position: int) -> int:
-        """Return the offset, from ``position`` on, of an intact chunk, attachment or end of data, or the file size."""
+        """Return the offset, from ``position`` on, of the next intact chunk, attachment or data end, or file size."""
         candidates = (match.start() for match in _CANDIDATE.finditer(self._data, position))
         return next((at for at in candidates if _record(self._data, at)[1]), len(self._data))
 
@@ -120,6 +120,6 @@ def _record(data: memoryview, position: int) -> tuple[kinds.McapRecord | None, i
 
 
 def _fits_checksum(data: memoryview) -> bool:
-    """Return whether the CRC-32 in the last four bytes of ``data`` fits the others, or is zero, which means none."""
+    """Return whether the CRC-32 in the last four bytes of ``data`` fits the rest, or is zero, which means none."""
     expected = int.from_bytes(data[-4:], "little")
     return expected in (0, zlib.crc32(data[:-4]))

@@ -199,7 +199,7 @@ class Launcher:
     def stop(self) -> None:
         """End all processes with SIGINT; send SIGTERM, then SIGKILL, to those that still run.
 
-        They are signalled in reverse start order, the plant before the recorder, which so receives everything.
+        They are signalled in reverse start order, in a run the plant first, so that the recorder receives everything.
         """
         for number, grace in ((signal.SIGINT, GRACE), (signal.SIGTERM, GRACE / 5), (signal.SIGKILL, GRACE)):
             running = [p for p in reversed(self._processes) if p.popen.poll() is None]

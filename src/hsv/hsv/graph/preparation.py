@@ -215,7 +215,7 @@ def _new_directory(candidates: Sequence[Path]) -> Path:
 
 
 def commit() -> str:
-    """Return the git commit of this source tree, marked if it has changes; ``unknown`` outside a checkout."""
+    """Return the commit of this source tree as ``git describe --dirty`` names it; ``unknown`` outside a checkout."""
     command = ["git", "-C", str(Path(__file__).resolve().parent), "describe", "--always", "--dirty", "--abbrev=40"]
     try:
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()

@@ -156,7 +156,7 @@ def broken_off(bag: Bag) -> bool:
 
 
 def refuse_vacuous(bag: Bag) -> None:
-    """Raise a RecordingError if commands differ from reference inputs for less than 10 s: a replay proves nothing."""
+    """Raise a RecordingError if commands differ from reference inputs for under 10 s: a replay would prove nothing."""
     command, nominal = joined(bag, (COMMAND, NOMINAL)).values()
     deviation = input_columns(command) - input_columns(nominal, "reference_input.")
     active = np.abs(deviation).max(axis=1, initial=0.0) > ACTIVE_INPUT
