@@ -55,7 +55,7 @@ class Flight(FlightData):
         return f"<Flight of {steps * self.period:g} s, {steps} steps, {self.status.name.lower()}, {self.fingerprint}>"
 
     def to_frame(self) -> DataFrame:
-        """Return all signals as a table with one row per step; the index is time (s).
+        """Return the signals of history and reference as a table with one row per step; the index is time (s).
 
         A column has a name such as ``state.altitude``. The units (SI) of the columns are in ``attrs["units"]``.
         """

@@ -1,4 +1,4 @@
-"""The history of a flight: every signal of every step."""
+"""The history of a flight: the main signals in every step."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class _Matrices(NamedTuple):
 
 
 class History(_Matrices):
-    """All signals of a flight for the steps k = 0 ... n, SI."""
+    """The signals of a flight that are named in :data:`SIGNALS`, for the steps k = 0 ... n, SI."""
 
     @classmethod
     def empty(cls, rows: int, *, estimated: bool = True) -> History:
@@ -81,7 +81,7 @@ class History(_Matrices):
         return self.state if self.estimated is None else self.estimated
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return all signals by name, in the order of the loop."""
+        """Return the signals by name, in the order of :data:`SIGNALS`."""
         return {name: getattr(self, name) for name in SIGNALS}
 
     def copy(self) -> History:

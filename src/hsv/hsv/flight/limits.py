@@ -66,7 +66,7 @@ def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float]
 
 
 def criteria_not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, float], system: UnitSystem) -> list[str]:
-    """Return the paper's criteria that the scenario does not limit, each as text with its value."""
+    """Return the paper's criteria that the flight defines and the scenario does not limit, as texts with values."""
     named = [name for name in not_judged(judged, metrics) if name in CRITERIA]
     return [f"{in_words(name)} ({in_units(name, metrics[name], system)})" for name in named]
 

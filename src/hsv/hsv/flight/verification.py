@@ -160,7 +160,7 @@ def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
 
 
 def share_of(inputs: Mapping[str, Any]) -> float:
-    """Return the share of fault and parameter bounds that the set W' holds (eq. 47): largest tau, 1 if tau is fixed."""
+    """Return the share of fault and parameter bounds that W' covers (eq. 47): largest tau, 1 if tau is fixed."""
     return float(max(inputs["adjustable"]["tau"])) if inputs.get("adjustable") else 1.0
 
 
@@ -279,7 +279,7 @@ FLOWN: dict[str, Part] = {"flights": flight_checks, "random sequences": sequence
 
 
 def verify(subject: Subject, quick: bool = False, progress: Progress = lambda *_: None) -> dict[str, list[Check]]:
-    """Return all checks by part; with ``quick``, only those without flights and random sequences."""
+    """Return the checks by part; with ``quick``, those without flights and random sequences."""
     checks: dict[str, list[Check]] = {}
     for name, part in (QUICK | RECOMPUTED | ({} if quick else FLOWN)).items():
         progress(name, 0, 1)

@@ -233,7 +233,7 @@ def plan(
     Args:
         scenario_name: Name of a shipped scenario, or path of a TOML file.
         method: One of :data:`METHODS`; ``"corners"`` flies all combinations of the factors' least and largest values.
-        samples: Number of flights; ignored for corners.
+        samples: Number of flights, a power of two for ``sobol``; ignored for corners.
         seed: Seed from which samples, except corners, are drawn; the seeds of the flights depend on it, too.
         scale: Factor on the vehicle's bounds of uncertain parameters (section 5.1 of the paper), not on distributions.
         commit: Git commit of the program.

@@ -67,7 +67,7 @@ class SampleRunner:
 
     @property
     def controller(self) -> Controller:
-        """The controller of all flights."""
+        """The controller of the scenario without samples; that of a flight may have other parameters."""
         return self._variants.unchanged.controller
 
     def sample(self, flight: int) -> list[float]:

@@ -52,7 +52,7 @@ class Subject:
         return rounded(moment.share * self.scenario.duration)
 
     def file(self, moment: Moment, vehicle: int, fault: TriedFault | None = None, value: float = 0.0) -> str:
-        """Return the text of a flight's scenario file, with one fault or none in place of its own, and no limits.
+        """Return the text of a flight's scenario file, with one fault or none in place of the scenario's and no limits.
 
         After the start of the fault, the flight lasts for the share :data:`OBSERVED` of the scenario's duration.
 
