@@ -50,9 +50,7 @@ def inputs_of(name: str) -> DesignInputs:
 def extended_model(inputs: DesignInputs, coupling: str | float) -> tuple[np.ndarray, np.ndarray]:
     """Return discrete A (11, 11) and B (11, 2) of the extended coupled model (paper eq. 40) at :data:`BETWEEN`.
 
-    Args:
-        inputs: Inputs of the co-design, with its filter and period.
-        coupling: Name of a set of coupling coefficients, or a factor on the set ``derived``.
+    ``coupling`` names a set of coupling coefficients, or is a factor on the set ``derived``.
     """
     vehicle, filter_ = load_vehicle().coupled(coupling), Filter(*series(continuous(_sections(inputs))))
     equilibrium = trim(vehicle, *BETWEEN)

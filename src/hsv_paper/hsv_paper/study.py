@@ -96,12 +96,7 @@ class Study:
 
 
 def markdown(rows: Rows, right: Sequence[str] | None = None) -> str:
-    """Return a table in Markdown; a dash stands for None.
-
-    Args:
-        rows: Rows with the same columns.
-        right: Columns that are aligned right; by default all but the first.
-    """
+    """Return a table in Markdown, with a dash for None; ``right`` are right-aligned columns, default: all but one."""
     heads = list(rows[0])
     lines = [heads, ["---:" if head in (heads[1:] if right is None else right) else "---" for head in heads]]
     lines += [

@@ -146,12 +146,7 @@ def kept_of_level(A: np.ndarray, B: np.ndarray, gain: np.ndarray, shape: np.ndar
     """Return the largest ratio of x' P x after a step to that before it, under u = K x, over all vertices and states.
 
     Below 1, x' P x decreases in every step. The ratio is the maximum over the whole polytope, because x' P x is convex.
-
-    Args:
-        A: (r, n, n) state matrices of the vertices.
-        B: (r, n, m) input matrices of the vertices.
-        gain: (m, n) K.
-        shape: (n, n) P.
+    ``A`` (r, n, n) and ``B`` (r, n, m) are those of the vertices, ``gain`` (m, n) is K and ``shape`` (n, n) is P.
     """
     return max(float(eigh(M.T @ shape @ M, shape, eigvals_only=True)[-1]) for M in A + B @ gain)
 
@@ -266,10 +261,9 @@ def passed(evidence: Evidence) -> Numbers:
 
 
 def unit_circle(evidence: Evidence) -> Numbers:
-    """Return how far the zeros of the discrete filter are from the unit circle, and the benefit of undamped zeros.
+    """Return how far zeros of the discrete filter are from the unit circle: the baseline's, and undamped (``ideal``).
 
-    ``ours`` is the distance of the baseline's zeros, ``ideal`` that of undamped ones, which reduce the first mode's
-    peak by ``gained`` (dB) more.
+    ``gained``: by how much more (dB) undamped zeros reduce the first mode's peak.
     """
     ours = design("baseline").notch[0]
     ideal = replace(ours, zero_damping=0.0)
@@ -363,11 +357,7 @@ def less_uncertainty(evidence: Evidence) -> Numbers:
 def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.ndarray]:
     """Return, by channel of W, its largest magnitude (SI) in each flight of ``scenario``, shape (flights,).
 
-    The channels are measured as in the design of W.
-
-    Args:
-        scenario: A shipped scenario with the tube law, with or without notch filter.
-        over: Relative changes of the vehicle's parameters, one flight each.
+    The channels are measured as in the design of W. ``over`` are relative changes of the vehicle, one for each flight.
     """
     values = flight_parameters(load_scenario(scenario))
     sections = tuple(assemble(values).notch_filter.sections)

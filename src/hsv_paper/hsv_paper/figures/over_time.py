@@ -155,8 +155,7 @@ _CASE_1 = (
     Curve("RMPC on the DM, fourth gain", ORANGE, RMPC),
     Curve("Tube-MPC with notch", BLUE, NOTCH),
 )
-"""The controllers of Figures 9 to 12. The one that vibrates most is drawn first, so that it does not hide the others.
-"""
+"""The controllers of Figures 9 to 12; the one that vibrates most is drawn first and does not hide the others."""
 
 _CASE_2 = (
     Curve("baseline", ORANGE, BASELINE, 2.0),
@@ -190,10 +189,7 @@ def figure_09() -> Figure:
 
 
 def figure_11() -> Figure:
-    """Draw the elastic states in Case 1.
-
-    Robust MPC vibrates about as much as the tube controller with notch filter, so it is drawn last and thinner.
-    """
+    """Draw the elastic states in Case 1; robust MPC vibrates like the tube with notch: it is drawn last and thinner."""
     without, robust, tube = _CASE_1
     return histories(ELASTIC, (without, tube, robust._replace(width=0.7)), Zoom(99.0, 107.0), 1.9, apart=True)
 

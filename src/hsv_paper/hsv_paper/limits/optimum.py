@@ -94,10 +94,7 @@ class Problem:
         return np.vstack(missing).ravel()
 
     def transitions(self, point: Point) -> tuple[np.ndarray, np.ndarray]:
-        """Return the states (N, 9) at the ends of all periods, and their derivatives (N, 9, 12).
-
-        The derivatives are by state, input and length of the period.
-        """
+        """Return the states (N, 9) at the ends of all periods; their derivatives (N, 9, 12) by state, input and length."""
         return transitions(point.state[:-1], point.input, self.periods(point.scalar), self.substeps, self.vehicle)
 
     def merit(self, point: Point) -> float:

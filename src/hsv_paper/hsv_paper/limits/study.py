@@ -83,10 +83,7 @@ def fault_row(fault: Optimum, delay: float) -> dict[str, Any]:
 def corner_limits(
     vehicle: VehicleParameters, envelope: Vehicle, over: Sequence[Corner], delays: tuple[float, ...]
 ) -> np.ndarray:
-    """Return the least effectiveness for each condition, shape (vehicles, 2 + number of delays).
-
-    Conditions: a trim at the target; one at any of nine points of the envelope; nose turned down after each delay (s).
-    """
+    """Return least effectivenesses (vehicles, 2 + delays): trim at the target, in the envelope; nose turned by delay."""
     points = problems.envelope_points(envelope)
     rows = []
     for corner in over:

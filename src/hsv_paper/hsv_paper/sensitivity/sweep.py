@@ -131,13 +131,7 @@ def draw_metric(axis: Axes, x: np.ndarray, results: Mapping[Controller, Columns]
 
 
 def draw_losses(figure: Figure, x: np.ndarray, results: Mapping[Controller, Columns], label: str) -> np.ndarray:
-    """Draw and return three panels over ``x``: losses and saturation, attitude excursion, altitude error at the end.
-
-    Args:
-        x: Values along the sweep.
-        results: Columns by controller.
-        label: Label of the horizontal axis.
-    """
+    """Draw three panels over ``x`` and return them: losses and saturation, attitude excursion, altitude end error."""
     axes = np.asarray(figure.subplots(3, 1, sharex=True))
     for (controller, columns), width in zip(results.items(), widths(len(results)), strict=True):
         for name, style, key in (("finished", "-", controller.label), ("without_limits", ":", None)):
@@ -165,10 +159,7 @@ def legend(figure: Figure, *, shares: bool) -> None:
 def lost_where(x: np.ndarray, columns: Columns, digits: int = 2, *, rising: bool = True) -> dict[str, str]:
     """Return table cells: the intervals of ``x`` in which saturation, losses and the nominal vehicle's loss begin.
 
-    Args:
-        x: Values along the sweep, increasing.
-        digits: Decimals of a printed value.
-        rising: Whether to search from the smallest value up; otherwise from the largest down.
+    ``x`` increases; the search goes from its smallest value up, or from its largest down. ``digits`` are decimals.
     """
     order = slice(None) if rising else slice(None, None, -1)
     along, cells = [f"{value:.{digits}f}" for value in x[order]], {}
