@@ -94,7 +94,7 @@ class Problem:
         return np.vstack(missing).ravel()
 
     def transitions(self, point: Point) -> tuple[np.ndarray, np.ndarray]:
-        """Return the states (N, 9) at the ends of all periods; their derivatives (N, 9, 12) by state, input and length."""
+        """Return the states (N, 9) at the ends of periods; their derivatives (N, 9, 12) by state, input and length."""
         return transitions(point.state[:-1], point.input, self.periods(point.scalar), self.substeps, self.vehicle)
 
     def merit(self, point: Point) -> float:

@@ -83,7 +83,7 @@ def fault_row(fault: Optimum, delay: float) -> dict[str, Any]:
 def corner_limits(
     vehicle: VehicleParameters, envelope: Vehicle, over: Sequence[Corner], delays: tuple[float, ...]
 ) -> np.ndarray:
-    """Return least effectivenesses (vehicles, 2 + delays): trim at the target, in the envelope; nose turned by delay."""
+    """Return least effectiveness (vehicles, 2 + delays): trim at target; trim in the envelope; nose turned by delay."""
     points = problems.envelope_points(envelope)
     rows = []
     for corner in over:
