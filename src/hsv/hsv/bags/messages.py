@@ -202,7 +202,7 @@ class StepMessages:
     """Conversion of the signals of a step to and from the messages of one topic; clock messages can only be packed."""
 
     def __init__(self, topic: str, store: Typestore | None = None) -> None:
-        """Prepare for a step ``topic``, given by its role; ``store`` has its definitions, default: installed ones."""
+        """Choose the topic by its role, e.g. ``hsv/state``, and its message definitions; None: the installed ones."""
         self.type = TOPICS[topic]
         self._store = store or installed_types(self.type)
         carried = CARRIED.get(topic, {})

@@ -244,7 +244,7 @@ def _fault(units: UnitSystem, fault: dict[str, Any]) -> str:
 
 
 def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str, str]:
-    """Return texts on sensors, held steps, effectors and air, by name, as far as ``equipment`` has their numbers."""
+    """Return the texts of hsv info on sensors, repeated (held) steps, effectors and air; ideal ones have none."""
     from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
     from hsv.pages.panels import AIR_PANELS
 

@@ -198,7 +198,7 @@ def _commands(times: Sequence[float], altitudes: Sequence[float], velocities: Se
 
 
 def _blends(times: Sequence[float], blend: float | Sequence[float]) -> np.ndarray:
-    """Return the half-width (b) of the blend of each corner, s; zero if there is only one corner.
+    """Return the half-width (s) of each corner's blend, shape (b,) as ``times``; zero if there is only one corner.
 
     Raises:
         ParameterError: A blend begins before time 0 or lies at a jump, or there is not one for each time.

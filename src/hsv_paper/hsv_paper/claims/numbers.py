@@ -433,7 +433,7 @@ def relaxed(evidence: Evidence) -> Numbers:
 
 
 def adjustable_step(evidence: Evidence) -> Numbers:
-    """Return tau, and the velocity's settling time in Case 1, nominal vehicle: adjustable design over baseline."""
+    """Return tau, and the ratio of the velocity's settling times in nominal Case 1, adjustable design to baseline."""
     values = {**read_parameters(find_design("adjustable")), **load_scenario("case1").parameters()}
     tables = fly_over(Point(values, [{}])), evidence.corners("case1")
     adjustable, baseline = (float(table["velocity_settling_time"][0]) for table in tables)

@@ -34,7 +34,7 @@ TUBE_LIMIT = 1.0
 
 @dataclass(frozen=True)
 class Share:
-    """The number ``within`` of the ``flights`` that finish and keep ``limit`` (SI), or just finish if it is None."""
+    """``within`` of ``flights`` flights finish and keep ``limit`` (SI); if ``limit`` is None, they just finish."""
 
     name: str
     limit: float | None
