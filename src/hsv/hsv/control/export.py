@@ -175,7 +175,7 @@ def constant_array(name: str, element: str, numbers: np.ndarray) -> str:
 
 
 def _number(value: Any) -> str:
-    """Return a number, or a struct of numbers, in C; floating-point numbers are hexadecimal and thus exact."""
+    """Return a number, or an array or struct of numbers, in C; floating-point numbers are hexadecimal and so exact."""
     if isinstance(value, np.void | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple):

@@ -136,9 +136,9 @@ def _predicted(
     ``block`` steps.
 
     Returns:
-        Factor of x_n (rows, n), factor of c (rows, m times blocks), and whether a row is bounded (rows). Each time of
-        :data:`CHECKED_NEAR` or :data:`CHECKED_FAR` in each block has m + 1 rows: the inputs, always bounded, then the
-        pitch acceleration, bounded only in the first :data:`NEAR_BLOCKS`.
+        Factor of x_n (rows, n), factor of c (rows, m times blocks), and whether a row is bounded (rows). Every
+        checked time has m + 1 rows: the inputs, always bounded, then the pitch acceleration, bounded only in the first
+        :data:`NEAR_BLOCKS`. The times are :data:`CHECKED_NEAR` in these, :data:`CHECKED_FAR` in the other blocks.
     """
     n, m = B.shape
     power, forced = [np.eye(n)], [np.zeros((n, m))]
