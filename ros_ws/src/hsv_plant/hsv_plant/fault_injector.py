@@ -51,7 +51,7 @@ class FaultInjectorNode(BlockNode):
         super().on_message(topic, message)
 
     def missing_links(self) -> list[str]:
-        """Return missing topic links, e.g. "tube_mpc (/hsv/command)"; without any, fail if several nodes publish commands."""
+        """Return missing topic links: "tube_mpc (/hsv/command)"; without any, fail if two nodes publish commands."""
         missing = super().missing_links()
         if not missing:
             self._refuse_two()

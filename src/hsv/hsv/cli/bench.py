@@ -178,7 +178,8 @@ def machine() -> str:
 def c_flight(components: Components) -> Callable[[], History]:
     """Return a function that simulates ``components`` by the C loop alone, compiled here for this processor.
 
-    The equipment must be ideal, and controller and nominal law those of the core. The function returns the history; its next call overwrites this history.
+    The equipment must be ideal, and controller and nominal law those of the core. The function returns
+    the history; its next call overwrites this history.
 
     Raises:
         RunError: There is no C compiler, or the build failed.

@@ -91,7 +91,7 @@ def coupling(scope: Scope) -> Outcome:
 
 
 def sampling(scope: Scope) -> Outcome:
-    """Design the baseline at each sampling period; compute its loop's growth (1/s) over the coupling, and fly Case 1."""
+    """Design the baseline at each sampling period; compute its loop's growth (1/s) over the coupling; fly Case 1."""
     kappas = scope.grid(COUPLING_SCALES[0], COUPLING_SCALES[-1], 0.05)
     designs = {period: _design_at(period, scope) for period in PERIODS}
 
