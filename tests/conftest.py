@@ -14,8 +14,9 @@ from hypothesis import HealthCheck, settings
 if TYPE_CHECKING:
     from browser import Browser
 
-# Child processes inherit an ignored SIGINT from a shell that starts pytest in the background. Undo that for the tests.
+# A shell that starts pytest in the background, and nohup, have signals ignored by all child processes. Undo that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # No time limit on examples or on the search for them: other load on the machine must not fail a test.
 settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -198,7 +198,6 @@ def test_a_bad_scenario_or_design_is_refused_before_anything_is_written(hsv, tmp
         ("verify nope.yaml", "design = 'nope.yaml': no such file, expected the path of a .yaml file, a name in "),
         # Wrong words and options.
         ("trim --units imperial", "units = 'imperial': expected one of metric, si, paper"),
-        ("view absent --with vlc", "with = 'vlc': expected one of foxglove, lichtblick, plotjuggler, rerun"),
         ("montecarlo case1 --samples many", "samples = 'many': expected a valid integer"),
         ("topic /hsv/state --every 0", "every = '0': expected a number greater than or equal to 1"),
         ("trim --wings", "No such option: --wings"),

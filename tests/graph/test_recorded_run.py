@@ -89,8 +89,7 @@ def test_player_plays_the_recorded_bytes(shared_processes, bag):
         words = [sys.executable, "-c", SUBSCRIBE, bag, ",".join([*topics, "/clock"])]
         subscriber = shared_processes.start(*words, output=output)
         wait_until(lambda: "waits for a player" in log.read_text(), [subscriber.pid])
-    # The delay is above 3 s, after which a node without the bench's settings of Fast DDS announces itself again.
-    words = ["--rate", "4", "--delay", "5", "--topics", *topics, "/hsv/run", "/rosout"]
+    words = ["--rate", "4", "--delay", "5", "--topics", *topics, "/hsv/run", "/rosout"]  # 5 s: see docs/replay.md
     played = shared_processes.run("ros2", "run", "hsv_bringup", "player", bag, *words)
     assert played.returncode == 0, played.stdout
     assert exit_code_of(subscriber) == 0, log.read_text()
