@@ -33,6 +33,8 @@ def watch_flight(client: GraphClient, options: SimpleNamespace) -> None:
         client.create_subscription(message_class(TOPICS[topic]), topic, keep, LATEST)
     state = client.resolve_topic_name(STATE)
     if not client.wait_for(lambda: {STATE, NOMINAL, ACTUATOR} <= latest.keys(), f"a step on {state}", (STATE,)):
+        if client.count_publishers(state):
+            raise RunError(f"no step on {state}: expected a run that is not paused (hsv set paused false)")
         raise RunError(f"no run in {client.where}: expected hsv run, or nodes started by hand there")
     moves = sys.stdout.isatty() and not options.json
     shown = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -223,12 +224,12 @@ def _parameters(part: str, runs: Sequence[ReportedRun]) -> Iterator[tuple[str, s
 
 
 def _defaults(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the default of each parameter, taken from the shipped vehicle or design if ``values`` names one."""
+    """Return the default of each parameter, taken from the vehicle and the design that ``values`` names, if known."""
     defaults: dict[str, Any] = {name: parameter.default for name, parameter in DECLARED.items()}
-    if values.get("vehicle.name") in SHIPPED_VEHICLES:
+    if str(values.get("vehicle.name")) in SHIPPED_VEHICLES:
         defaults |= named_parameters(values)
-    design = str(values.get("design.name", ""))
-    if not Path(design).suffix and "/" not in design:  # a path from a bag is not opened
+    design = str(values.get("design.name"))
+    if re.fullmatch(r"[\w-]{1,100}", design):  # a path from a bag is not opened
         with suppress(DesignError):
             defaults |= read_parameters(find_design(design))
     return defaults
