@@ -21,6 +21,7 @@ IN_FLIGHT = {
     "hsv fault clear elevator_deflection",
     'hsv command "86050 ft" "8140 ft/s"',
     "hsv set tau 0.9",
+    "hsv set paused false",
     "hsv topic",
 }
 """Commands that run on the flight printed before them."""
@@ -115,9 +116,8 @@ def test_a_flight_answers_as_it_is_printed(checkout):
     assert len(commands) == len(IN_FLIGHT)
     with own_environment() as environment:
         processes = Processes(environment, checkout)
-        popen = processes.start(
-            "bash", "-c", "exec hsv run case2 --real-time-factor 1 --bag bags/answering --no-report"
-        )
+        flight = "hsv run case2 --real-time-factor 1 --bag bags/answering --no-report"
+        popen = processes.start("bash", "-c", f"exec {flight}")
         wait_until(lambda: recorded_steps(checkout / "bags" / "answering") > 50, [popen.pid])
         for command in commands:
             done = processes.run("bash", "-c", command)
