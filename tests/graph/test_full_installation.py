@@ -108,7 +108,7 @@ def test_launch_ends_with_1_after_a_node_is_killed(processes: Processes, name: s
         ("scenari:=case1", "scenari: no such argument, did you mean scenario?"),
         ("colour:=red", "colour: no such argument: expected one of scenario, bag, "),
         ("scenario:=nowhere", "scenario 'nowhere': expected a path or one of case1, "),
-        ("real_time_factor:=quick", "Invalid value for 'real_time_factor'"),
+        ("real_time_factor:=quick", "real_time_factor = 'quick': expected a valid number"),
         ("step_timeout:=0", "step_timeout = 0.0: expected at least 0.1"),
         ("bag:=.", "bag = '.': exists already"),
     ],
