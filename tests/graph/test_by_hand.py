@@ -123,7 +123,7 @@ def test_a_flight_by_hand_is_told_and_can_be_repeated(processes):
         long("topic", 1, "hsv: error: no node of the graph in ROS_DOMAIN_ID="),
         long("watch", 1, "hsv: error: no run in ROS_DOMAIN_ID="),
         long("set tua 0.8", 2, "name = 'tua': expected a parameter that may change in flight, feedback.tau"),
-        long("topic --every 0", 2, "--every"),
+        long("topic --every 0", 2, "every = '0': expected a number"),
         long("topic /hsv//state", 2, "(topic name must not contain repeated '/')"),
         long("fault list --namespace 9x", 2, "namespace = '9x'"),
     ],
