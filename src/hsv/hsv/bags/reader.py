@@ -105,7 +105,7 @@ class Bag:
         self._check()
 
     def name_of(self, role: str) -> str:
-        """Return the name of the topic in ``role``, or its default name if the bag has none; a full name as it is."""
+        """Return the name of the topic in ``role``, or its default name if the bag has no such topic."""
         return self.roles.get(role) or resolved(role, self.namespace)
 
     @cached_property

@@ -153,7 +153,7 @@ class ControllerClass(Protocol):
 
     An instance has either a ``kernel``, a :class:`StepKernel`, or the methods ``reset`` and ``step``. A step returns
     the unsaturated input, fuel equivalence ratio and elevator deflection (rad); the bench limits it. An instance of
-    :class:`Controller` is used as it is.
+    :class:`Controller` needs no wrapper and is called directly.
     """
 
     PARAMETERS: tuple[Parameter, ...]
