@@ -44,9 +44,9 @@ setup(
         "hsv": [
             "py.typed",
             "**/*.toml",
-            "control/*.c",
+            "plugins/*.c",
             "flight/*.c",
-            "control/include/*.h",
+            "plugins/include/*.h",
             "core/*.[ch]",
             "designs/*",
             "pages/template/*",

@@ -5,7 +5,7 @@ import pytest
 
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, validate
-from hsv.control.controllers import CONTROLLER_PARAMETERS
+from hsv.control.controller import CONTROLLER_PARAMETERS
 from hsv.control.design import DESIGN_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.control.notch_filter import NOTCH_PARAMETERS

@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 from numpy.testing import assert_allclose
 
-from hsv.control.checks import load_subject
+from hsv.certificate.checks import load_subject
 from hsv.control.design import find_design, read_design, read_parameters, write_design
-from hsv.control.export import controller_files, step_bounds
 from hsv.design.inputs import find_inputs
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario
 from hsv.flight.verification import verify
+from hsv.plugins.export import controller_files, step_bounds
 
 
 @pytest.fixture

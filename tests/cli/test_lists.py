@@ -2,11 +2,11 @@
 
 import pytest
 
-from hsv.control.controllers import controller_names
 from hsv.flight.scenario import parse_scenario, scenario_names, scenario_text
 from hsv.model.faults.injector import FaultInjector
 from hsv.model.faults.table import FAULT_KINDS, read_fault
 from hsv.model.vehicle import vehicle_names
+from hsv.plugins.controllers import controller_names
 
 SETS = ["elevator_50", "elevator_150", "elevator_20", "elevator_first_order_20", "fuel_10"]
 SETS += ["ideal", "fine", "ghv", "inertial"]

@@ -17,11 +17,11 @@ from hsv.control.controller import (
     StepKernel,
     flat_input,
 )
-from hsv.control.controllers import build_controller
 from hsv.control.design import find_design, read_design, read_parameters
 from hsv.control.robust_mpc import RobustMpc
 from hsv.control.tube_law import TubeStatusCode
 from hsv.model.vehicle import load_vehicle
+from hsv.plugins.controllers import build_controller
 
 VEHICLE = load_vehicle().decoupled
 LOW, HIGH = VEHICLE.input_minimum, VEHICLE.input_maximum

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from hsv.control.design import find_design, read_design
-from hsv.control.nominal_gain import NominalProblem, nominal_gain
 from hsv.control.nominal_law import (
     MEMBERSHIP_TOLERANCE,
     NOT_IN_FAMILY,
@@ -17,6 +16,7 @@ from hsv.control.nominal_law import (
 )
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.reference_trajectory import ReferenceTrajectory
+from hsv.lmi.nominal_gain import NominalProblem, nominal_gain
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 

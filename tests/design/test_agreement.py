@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.control.tolerances import PARAMETERS
+from hsv.certificate.tolerances import PARAMETERS
 from hsv.design.agreement import deviations
 from hsv.design.inputs import parse_inputs, read_inputs
 

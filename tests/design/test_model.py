@@ -9,12 +9,12 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from hsv.base.errors import DesignError
-from hsv.control.nominal_gain import nominal_gain
 from hsv.control.notch_filter import NotchSection
-from hsv.control.optimisation import BOUND_DIGITS, GAP, Unknown, minimise, outward, rounded
 from hsv.design.baseline import initial_deviation, nominal_problem
 from hsv.design.inputs import read_inputs
 from hsv.design.model import design_model
+from hsv.lmi.nominal_gain import nominal_gain
+from hsv.lmi.semidefinite import BOUND_DIGITS, GAP, Unknown, minimise, outward, rounded
 from hsv.model.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"

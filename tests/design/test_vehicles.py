@@ -5,8 +5,8 @@ import json
 import pytest
 
 from hsv.base.errors import DesignError
+from hsv.certificate.checks import load_subject
 from hsv.cli.entry import main
-from hsv.control.checks import load_subject
 from hsv.control.design import read_design
 from hsv.control.tube_law import TubeStatusCode
 from hsv.design.inputs import read_inputs

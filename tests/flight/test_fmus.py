@@ -13,14 +13,14 @@ from marking import long
 from page_blocks import blocks
 
 from hsv.base.errors import ControllerError, HsvError, ParameterError
-from hsv.control.controllers import class_place, names_code
 from hsv.control.design import find_design, read_design
-from hsv.control.export import exported_controller
-from hsv.control.fmu_export import write_fmu
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.export import exported_vehicle
 from hsv.flight.scenario import load_scenario
+from hsv.plugins.controllers import class_place, names_code
+from hsv.plugins.export import exported_controller
+from hsv.plugins.fmu_export import write_fmu
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 CASE1 = "v1:0669d52ede9cf309349ec3729d9c4c7160e4c8f9d681081827ea43f18398a596"

@@ -5,12 +5,12 @@ import pytest
 
 from hsv.base.errors import HsvError, RunError, ScenarioError
 from hsv.base.parameters import Parameter, validate
-from hsv.control.controllers import controller_class
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.flight import step_statistics, step_times_in_words
 from hsv.flight.scenario import parse_scenario
 from hsv.model.vehicle import load_vehicle
+from hsv.plugins.controllers import controller_class
 
 LIMITS = load_vehicle().decoupled
 

@@ -12,14 +12,14 @@ from c_libraries import PROBE, build_probe
 from hsv.base.errors import ControllerError, ScenarioError
 from hsv.base.parameters import Parameter
 from hsv.control.controller import ControllerInput
-from hsv.control.library import include_folder, library_digest, library_record
-from hsv.control.library_process import SharedMemory
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
-from hsv.flight.library_child import LoadedLibrary
 from hsv.flight.repeatability import findings, from_copied_state
 from hsv.flight.scenario import load_scenario, scenario_text
 from hsv.graph.preparation import prepare
+from hsv.plugins.library import include_folder, library_digest, library_record
+from hsv.plugins.library_child import LoadedLibrary
+from hsv.plugins.library_process import SharedMemory
 
 SCENARIO = """
 title = "Case 1 by a library"
@@ -111,7 +111,7 @@ def test_what_a_library_keeps_beside_its_state_is_found(tmp_path):
     ],
 )
 def test_what_goes_wrong_is_named_with_its_step_and_the_next_flight_flies(flight, settings, message, monkeypatch):
-    monkeypatch.setattr("hsv.control.library_process.NO_PROGRESS", 1.0)
+    monkeypatch.setattr("hsv.plugins.library_process.NO_PROGRESS", 1.0)
     with pytest.raises(ControllerError, match=message):
         fly(flight(settings))
     assert len(fly(flight()).time) == 201
@@ -147,7 +147,7 @@ def test_a_library_that_is_no_controller_is_refused(tmp_path, flags, message, mo
     build_probe(tmp_path, "-w", *flags)
     # Load the library here, as its own process would; starting a process for each case takes longer.
     library = LoadedLibrary(tmp_path / "probe.so", SharedMemory(-1))
-    monkeypatch.setattr("hsv.control.library_process._in_this_process", library)
+    monkeypatch.setattr("hsv.plugins.library_process._in_this_process", library)
     with pytest.raises(ScenarioError, match=message):
         assemble_flight(load_scenario(written(tmp_path, design="baseline")))
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hsv.control.checks import Subject, load_subject
+from hsv.certificate.checks import Subject, load_subject
+from hsv.certificate.verification import Tube
 from hsv.control.design import find_design
-from hsv.control.verification import Tube
 from hsv.design.certified import load_certified
 from hsv.design.disturbance import ChannelModel
 from hsv.design.region import Region

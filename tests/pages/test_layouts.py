@@ -8,8 +8,8 @@ from recorded_flight import message_types
 
 from hsv.bags.definitions import fields_of
 from hsv.bags.description import TOPICS, resolved
-from hsv.model.airframe.pose import Sample, transforms
-from hsv.model.airframe.scene import SCENE_TOPIC
+from hsv.pages.airframe.pose import Sample, transforms
+from hsv.pages.airframe.scene import SCENE_TOPIC
 from hsv.pages.layouts import foxglove_layout
 
 RECORDED = {resolved(role): kind for role, kind in TOPICS.items()} | {

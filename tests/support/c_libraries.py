@@ -8,7 +8,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from hsv.control.library import include_folder
+from hsv.plugins.library import include_folder
 
 PROBE = Path(__file__).with_name("probe.c")
 WARNINGS = ("-Wall", "-Wextra", "-Werror", "-pedantic")

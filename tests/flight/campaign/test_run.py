@@ -10,7 +10,6 @@ from full_disk import files_no_larger_than
 from pyarrow import parquet
 
 from hsv.base.errors import CampaignError
-from hsv.control.library import library_place
 from hsv.flight.campaign.campaign import plan
 from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
@@ -19,6 +18,7 @@ from hsv.flight.campaign.store import ResultStore, read_result, result_digest
 from hsv.flight.campaign.summary import Results, shares, worst_flights
 from hsv.graph.campaign_replay import replay_in_process
 from hsv.pages.campaign import write_campaign_page
+from hsv.plugins.library import library_place
 
 
 class Counting(Executor):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hsv.model.airframe.geometry import airframe
+from hsv.pages.airframe.geometry import airframe
 from hsv.pages.report import write_report
 from hsv.pages.side_view import geometry
 

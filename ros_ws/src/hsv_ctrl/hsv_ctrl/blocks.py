@@ -6,10 +6,11 @@ from functools import partial
 
 from hsv.bags.description import CONTROLLER, CONTROLLERS, NOTCH_FILTER
 from hsv.base.errors import ParameterError
-from hsv.control.controllers import NODE, build_controller, controller_class
+from hsv.control.controller import NODE
 from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.control.notch_filter import NOTCH_PARAMETERS, NotchFilter
 from hsv.flight.blocks import Signals
+from hsv.plugins.controllers import build_controller, controller_class
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
 from hsv_node.parameters import declare, declare_design, declare_vehicle, given

@@ -10,12 +10,12 @@ from rclpy.parameter import Parameter
 
 from hsv.bags.description import ROBUST_MPC, TUBE_MPC, NodeDescription
 from hsv.base.errors import DesignError, ParameterError
-from hsv.control.coverage import uncovered_hardware
+from hsv.certificate.verification import preflight
 from hsv.control.design import CERTIFICATE_PARAMETERS, TAU
 from hsv.control.effectiveness import EFFECTIVENESS_ENABLED, WATCHED_PARAMETERS, EffectivenessMode
+from hsv.control.hardware import uncovered_hardware
 from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS, RobustMpc
 from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw, TubeResult, TubeStatusCode
-from hsv.control.verification import preflight
 from hsv.flight.blocks import Signals
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node

@@ -18,9 +18,9 @@ from hsv.bags import description
 from hsv.bags.description import NodeDescription
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.base.errors import RunError
-from hsv.control.controllers import class_place
 from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.flight.blocks import Signals
+from hsv.plugins.controllers import class_place
 from hsv_node.middleware import LATCHED, STEP, message_class
 from hsv_node.parameters import declare, refuse_unknown
 from hsv_node.process import ProcessNode

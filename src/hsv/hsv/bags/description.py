@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hsv.base.errors import ParameterError
-from hsv.control.controllers import NODE
+from hsv.control.controller import NODE
 from hsv.flight import blocks
 from hsv.flight.blocks import Block
 from hsv.model import signals

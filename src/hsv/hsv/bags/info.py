@@ -34,7 +34,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.steps import bag_warnings, complete_stamps, cut_off, joined
 from hsv.base.errors import HsvError, ParameterError, RecordingError
 from hsv.base.files import parse_json
-from hsv.control.coverage import uncovered
+from hsv.certificate.coverage import uncovered
 from hsv.control.design import design_of
 from hsv.flight.fingerprint import as_published
 from hsv.flight.scenario import Scenario, parse_scenario

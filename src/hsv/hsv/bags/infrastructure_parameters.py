@@ -7,7 +7,7 @@ A node imports only this module and its own component, so that it starts faster.
 from __future__ import annotations
 
 from hsv.base.parameters import Parameter
-from hsv.control.controllers import CONTROLLER_PARAMETERS
+from hsv.control.controller import CONTROLLER_PARAMETERS
 from hsv.control.estimator import ESTIMATOR_ENABLED
 
 LOCKSTEP_PARAMETERS = (

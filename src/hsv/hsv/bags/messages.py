@@ -25,7 +25,6 @@ from hsv.bags.description import CARRIED, CLOCK, TOPICS, TUBE_STATUS, WIRE_ALIGN
 from hsv.base.errors import ParameterError, RunError, SignalError
 from hsv.flight.blocks import LOOP
 from hsv.model import signals as types
-from hsv.model.airframe.pose import LEVEL
 from hsv.model.signals import N_INPUTS, N_STATES, NEVER, VARYING, SignalType
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     from hsv.model.faults.schedule import ActiveFault
     from hsv.model.faults.table import Fault
 
-FRAME = LEVEL
+FRAME = "vehicle_carried"
 """``frame_id`` of every message of a step: the vehicle-carried frame of the state."""
 
 ENCAPSULATION = 4

@@ -258,8 +258,8 @@ def export(
         raise ParameterError("format: expected one of --csv, --parquet, --npz and --scene, or --format mat")
     opened = Bag(bag)
     if scene:
-        from hsv.bags.scene import scene_path, write_scene
-        from hsv.model.airframe.geometry import airframe
+        from hsv.pages.airframe.export import scene_path, write_scene
+        from hsv.pages.airframe.geometry import airframe
 
         if topic:
             raise ParameterError("topic: expected with a table, --scene holds every topic")

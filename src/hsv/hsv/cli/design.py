@@ -31,11 +31,11 @@ if TYPE_CHECKING:
     import numpy as np
     from rich.table import Table
 
-    from hsv.control.checks import Subject
+    from hsv.certificate.checks import Subject
     from hsv.control.design import ControlDesign
-    from hsv.control.fmu_export import ExportedBlock
     from hsv.control.linear_model import LinearModel
     from hsv.model.lpv.linearisation import Mode
+    from hsv.plugins.fmu_export import ExportedBlock
 
 _DESIGN_SECONDS = {"baseline": 175.0, "adjustable": 294.0}
 """Measured computation times (s) of these two designs, with 1025 flights each."""
@@ -191,7 +191,7 @@ def design(
 
     Example: hsv design baseline; hsv design adjustable --tau 0.8 --out softer.yaml; hsv design baseline --check
     """
-    from hsv.control.checks import load_subject
+    from hsv.certificate.checks import load_subject
     from hsv.control.design import certificate_path, write_certificate, write_design
     from hsv.design.adjustable import design_adjustable
     from hsv.design.baseline import design_baseline
@@ -302,7 +302,7 @@ def verify(
 
     Example: hsv verify offline_design/baseline.yaml --scenario case1_qp
     """
-    from hsv.control.checks import load_subject, unchecked
+    from hsv.certificate.checks import load_subject, unchecked
     from hsv.control.design import find_design
     from hsv.flight.scenario import load_scenario
     from hsv.flight.verification import bounding_corners, scenario_checks
@@ -476,7 +476,7 @@ def export_controller(
     Example: hsv export-controller baseline --out controller
     """
     from hsv.control.design import find_design, read_design
-    from hsv.control.export import controller_files, exported_controller, step_bounds
+    from hsv.plugins.export import controller_files, exported_controller, step_bounds
 
     if out is None and fmu is None:
         raise ParameterError("out, fmu: missing, expected --out FOLDER, --fmu FILE or both")
@@ -526,7 +526,7 @@ def export_vehicle(
 
 
 def _write_fmu(path: Path, block: ExportedBlock, force: bool) -> None:
-    from hsv.control.fmu_export import write_fmu
+    from hsv.plugins.fmu_export import write_fmu
 
     check_new(path, "fmu", force)
     with writing(path, "fmu"):
@@ -538,6 +538,6 @@ def include() -> None:
 
     Example: hsv include
     """
-    from hsv.control.library import include_folder
+    from hsv.plugins.library import include_folder
 
     print(include_folder())

@@ -510,9 +510,9 @@ def scenario(
     Example: hsv montecarlo scenario campaigns/case1_corners.parquet --flight 17 > worst.toml
     """
     from hsv.bags.parameter_sections import ParameterSections
-    from hsv.control.library import seen_from
     from hsv.flight.campaign.summary import Results
     from hsv.graph.campaign_replay import require_design
+    from hsv.plugins.library import seen_from
 
     results = Results(result, trust=trust)
     if design is None:

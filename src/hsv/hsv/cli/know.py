@@ -87,7 +87,7 @@ def _list_vehicles(name: str, json: bool) -> None:
 
 
 def _list_controllers(name: str, json: bool) -> None:
-    from hsv.control.controllers import controller_class, controller_names
+    from hsv.plugins.controllers import controller_class, controller_names
 
     titles = {}
     for known in controller_names():

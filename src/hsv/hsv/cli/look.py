@@ -108,8 +108,8 @@ def view(
     import subprocess
 
     from hsv.bags.reader import Bag
-    from hsv.bags.scene import scene_of
     from hsv.base.errors import RecordingError
+    from hsv.pages.airframe.export import scene_of
     from hsv.pages.viewers import VIEWERS, layout_for
 
     opened = Bag(bag)

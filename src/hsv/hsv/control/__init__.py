@@ -1,1 +1,1 @@
-"""Designs and their verification, notch filter, nominal trajectory, control laws, and custom controllers."""
+"""Designs, notch filter, reference and nominal trajectory, the laws that fly, and the interface of a controller."""

@@ -41,6 +41,24 @@ if TYPE_CHECKING:
     from hsv.control.design import ControlDesign
 
 
+SHIPPED_CONTROLLERS = {"tube_mpc": "hsv.control.tube_law:TubeLaw", "robust_mpc": "hsv.control.robust_mpc:RobustMpc"}
+"""Classes of this library by name; others are entry points, see :mod:`hsv.plugins.controllers`."""
+
+_DEFAULT = "tube_mpc"
+
+NODE = "node:"
+"""Prefix of the name of a controller that is a separate ROS 2 node, ``node:package/executable``; the prefix alone means
+a node that is started by hand."""
+
+CONTROLLER_PARAMETERS = (
+    Parameter(
+        "controller",
+        _DEFAULT,
+        "controller: a registered name, package.module:Class, path/lib.so:symbol, path/name.fmu or "
+        "node:package/executable",
+    ),
+)
+
 FOREIGN_FAILURES = (Exception, SystemExit)
 """Exceptions to expect from external code, which may raise anything and even call ``sys.exit``."""
 
@@ -123,7 +141,7 @@ class Controller(ABC):
     kernel: Any = None
     """The :class:`StepKernel` of a controller outside the core; None: call :meth:`unsaturated_input`"""
     library: Any = None
-    """The process that steps a controller in a shared library, see :mod:`hsv.control.library_process`, or None"""
+    """The process that steps a controller in a shared library, see :mod:`hsv.plugins.library_process`, or None"""
 
     @abstractmethod
     def reset(self) -> None:
@@ -162,7 +180,7 @@ class ControllerClass(Protocol):
     def from_parameters(self, values: Mapping[str, Any], design: ControlDesign | None) -> Any:
         """Return a controller for a flight with the flat parameters ``values``; ``design`` is None if it has no design.
 
-        ``values`` lacks :data:`hsv.control.controllers.HIDDEN_PARAMETERS` unless the controller is a shipped one.
+        ``values`` lacks :data:`hsv.plugins.controllers.HIDDEN_PARAMETERS` unless the controller is a shipped one.
         """
 
 

@@ -119,7 +119,7 @@ class TubeSet:
     """The invariant set (e - c)' P (e - c) <= 1 for errors e (n) of the rigid states and the notch filter, SI.
 
     ``centre`` is c (n), ``shape`` P (n, n). ``half_width`` (n) is the certified bound of |e - c| by entry; for the
-    rigid states it may be narrower than the set, see :class:`hsv.control.verification.StarNorms`.
+    rigid states it may be narrower than the set, see :class:`hsv.certificate.verification.StarNorms`.
     """
 
     centre: np.ndarray

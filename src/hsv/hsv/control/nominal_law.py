@@ -99,7 +99,7 @@ class KothareLaw(FamilyLaw):
     def __init__(self, design: ControlDesign, data: Struct) -> None:
         super().__init__(data)
         # Imported here, as the modelling tool and the solver take a second to import.
-        from hsv.control.nominal_gain import NominalProblem, nominal_gain
+        from hsv.lmi.nominal_gain import NominalProblem, nominal_gain
 
         self._nominal_gain = nominal_gain
         polytope = design.polytope

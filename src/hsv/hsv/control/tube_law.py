@@ -20,7 +20,6 @@ import numpy as np
 from hsv.base.errors import SignalError
 from hsv.base.parameters import Parameter, validate
 from hsv.control.controller import Controller, ControllerInput, ControllerResult
-from hsv.control.coverage import HARDWARE_PARAMETERS, uncovered_hardware
 from hsv.control.design import TAU, TAU_CHANGE_PARAMETERS, ControlDesign, certified, compact, scheduled_changes
 from hsv.control.effectiveness import (
     EFFECTIVENESS_PARAMETERS,
@@ -29,6 +28,7 @@ from hsv.control.effectiveness import (
     effectiveness_data,
     effectiveness_in,
 )
+from hsv.control.hardware import HARDWARE_PARAMETERS, uncovered_hardware
 from hsv.control.nominal_law import level
 from hsv.control.notch_filter import FLOWN_NOTCH_PARAMETERS, NotchSection, discretise, flown_sections
 from hsv.core import Struct, doubles, dtype, lib, records, vector

@@ -7,7 +7,7 @@
 - :mod:`~hsv.design.feedback`: the gain F (eq. 24)
 - :mod:`~hsv.design.sets`: the invariant set (eq. 25 to 28)
 - :mod:`~hsv.design.tightening`: the tightened inputs (eq. 30 and 53)
-- :mod:`hsv.control.nominal_gain`: the gains K (eq. 31 to 35)
+- :mod:`hsv.lmi.nominal_gain`: the gains K (eq. 31 to 35)
 - :mod:`~hsv.design.tube`: the certificate of the tube
 
 :mod:`~hsv.design.baseline` takes these steps for the design of section 3, :mod:`~hsv.design.adjustable` for that of

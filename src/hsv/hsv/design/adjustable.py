@@ -17,8 +17,6 @@ import numpy as np
 from hsv.base.errors import DesignError
 from hsv.base.processes import Progress
 from hsv.control.design import ControlDesign
-from hsv.control.nominal_gain import nominal_gain
-from hsv.control.optimisation import BOUND_DIGITS, rounded
 from hsv.design.baseline import (
     DesignResult,
     design_gains,
@@ -40,6 +38,8 @@ from hsv.design.sets.invariant_set import InvariantSet
 from hsv.design.tightening import TightenedInputs, tighten
 from hsv.design.tube import MeasuredSet, Tube, design_tube, flights_in_tube, flights_report, measured_set
 from hsv.design.tube_problem import bounding_factors, tube_problem
+from hsv.lmi.nominal_gain import nominal_gain
+from hsv.lmi.semidefinite import BOUND_DIGITS, rounded
 from hsv.model.signals import N_RIGID
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.control.checks import Subject
+from hsv.certificate.checks import Subject
+from hsv.certificate.tolerances import PARAMETERS, RECOMPUTED_DESIGN, entry_size
 from hsv.control.design import ControlDesign
-from hsv.control.tolerances import PARAMETERS, RECOMPUTED_DESIGN, entry_size
 
 
 @dataclass(frozen=True)

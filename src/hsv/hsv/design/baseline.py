@@ -12,14 +12,14 @@ import numpy as np
 from hsv.base.errors import DesignError
 from hsv.base.processes import Progress
 from hsv.control.design import ControlDesign
-from hsv.control.nominal_gain import NominalGain, NominalProblem, nested_gains, step_deviation
 from hsv.control.notch_filter import NotchSection
-from hsv.control.optimisation import inverse, spectral_radii
 from hsv.design.feedback import FeedbackGain, feedback_gain
 from hsv.design.inputs import DesignInputs
 from hsv.design.model import DesignModel, design_model
 from hsv.design.tightening import TightenedInputs
 from hsv.design.tube import design_tube
+from hsv.lmi.nominal_gain import NominalGain, NominalProblem, nested_gains, step_deviation
+from hsv.lmi.semidefinite import inverse, spectral_radii
 from hsv.model.lpv.linearisation import linearise, zero_order_hold
 from hsv.model.lpv.polytope import Polytope
 from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.checks import Subject, load_subject
+from hsv.certificate.checks import Subject, load_subject
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import (
     ACCELERATED,

@@ -28,11 +28,11 @@ import numpy as np
 
 from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import discretise
-from hsv.control.optimisation import outward
 from hsv.core import Struct, doubles, lib
 from hsv.design.error_system import tube_errors
 from hsv.flight.flight import Flight
 from hsv.flight.responses import along_filter, lag_response
+from hsv.lmi.semidefinite import outward
 from hsv.model.lpv.actuated import respond, sampled_actuators
 from hsv.model.lpv.linearisation import linearise, zero_order_hold
 from hsv.model.lpv.polytope import Polytope

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_discrete_lyapunov
 
 from hsv.base.errors import DesignError, one_of
-from hsv.control.optimisation import (
+from hsv.lmi.semidefinite import (
     GAIN_DIGITS,
     SolverReport,
     Unknown,

@@ -18,8 +18,8 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.control.notch_filter import NotchSection, continuous, series
-from hsv.control.optimisation import VERTEX_DIGITS, rounded
 from hsv.design.inputs import ModelInputs
+from hsv.lmi.semidefinite import VERTEX_DIGITS, rounded
 from hsv.model.lpv import polytopic
 from hsv.model.lpv.linearisation import Filter
 from hsv.model.lpv.polytope import Polytope

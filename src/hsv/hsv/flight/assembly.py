@@ -10,8 +10,8 @@ from typing import Any
 
 from hsv.base.errors import HsvError, ParameterError, ScenarioError, TrimError
 from hsv.base.parameters import table_values
-from hsv.control.controllers import NODE, SHIPPED_CONTROLLERS, controller_class, names_code
-from hsv.control.coverage import uncovered
+from hsv.certificate.coverage import uncovered
+from hsv.control.controller import NODE, SHIPPED_CONTROLLERS
 from hsv.control.design import (
     TAU,
     ControlDesign,
@@ -25,6 +25,7 @@ from hsv.control.design import (
 from hsv.flight.blocks import LOOP
 from hsv.flight.closed_loop import Components
 from hsv.flight.scenario import Scenario
+from hsv.plugins.controllers import controller_class, names_code
 
 _FIELDS = {
     r"^parameter feedback\.tau\b": "tube.tau",

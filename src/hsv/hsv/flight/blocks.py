@@ -150,7 +150,7 @@ NOMINAL_TRAJECTORY = Block(
 )
 CONTROLLER = Block(
     "controller",
-    "hsv.control.controllers:build_controller",
+    "hsv.plugins.controllers:build_controller",
     inputs=CONTROLLER_INPUTS,
     outputs=(types.COMMAND, types.SATURATED, types.DIAGNOSTICS),
     step=_control,

@@ -26,6 +26,7 @@ from hsv.model.faults.injector import FaultInjector
 from hsv.model.faults.table import COMMAND
 from hsv.model.plant import Plant, plant_faults
 from hsv.model.signals import N_INPUTS, N_STATES, VARYING
+from hsv.plugins.library import LibraryController
 
 
 @dataclass
@@ -57,7 +58,7 @@ def fly(components: Components) -> Flight:
     rows = components.plant.steps + 1
     if components.controller.library is not None:
         with watched(components.controller, rows) as (history, request):
-            steps = request("fly", rows, kept=vars(components))
+            steps = request("call", _fly_in_child, rows, kept=vars(components))
             return flight_of(components, history.copy().cut(steps))
     history = History.empty(rows, estimated=not is_ideal(components))
     steps, law_times = fly_into(history, components)
@@ -72,6 +73,16 @@ def is_ideal(components: Components) -> bool:
     injector = components.fault_injector
     ideal = components.plant.is_ideal(injector.known) and injector.link.ideal
     return ideal and components.notch_filter.estimator is None
+
+
+def _fly_in_child(rows: int, **parts: Any) -> int:
+    """Simulate a flight of at most ``rows`` steps into the memory shared with the parent; return its steps."""
+    components = Components(**parts)
+    controller = components.controller
+    assert isinstance(controller, LibraryController)
+    components.controller = controller.loaded(controller.library.describe(controller.symbol).address)
+    with controller.library.sharing(rows * History.numbers()) as memory:
+        return fly_into(History.over(memory, rows), components)[0]
 
 
 @contextmanager

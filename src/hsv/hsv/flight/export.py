@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-from hsv.control.export import HEADER, constant, constant_array, core_headers
-from hsv.control.fmu_export import ExportedBlock
-from hsv.control.library import include_folder
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import Components
 from hsv.flight.scenario import Scenario
 from hsv.model.faults.table import COMMAND as COMMAND_SIDE
 from hsv.model.plant import plant_faults
 from hsv.model.signals import COMMAND, numbers_of
+from hsv.plugins.export import HEADER, constant, constant_array, core_headers
+from hsv.plugins.fmu_export import ExportedBlock
+from hsv.plugins.library import include_folder
 
 SOURCE = "vehicle.c"
 NUMBERS = "scenario.h"

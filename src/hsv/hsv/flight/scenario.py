@@ -15,11 +15,10 @@ from pydantic import Field, StrictInt, ValidationError
 from hsv.base.errors import DocumentError, HsvError, ParameterError, ScenarioError, one_of
 from hsv.base.files import follow_extends, is_path, parse_toml, read_text
 from hsv.base.parameters import Parameter, table_values
-from hsv.control.controllers import SHIPPED_CONTROLLERS
+from hsv.control.controller import SHIPPED_CONTROLLERS
 from hsv.control.design import TAU, rigid_factors
 from hsv.control.effectiveness import EFFECTIVENESS_PARAMETERS
 from hsv.control.estimator import ESTIMATOR_PARAMETERS
-from hsv.control.library import inside
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.notch_filter import FLOWN_NOTCH_PARAMETERS, NOTCH_PARAMETERS
 from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS
@@ -47,6 +46,7 @@ from hsv.model.faults.table import Fault
 from hsv.model.links import COMMAND_LINK_PARAMETERS
 from hsv.model.plant import EQUIPMENT_PARAMETERS, check_equipment
 from hsv.model.vehicle import DEFAULT_VEHICLE, SHIPPED_VEHICLES, vehicle_label, vehicle_tables
+from hsv.plugins.library import inside
 
 
 class Scenario(Table):

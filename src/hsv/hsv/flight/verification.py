@@ -1,4 +1,4 @@
-"""Verification of a design by flights and random sequences; :mod:`hsv.control.verification` has the other checks.
+"""Verification of a design by flights and random sequences; :mod:`hsv.certificate.verification` has the other checks.
 
 Nothing here uses the code that computes designs. The core simulates the flights. The disturbances of a flight are the
 part of its motion that the polytopic model does not explain, eq. 13 to 19.
@@ -15,11 +15,9 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.base.processes import Progress
-from hsv.control.checks import Check, Checks, Subject, above, at_most, gathered, recomputed
-from hsv.control.design import ControlDesign
-from hsv.control.notch_filter import discretise
-from hsv.control.tolerances import ROUNDING, TOLERANCES
-from hsv.control.verification import (
+from hsv.certificate.checks import Check, Checks, Subject, above, at_most, gathered, recomputed
+from hsv.certificate.tolerances import ROUNDING, TOLERANCES
+from hsv.certificate.verification import (
     ACCELERATED,
     CHANNELS,
     QUICK,
@@ -31,6 +29,8 @@ from hsv.control.verification import (
     lag_feedback,
     level,
 )
+from hsv.control.design import ControlDesign
+from hsv.control.notch_filter import discretise
 from hsv.flight.assembly import assemble, assemble_flight
 from hsv.flight.closed_loop import Components, fly
 from hsv.flight.corners import Corner, corners, fraction, region_parameters
@@ -58,7 +58,7 @@ def region(subject: Subject, design: ControlDesign, share: float) -> Components:
 class Disturbances(NamedTuple):
     """Disturbances, tube error, and the feedback's response to the actuators' lag in a flight; one row per step, SI.
 
-    ``channels``, shape (n, 7), are the disturbances in the order of :data:`~hsv.control.verification.CHANNELS`.
+    ``channels``, shape (n, 7), are the disturbances in the order of :data:`~hsv.certificate.verification.CHANNELS`.
     ``error``, shape (n + 1, states), is the tube error e, less its response to the lag of the actuators behind the
     plan u_r + u_n. ``lag``, shape (n + 1, 2), is the response of the feedback to this lag, 0 without actuators.
     """

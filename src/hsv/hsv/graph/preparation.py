@@ -14,7 +14,7 @@ from hsv.bags.description import COMPOSED, CONTROLLER, LIVE, NodeDescription, co
 from hsv.bags.infrastructure_parameters import STEP_TIMEOUT
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.base.errors import ParameterError, QuantityError, RecordingError, RunError
-from hsv.control.controllers import NODE
+from hsv.control.controller import NODE
 from hsv.control.design import (
     DESIGN_PARAMETERS,
     NO_DESIGN,
@@ -25,11 +25,11 @@ from hsv.control.design import (
     find_design,
     read_design,
 )
-from hsv.control.library import library_digest, library_record
 from hsv.flight.assembly import assemble_flight, blamed_on, own_parameters
 from hsv.flight.scenario import Scenario, parse_scenario, scenario_text, with_controller
 from hsv.graph.exclusive import ports
 from hsv.graph.launcher import executable
+from hsv.plugins.library import library_digest, library_record
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from hsv.bags.description import ACTUATOR, COMMAND, DIAGNOSTICS, ROSOUT, TUBE_STATUS
-from hsv.model.airframe.pose import LEVEL, Sample, transforms
-from hsv.model.airframe.scene import SCENE_TOPIC
 from hsv.model.signals import N_RIGID
+from hsv.pages.airframe.pose import LEVEL, Sample, transforms
+from hsv.pages.airframe.scene import SCENE_TOPIC
 from hsv.pages.panels import GROUPS, PANELS, Panel, error_panel
 
 COLOURS = ("#0072b2", "#d55e00", "#57606a")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.model.airframe.geometry import Airframe, Point, airframe
+from hsv.pages.airframe.geometry import Airframe, Point, airframe
 
 SPACING = 0.5
 """Maximum distance (m) along x between neighbouring points of an outline."""

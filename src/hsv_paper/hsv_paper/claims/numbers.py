@@ -19,7 +19,6 @@ from hsv.control.design import ControlDesign, find_design, read_parameters
 from hsv.control.nominal_law import FamilyLaw
 from hsv.control.nominal_trajectory import nominal_data
 from hsv.control.notch_filter import NotchSection, discretise, flown_sections, notch_response
-from hsv.control.optimisation import spectral_radii
 from hsv.design.disturbance import CHANNELS, ChannelModel, DisturbanceSet
 from hsv.design.tube import invariant_set
 from hsv.design.tube_problem import tube_problem
@@ -28,6 +27,7 @@ from hsv.flight.corners import Corner, fraction
 from hsv.flight.flight import Flight
 from hsv.flight.scenario import load_scenario
 from hsv.flight.side_by_side import fly_perturbed
+from hsv.lmi.semidefinite import spectral_radii
 from hsv.model.lpv.linearisation import bode, bode_difference, frequency_response
 from hsv.model.signals import N_RIGID, PITCH_RATE
 from hsv.model.vehicle import Vehicle, load_vehicle

@@ -32,7 +32,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.steps import cut_off, expected_stamps, joined
 from hsv.base.errors import DesignError, ParameterError, RecordingError
 from hsv.base.parameters import validate
-from hsv.control.controllers import CONTROLLER_PARAMETERS
+from hsv.control.controller import CONTROLLER_PARAMETERS
 from hsv.control.design import (
     CERTIFICATE_PARAMETERS,
     TAU,

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation import spectral_radii
 from hsv.design.tube_problem import TubeProblem
+from hsv.lmi.semidefinite import spectral_radii
 
 _NEGLIGIBLE = 1e-6
 """The response of an output is cut off where one more step adds less than this share of the sum so far."""

@@ -21,7 +21,9 @@ from scipy.linalg import cholesky, solve_discrete_lyapunov, solve_triangular
 
 from hsv.base.errors import DesignError
 from hsv.control.design import TubeSet
-from hsv.control.optimisation import (
+from hsv.design.sets.star_norms import StarNorms
+from hsv.design.tube_problem import TubeProblem
+from hsv.lmi.semidefinite import (
     MATRIX_DIGITS,
     SolverReport,
     Unknown,
@@ -31,8 +33,6 @@ from hsv.control.optimisation import (
     rounded,
     rounded_matrix,
 )
-from hsv.design.sets.star_norms import StarNorms
-from hsv.design.tube_problem import TubeProblem
 from hsv.model.signals import N_RIGID
 
 _INFLATION = 1.002

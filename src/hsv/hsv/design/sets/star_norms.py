@@ -22,8 +22,8 @@ import numpy as np
 from scipy.linalg import cholesky
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation import Unknown, image, minimise, rounded_matrix, spectral_radii
 from hsv.design.tube_problem import TubeProblem
+from hsv.lmi.semidefinite import Unknown, image, minimise, rounded_matrix, spectral_radii
 
 _INFLATION = 1.002
 """Factor on Q that keeps the ellipsoid invariant after rounding."""

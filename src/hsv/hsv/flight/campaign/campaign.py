@@ -17,13 +17,13 @@ from hsv.base.errors import CampaignError, one_of
 from hsv.base.files import parse_json
 from hsv.base.units import percent, rounded, written
 from hsv.control.design import design_of
-from hsv.control.library import library_digest
 from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.assembly import assemble_flight, blamed_on, design_parameters
 from hsv.flight.campaign.run import Batch
 from hsv.flight.distribution import KINDS, Distribution
 from hsv.flight.scenario import Scenario, scenario_at_means, scenario_table, scenario_text, set_field
 from hsv.model.dynamics import COEFFICIENT_UNITS
+from hsv.plugins.library import library_digest
 
 METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
 

@@ -14,7 +14,6 @@ import pyarrow.parquet as pq
 
 from hsv.base.errors import ControllerError, ScenarioError
 from hsv.control.controller import Controller
-from hsv.control.library import LibraryController
 from hsv.core import lanes
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
@@ -24,6 +23,7 @@ from hsv.flight.flight import Flight
 from hsv.flight.metrics import METRICS, FlightData
 from hsv.flight.side_by_side import FlightGroup, TubeLevels
 from hsv.model.dynamics import in_model_range
+from hsv.plugins.library import LibraryController
 
 CAMPAIGN, ENVELOPE, DIGEST = b"hsv.campaign", b"hsv.envelope", b"hsv.digest"
 """Keys in the metadata of a result file: the campaign, the envelope, and the digest of both."""

@@ -13,12 +13,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from hsv.base.errors import CampaignError
-from hsv.control.controllers import names_code
 from hsv.flight.assembly import require_trust
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
 from hsv.flight.campaign.sample_runner import OUTCOMES, SampleRunner
 from hsv.flight.campaign.store import read_result
+from hsv.plugins.controllers import names_code
 
 if TYPE_CHECKING:
     from pandas import DataFrame

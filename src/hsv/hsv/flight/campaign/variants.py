@@ -7,9 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from hsv.base.errors import CampaignError
-from hsv.control.controllers import HIDDEN_PARAMETERS, SHIPPED_CONTROLLERS
+from hsv.control.controller import SHIPPED_CONTROLLERS
 from hsv.control.design import design_of
-from hsv.control.library import library_digest
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.flight.assembly import assemble, assemble_flight, scenario_parameters
 from hsv.flight.closed_loop import Components
@@ -17,6 +16,8 @@ from hsv.flight.scenario import Scenario
 from hsv.model.faults.injector import FaultInjector
 from hsv.model.plant import PLANT_PARAMETERS, Plant
 from hsv.model.trim import initial_trim
+from hsv.plugins.controllers import HIDDEN_PARAMETERS
+from hsv.plugins.library import library_digest
 
 _NOT_OF_SHIPPED = (*HIDDEN_PARAMETERS, "initial.", "reference.")
 """Prefixes of the parameters on which the shipped controllers do not depend."""

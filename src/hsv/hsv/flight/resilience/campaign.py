@@ -13,13 +13,13 @@ import tomli_w
 
 from hsv.base.errors import CampaignError, one_of
 from hsv.base.units import rounded, written
-from hsv.control.library import library_digest
 from hsv.flight.assembly import blamed_on, design_parameters
 from hsv.flight.campaign.run import Batch
 from hsv.flight.campaign.variants import FlightVariants
 from hsv.flight.corners import screening_corners
 from hsv.flight.resilience.faults import OBSERVED, TRIED, Moment, TriedFault
 from hsv.flight.scenario import PERIOD, Scenario, load_scenario, parse_scenario, scenario_table, scenario_text
+from hsv.plugins.library import library_digest
 
 CONTROLLERS = ("case1", "case2", "case1_qp", "case1_integral_heavy", "case1_rmpc")
 """Scenarios by default: nested gains, adjustable tube factor, quadratic programme, integral action, robust MPC."""

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation import (
+from hsv.lmi.semidefinite import (
     GAIN_DIGITS,
     SolverReport,
     Unknown,

@@ -4,8 +4,8 @@ This module imports no code that computes designs. It shares with that code only
 the discretisation of the notch filter (:mod:`hsv.control.notch_filter`) and the reading of the files. The numbers in
 flight (vertices A_i, B_i, gains F and K) come from the design file, the statements about them from the certificate.
 The vertices are recomputed from the parameters of the vehicle, and every inequality from its matrices.
-:mod:`hsv.flight.verification` repeats the flights, and :func:`hsv.control.checks.unchecked` lists the fields that no
-check covers. The parts follow the paper: model (eq. 10 to 12), gain F (eq. 24), gains K (eq. 31 to 35), error system
+:mod:`hsv.flight.verification` repeats the flights, and :func:`hsv.certificate.checks.unchecked` lists the fields that
+no check covers. The parts follow the paper: model (eq. 10 to 12), gain F (eq. 24), gains K (eq. 31 to 35), error system
 (eq. 22, 23), invariant set (eq. 25 to 28), tightened bounds (eq. 30), adjustable factor (eq. 47 to 54).
 
 The matrix inequalities are checked as bounds on singular values. With Q = L L', a matrix M maps the ellipsoid
@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.control.checks import (
+from hsv.certificate.checks import (
     Check,
     Checks,
     Subject,
@@ -38,9 +38,9 @@ from hsv.control.checks import (
     required,
     same,
 )
+from hsv.certificate.tolerances import ROUNDING
 from hsv.control.design import ControlDesign, find_certificate, read_certificate
 from hsv.control.notch_filter import continuous, discretise, series
-from hsv.control.tolerances import ROUNDING
 from hsv.model.lpv.actuated import actuator_names, sampled_actuators
 from hsv.model.lpv.linearisation import (
     Filter,

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
+from hsv.certificate.tolerances import PARAMETERS, TOLERANCES, entry_size
 from hsv.control.design import ControlDesign, certificate_path, read_certificate, read_design
-from hsv.control.tolerances import PARAMETERS, TOLERANCES, entry_size
 from hsv.model.vehicle import Vehicle, load_vehicle
 
 
@@ -89,7 +89,8 @@ def load_subject(path: Path) -> Subject:
 def same(name: str, value: Any, expected: Any, tolerance: str, size: Any = 1.0) -> Check:
     """Return the check that every entry of the array ``value`` equals that of ``expected``, within a tolerance.
 
-    ``tolerance`` is a key of :data:`hsv.control.tolerances.TOLERANCES`, ``size`` the typical magnitude of the entries.
+    ``tolerance`` is a key of :data:`hsv.certificate.tolerances.TOLERANCES`; ``size`` is the typical magnitude of the
+    entries.
     """
     value, expected = np.asarray(value, float), np.asarray(expected, float)
     if value.shape != expected.shape:

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from published_model import DERIVED, FOOT, SLUG
 
-from hsv.model.airframe.geometry import EIGENVALUE, Cantilever, airframe
-from hsv.model.airframe.pose import BODY, ELEVATOR, FLIGHT_PATH, LEVEL, Sample, Transform, segments, transforms
-from hsv.model.airframe.solids import solids
 from hsv.model.vehicle import load_vehicle
+from hsv.pages.airframe.geometry import EIGENVALUE, Cantilever, airframe
+from hsv.pages.airframe.pose import BODY, ELEVATOR, FLIGHT_PATH, LEVEL, Sample, Transform, segments, transforms
+from hsv.pages.airframe.solids import solids
 
 
 def composed(sample, root=LEVEL, exaggeration=None):

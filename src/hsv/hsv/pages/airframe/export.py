@@ -15,9 +15,9 @@ from hsv.bags.reader import Bag
 from hsv.bags.steps import joined
 from hsv.bags.writer import Schemas, register
 from hsv.base.errors import RecordingError
-from hsv.model.airframe.pose import Sample
-from hsv.model.airframe.scene import RATE, SCENE_TOPIC, TRANSFORMS_TOPIC, frame_transforms, scene
 from hsv.model.signals import INPUT_NAMES, STATE_NAMES
+from hsv.pages.airframe.pose import Sample
+from hsv.pages.airframe.scene import RATE, SCENE_TOPIC, TRANSFORMS_TOPIC, frame_transforms, scene
 
 Message = tuple[int, str, bytes]
 """Time (ns), topic and data."""

@@ -1,7 +1,7 @@
 """Child processes that load and step shared libraries or FMUs, so that a crash of a library is contained.
 
 One child serves one library file and many flights. The first request starts it; after a crash, or when the file has
-changed, the next request starts a new one. The child runs :mod:`hsv.flight.library_child`, which calls the library.
+changed, the next request starts a new one. The child runs :mod:`hsv.plugins.library_child`, which calls the library.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ import numpy as np
 from hsv.base.errors import ProcessError
 
 if TYPE_CHECKING:
-    from hsv.control.library import CBlock
+    from hsv.plugins.library import CBlock
 
 NO_PROGRESS = 20.0
 """Time (s) without progress after which a child is ended, while it loads the library or steps it."""
@@ -82,7 +82,7 @@ class LibraryProcess:
     def request(
         self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, begun: Callable[[], int] = lambda: 1
     ) -> Any:
-        """Return the reply of the child to a request, see :class:`hsv.flight.library_child.LoadedLibrary`.
+        """Return the reply of the child to a request, see :class:`hsv.plugins.library_child.LoadedLibrary`.
 
         Args:
             name: Name of the request.
@@ -149,7 +149,7 @@ class LibraryProcess:
         self._folder = TemporaryDirectory(prefix="hsv_library_")
         # Output of the library goes to stderr, not into the output of a command.
         self._child = subprocess.Popen(
-            [sys.executable, "-P", "-m", "hsv.flight.library_child", self._path, *map(str, descriptors)],
+            [sys.executable, "-P", "-m", "hsv.plugins.library_child", self._path, *map(str, descriptors)],
             stdin=subprocess.DEVNULL,
             stdout=2,
             pass_fds=descriptors,
@@ -197,7 +197,7 @@ _in_this_process: Any = None
 
 
 def use_in_this_process(library: Any) -> None:
-    """Make :func:`library_user` return ``library``, a :class:`hsv.flight.library_child.LoadedLibrary`; for a child."""
+    """Make :func:`library_user` return ``library``, a :class:`hsv.plugins.library_child.LoadedLibrary`; for a child."""
     global _in_this_process
     _in_this_process = library
 

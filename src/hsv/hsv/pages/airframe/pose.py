@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsv.model.airframe.geometry import Airframe, airframe
+from hsv.bags.messages import FRAME
+from hsv.pages.airframe.geometry import Airframe, airframe
 
-LEVEL = "vehicle_carried"
+LEVEL = FRAME
 BODY = "airframe"
 FLIGHT_PATH = "flight_path"
 ENGINE = "engine"

@@ -16,11 +16,11 @@ from numpy.testing import assert_array_equal
 import hsv.core
 from hsv.base.units import base_units
 from hsv.control.design import find_design, read_design
-from hsv.control.export import NUMBERS, SOURCE, controller_files, design_header, step_bounds
-from hsv.control.library import load_block
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario
+from hsv.plugins.export import NUMBERS, SOURCE, controller_files, design_header, step_bounds
+from hsv.plugins.library import load_block
 
 ROOT = Path(__file__).parents[2]
 DESIGNS = {name: read_design(find_design(name)) for name in ("baseline", "adjustable", "smooth")}

@@ -7,8 +7,8 @@ A package registers its controllers as entry points of the group ``hsv.controlle
 
 A scenario then contains ``controller = "lqr"``, or ``controller = "package.module:Class"`` for a class without a
 registered name; :mod:`hsv.control.controller` describes the class. A controller in C is
-``controller = "path/lib.so:symbol"``, see :mod:`hsv.control.library`, and one in an FMU
-``controller = "path/controller.fmu"``, see :mod:`hsv.control.fmu`.
+``controller = "path/lib.so:symbol"``, see :mod:`hsv.plugins.library`, and one in an FMU
+``controller = "path/controller.fmu"``, see :mod:`hsv.plugins.fmu`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,10 @@ from typing import TYPE_CHECKING, Any
 from hsv.base.errors import HsvError, ParameterError, one_of
 from hsv.base.parameters import Parameter, validate
 from hsv.control.controller import (
+    CONTROLLER_PARAMETERS,
     FOREIGN_FAILURES,
+    NODE,
+    SHIPPED_CONTROLLERS,
     Controller,
     ControllerClass,
     ExternalController,
@@ -28,9 +31,9 @@ from hsv.control.controller import (
     StepKernel,
     failure_words,
 )
-from hsv.control.fmu import FmuClass
-from hsv.control.library import LibraryClass, library_place
 from hsv.model.vehicle import Vehicle
+from hsv.plugins.fmu import FmuClass
+from hsv.plugins.library import LibraryClass, library_place
 
 if TYPE_CHECKING:
     from hsv.control.design import ControlDesign
@@ -38,29 +41,11 @@ if TYPE_CHECKING:
 GROUP = "hsv.controllers"
 """Group of the entry points that register controllers."""
 
-SHIPPED_CONTROLLERS = {"tube_mpc": "hsv.control.tube_law:TubeLaw", "robust_mpc": "hsv.control.robust_mpc:RobustMpc"}
-"""Classes of this library by name; others are entry points."""
-
 HIDDEN_PARAMETERS = (
     *("vehicle.perturbation.", "fault.", "seed"),
     *("actuator.", "wind.", "turbulence.", "gust.", "density.", "sensors.", "link."),
 )
 """Prefixes of parameters that custom controllers do not receive: perturbations, faults and equipment."""
-
-_DEFAULT = "tube_mpc"
-
-NODE = "node:"
-"""Prefix of the name of a controller that is a separate ROS 2 node, ``node:package/executable``; the prefix alone means
-a node that is started by hand."""
-
-CONTROLLER_PARAMETERS = (
-    Parameter(
-        "controller",
-        _DEFAULT,
-        "controller: a registered name, package.module:Class, path/lib.so:symbol, path/name.fmu or "
-        "node:package/executable",
-    ),
-)
 
 
 def controller_names() -> list[str]:

@@ -18,9 +18,9 @@ from foxglove.messages import (
     Vector3,
 )
 
-from hsv.model.airframe.geometry import airframe
-from hsv.model.airframe.pose import BODY, FLIGHT_PATH, LEVEL, Sample, transforms
-from hsv.model.airframe.solids import LABEL_COLOUR, LABEL_HEIGHT, LABEL_SIZE, Colour, Solid, label, solids
+from hsv.pages.airframe.geometry import airframe
+from hsv.pages.airframe.pose import BODY, FLIGHT_PATH, LEVEL, Sample, transforms
+from hsv.pages.airframe.solids import LABEL_COLOUR, LABEL_HEIGHT, LABEL_SIZE, Colour, Solid, label, solids
 
 SCENE_TOPIC = "/hsv/airframe/scene"
 TRANSFORMS_TOPIC = "/hsv/airframe/transforms"

@@ -14,7 +14,9 @@ from marking import long
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import DesignError
-from hsv.control.checks import Subject, gathered, leaves, load_subject, same, unchecked
+from hsv.certificate.checks import Subject, gathered, leaves, load_subject, same, unchecked
+from hsv.certificate.tolerances import PARAMETERS, TOLERANCES, entry_size
+from hsv.certificate.verification import QUICK, RECOMPUTED, preflight
 from hsv.control.design import (
     ControlDesign,
     certificate_path,
@@ -23,8 +25,6 @@ from hsv.control.design import (
     read_parameters,
     write_certificate,
 )
-from hsv.control.tolerances import PARAMETERS, TOLERANCES, entry_size
-from hsv.control.verification import QUICK, RECOMPUTED, preflight
 
 PARTS = QUICK | RECOMPUTED
 DESIGNS = sorted(path.stem for path in Path(__file__).parents[2].glob("offline_design/*.toml"))
@@ -63,7 +63,7 @@ def test_every_shipped_design_passes(name):
 
 def test_nothing_is_shared_with_the_design():
     code = (
-        "import sys, hsv.control.verification; "
+        "import sys, hsv.certificate.verification; "
         "print([m for m in sys.modules if m.startswith('hsv.design') or m in ('cvxpy', 'pydantic')])"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

@@ -1,6 +1,6 @@
 """Controllers in C: ``controller = "path/lib.so:symbol"``, where the symbol is a block of ``hsv_block.h``.
 
-A library may crash, so a child process loads and steps it, see :mod:`hsv.control.library_process`.
+A library may crash, so a child process loads and steps it, see :mod:`hsv.plugins.library_process`.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from hsv.control.controller import (
     StepKernel,
     flat_input,
 )
-from hsv.control.library_process import library_user
 from hsv.control.notch_filter import NotchFilter
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import SignalType
 from hsv.model.vehicle import Vehicle
+from hsv.plugins.library_process import library_user
 
 ABI_VERSION = 1
 """``HSV_BLOCK_ABI_VERSION`` of the header"""
@@ -91,7 +91,7 @@ class CBlock:
 
 def include_folder() -> Path:
     """Return the folder that contains ``hsv_block.h``."""
-    return Path(str(files("hsv.control").joinpath("include")))
+    return Path(str(files("hsv.plugins").joinpath("include")))
 
 
 def load_block(path: Path, symbol: str) -> CBlock:

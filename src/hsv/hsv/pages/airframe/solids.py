@@ -1,4 +1,4 @@
-"""The airframe as triangulated solids, each fixed to a frame of :mod:`hsv.model.airframe.pose`."""
+"""The airframe as triangulated solids, each fixed to a frame of :mod:`hsv.pages.airframe.pose`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from hsv.model.airframe.geometry import Airframe, Point, airframe
-from hsv.model.airframe.pose import ELEVATOR, ENGINE, FLAMES, segments
+from hsv.pages.airframe.geometry import Airframe, Point, airframe
+from hsv.pages.airframe.pose import ELEVATOR, ENGINE, FLAMES, segments
 
 Colour = tuple[float, float, float, float]
 

@@ -1,10 +1,10 @@
-"""Child process that loads a shared library and simulates the loop with its controller.
+"""Child process that loads a shared library, steps its controller, and calls functions that use it.
 
 There are two processes. The supervisor never loads the library; it forks the worker, which does. If the worker crashes
 or exits, the supervisor reports this to the parent and forks a fresh worker.
 
-:mod:`hsv.control.library_process` starts the supervisor as
-``python3 -m hsv.flight.library_child LIBRARY CONNECTION MEMORY``; the last two are file descriptors.
+:mod:`hsv.plugins.library_process` starts the supervisor as
+``python3 -m hsv.plugins.library_child LIBRARY CONNECTION MEMORY``; the last two are file descriptors.
 """
 
 from __future__ import annotations
@@ -25,18 +25,16 @@ import numpy as np
 
 from hsv.base.errors import HsvError, ProcessError, RunError
 from hsv.control.controller import call_step_function
-from hsv.control.fmu import LoadedFmu
-from hsv.control.library import CBlock, LibraryController, load_block
-from hsv.control.library_process import SharedMemory, use_in_this_process
-from hsv.flight.closed_loop import Components, fly_into
-from hsv.flight.history import History
+from hsv.plugins.fmu import LoadedFmu
+from hsv.plugins.library import CBlock, load_block
+from hsv.plugins.library_process import SharedMemory, use_in_this_process
 
 
 class LoadedLibrary:
     """A shared library in this process, with the requests that the parent can make."""
 
     def __init__(self, path: Path, memory: SharedMemory) -> None:
-        """Prepare to load the library; flights are written to ``memory``, which is shared with the parent."""
+        """Prepare to load the library; ``memory`` is shared with the parent."""
         self._path = path
         self._memory = memory
         self._load = cache(load_block)
@@ -58,14 +56,6 @@ class LoadedLibrary:
             return self._fmu.block
         return self._load(self._path, symbol)
 
-    def fly(self, rows: int, **parts: Any) -> int:
-        """Simulate a flight of at most ``rows`` steps into the shared memory and return its number of steps."""
-        components = Components(**parts)
-        assert isinstance(components.controller, LibraryController)
-        components.controller = components.controller.loaded(self.describe(components.controller.symbol).address)
-        with self._reason():
-            return fly_into(History.over(self._memory.numbers(rows * History.numbers()), rows), components)[0]
-
     def step(
         self, symbol: str, k: int, inputs: np.ndarray, state: np.ndarray, parameters: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -84,9 +74,10 @@ class LoadedLibrary:
                 raise type(error)(str(error).partition("returned ")[0] + self._fmu.failure) from error
             raise
 
-    def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Return the result of ``function(*arguments)``, which uses the library in this process."""
-        return function(*arguments)
+    def call(self, function: Callable[..., Any], *arguments: Any, **kept: Any) -> Any:
+        """Return the result of ``function(*arguments, **kept)``, which uses the library in this process."""
+        with self._reason():
+            return function(*arguments, **kept)
 
 
 def main() -> None:

@@ -12,12 +12,12 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
-from hsv.control.fmu_export import ExportedBlock
-from hsv.control.library import include_folder
 from hsv.control.nominal_trajectory import nominal_data
 from hsv.control.tube_law import TubeLaw
 from hsv.core import Struct, ffi
 from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES
+from hsv.plugins.fmu_export import ExportedBlock
+from hsv.plugins.library import include_folder
 
 SOURCE = "controller.c"
 NUMBERS = "design.h"

@@ -146,7 +146,7 @@ class Airframe:
 @cache
 def airframe() -> Airframe:
     """Return the airframe of the drawings, from ``airframe.toml`` and the paper's vehicle."""
-    tables = tomllib.loads(files("hsv.model.airframe").joinpath("airframe.toml").read_text(encoding="utf-8"))
+    tables = tomllib.loads(files("hsv.pages.airframe").joinpath("airframe.toml").read_text(encoding="utf-8"))
     values = {name: value for table in tables.values() for name, value in table.items()}
     units = {name: "rad" if name.endswith("angle") else "m" for name in values} | {"mass_per_length": "kg/m"}
     lengths = {

@@ -1,7 +1,7 @@
 """Controllers in FMUs: ``controller = "path/controller.fmu"``, FMI 2.0 or 3.0 for co-simulation.
 
 A child process loads the FMU with FMPy and steps it like a block of ``hsv_block.h``, see
-:mod:`hsv.control.library_process`. Step k sets the inputs, advances the FMU from k T to (k + 1) T and reads the
+:mod:`hsv.plugins.library_process`. Step k sets the inputs, advances the FMU from k T to (k + 1) T and reads the
 outputs, which are u(k).
 
 Variables of the FMU are matched to signals by name, such as ``measurement.altitude``; the scenario's table ``[fmu]``
@@ -24,10 +24,10 @@ from hsv.base.errors import ParameterError, QuantityError, RunError
 from hsv.base.parameters import Parameter, validate
 from hsv.base.units import parse_quantity
 from hsv.control.controller import CONTROLLER_INPUTS, CONTROLLER_OUTPUTS, FOREIGN_FAILURES, STEP_FUNCTION, failure_words
-from hsv.control.library import CBlock, LibraryClass, LibraryController
 from hsv.model.plant import PLANT_PARAMETERS
 from hsv.model.signals import ESTIMATE, MEASUREMENT, SignalType, numbers_of
 from hsv.model.vehicle import Vehicle
+from hsv.plugins.library import CBlock, LibraryClass, LibraryController
 
 _INPUTS = [
     number

@@ -1,0 +1,1 @@
+"""The certificate of a design: its statements recomputed, their tolerances, and which flights it covers."""

@@ -1,0 +1,1 @@
+"""Foreign code and code for others: controllers by name, C libraries, FMUs both ways, and export in C99."""
