@@ -58,7 +58,7 @@ test-portability: setup ## set up, then fly on emulated processors, another Pyth
 # core's headers that the golden flights run.
 coverage: setup ## set up, then measure how much of the flight's packages and core their own tests run; fails below the floor
 	@$(PYTEST) -n auto --cov --cov-report=term:skip-covered \
-		-m "not (graph or viewer or reference or $(NOT_IN_TEST))" tests/{base,core,model,lmi,control,certificate,plugins,flight,bags} $(ARGS)
+		-m "not (graph or viewer or reference or $(NOT_IN_TEST))" tests/{base,core,model,control,certificate,plugins,flight,bags} $(ARGS)
 	@source ./env.sh && cd src/hsv && rm -rf build/coverage && HSV_CFLAGS="-O0 --coverage" \
 		python3 setup.py -q build --build-base build/coverage --build-lib build/coverage/library
 	@source ./env.sh && HSV_CORE=sse2 PYTHONPATH="$$PWD/src/hsv/build/coverage/library" python3 -m pytest -p no:cacheprovider \

@@ -45,7 +45,7 @@ def controller_files(design: ControlDesign) -> dict[str, str]:
     """
     if design.tube is None:
         raise DesignError(f"design {design.name!r}: parameter tube.shape: empty, expected a design with a tube")
-    source = files("hsv.control").joinpath("export.c").read_text(encoding="utf-8")
+    source = files("hsv.plugins").joinpath("export.c").read_text(encoding="utf-8")
     header = (include_folder() / HEADER).read_text(encoding="utf-8")
     return {SOURCE: source, NUMBERS: design_header(design), HEADER: header, **core_headers(source)}
 

@@ -62,7 +62,7 @@ def write_fmu(path: Path, block: ExportedBlock) -> None:
         described = load_block(_compile(Path(folder), block.source, path, "-O0"), block.symbol)
         token = str(uuid.uuid5(uuid.NAMESPACE_OID, hashlib.sha256("".join(texts.values()).encode()).hexdigest()))
         texts |= {
-            _SOURCE: files("hsv.control").joinpath(_SOURCE).read_text(encoding="utf-8"),
+            _SOURCE: files("hsv.plugins").joinpath(_SOURCE).read_text(encoding="utf-8"),
             _HEADER: _block_header(block, described, token),
         }
         _write(Path(folder), texts)
