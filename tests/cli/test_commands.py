@@ -67,7 +67,7 @@ def test_trim_and_linearise_of_another_vehicle_are_inside_its_envelope(hsv):
 def test_the_damping_of_a_pole_at_the_origin_is_a_dash(hsv):
     origin = hsv("linearise", "--json").json["poles"][-1]
     assert abs(origin["natural_frequency_rad_per_s"]) < 1e-9 and origin["damping_ratio"] is None
-    assert hsv("linearise").out.rstrip().splitlines()[-1].split() == ["0", "0", "0", "-"]
+    assert ["0", "0", "0", "-"] in [line.split() for line in hsv("linearise").out.splitlines()]
 
 
 def test_linearise_in_paper_units_has_the_same_poles(hsv):

@@ -115,7 +115,10 @@ def test_no_more_parameters_are_uncertain_than_a_design_can_fly_the_corners_of()
     ("text", "message"),
     [
         ("title = ", r"mine.toml': .*, expected a TOML file"),
-        ('extends = "parkr"\n', r"vehicle 'parkr': expected one of parker, winged_cone or the path of a"),
+        (
+            'extends = "parkr"\n',
+            r"vehicle 'parkr': expected one of parker, winged_cone, winged_cone_lift or the path of a",
+        ),
     ],
 )
 def test_a_file_that_is_no_vehicle_is_named(tmp_path, text, message):

@@ -99,9 +99,10 @@ def linearise(
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Compute the linear model and its poles at a trim point (paper eq. 6 to eq. 9; for the ECM eq. 40 to eq. 43).
+    """Compute the linear model at a trim point, its poles and zeros (paper eq. 6 to eq. 9; ECM: eq. 40 to eq. 43).
 
-    Files and JSON have A, B, C and D, the names and units of states, inputs and outputs, and the operating point.
+    The zeros are those from both inputs to altitude and velocity. Files and JSON have A, B, C and D, the names and
+    units of states, inputs and outputs, and the operating point.
 
     Example: hsv linearise --coupling derived --model ECM --out model.mat
     """
@@ -113,7 +114,8 @@ def linearise(
     if json or out:
         units = output.json_system(units)
     shown = found.in_units(units)
-    described = _described(shown, units) | {"poles": list(map(_pole, found.poles))}
+    poles, zeros = found.poles, found.zeros
+    described = _described(shown, units) | {"poles": [*map(_mode, poles)], "zeros": [*map(_mode, zeros)]}
     if out:
         with writing(out, "out"):
             if out.suffix == ".json":
@@ -126,7 +128,9 @@ def linearise(
     for name, matrix, columns in (("A", shown.A, shown.states), ("B", shown.B, shown.inputs)):
         cells = [[significant(entry) for entry in row] for row in matrix.tolist()]
         output.print_matrix(f"{name} ({UNIT_SYSTEMS[units]})", list(shown.states), list(columns), cells)
-    output.console.print(_pole_table(found.poles))
+    output.console.print(_modes_table("Poles", poles))
+    if zeros:
+        output.console.print(_modes_table("Zeros from both inputs to altitude and velocity", zeros))
     if out:
         output.say(f"written {out}")
 
@@ -149,7 +153,7 @@ def _damping(mode: Mode) -> float | None:
     return mode.damping_ratio if round(mode.natural_frequency, 9) else None
 
 
-def _pole(mode: Mode) -> dict[str, float | None]:
+def _mode(mode: Mode) -> dict[str, float | None]:
     return {
         "real_rad_per_s": mode.pole.real,
         "imag_rad_per_s": mode.pole.imag,
@@ -158,10 +162,10 @@ def _pole(mode: Mode) -> dict[str, float | None]:
     }
 
 
-def _pole_table(poles: list[Mode]) -> Table:
+def _modes_table(title: str, modes: list[Mode]) -> Table:
     headings = ("real rad/s", "imaginary rad/s", "frequency rad/s", "damping ratio")
-    table = output.new_table(*headings, title="Poles", right=headings)
-    for mode in poles:
+    table = output.new_table(*headings, title=title, right=headings)
+    for mode in modes:
         damping = _damping(mode)
         table.add_row(
             # A pole at the origin has a rounding error.

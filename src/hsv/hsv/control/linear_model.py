@@ -13,7 +13,7 @@ from hsv.base.errors import QuantityError, one_of
 from hsv.base.units import UnitSystem, in_system, unit_in
 from hsv.control.notch_filter import continuous, default_sections, series
 from hsv.model.dynamics import MODELS, jacobian
-from hsv.model.lpv.linearisation import Filter, Mode, extended_jacobian, extended_state, modes
+from hsv.model.lpv.linearisation import Filter, Mode, as_modes, extended_jacobian, extended_state, modes
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_RIGID, N_STATES, STATE_NAMES, STATE_UNITS
 from hsv.model.trim import trim_at
 from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
@@ -21,6 +21,9 @@ from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
 EXTENDED = "ECM"
 READINGS = ("physical", "printed")
 FILTER_UNITS = ("rad", "rad s")
+
+_INFINITE = 1e6
+"""Magnitude (rad/s) from which a zero of the pencil is one at infinity."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,17 @@ class LinearModel:
     def poles(self) -> list[Mode]:
         """The modes of A, one for each pair of complex poles, highest natural frequency first."""
         return modes(self.A)
+
+    @property
+    def zeros(self) -> list[Mode]:
+        """The transmission zeros from both inputs to altitude and velocity, in the form of :attr:`poles`."""
+        from scipy.linalg import eigvals  # slow
+
+        n = len(self.A)
+        pencil = np.block([[self.A, self.B], [self.C[:2], self.D[:2]]])
+        over, under = eigvals(pencil, np.diag([1.0] * n + [0.0] * len(self.B.T)), homogeneous_eigvals=True)
+        finite = np.abs(over) < _INFINITE * np.abs(under)
+        return as_modes(over[finite] / under[finite])
 
     def in_units(self, system: UnitSystem) -> LinearModel:
         """Return this model, which must be in SI units, with its signals in the units of ``system``."""

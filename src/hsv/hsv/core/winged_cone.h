@@ -5,13 +5,15 @@
  *
  * the coefficients are
  *
- *   C_L = alpha (c_0 + c_1 / M),  C_D = c_D (a_2 alpha^2 + a_1 alpha + 1) (m_2 M^2 + m_1 M + 1),
+ *   C_L = alpha (c_0 + c_1 / M) + (l_2 alpha^2 + l_1 alpha + l_0) delta_e,
+ *   C_D = c_D (a_2 alpha^2 + a_1 alpha + 1) (m_2 M^2 + m_1 M + 1),
  *   C_T = c_T (1 + c_M / M) (1 + e) phi, and c_T (1 + c_M / M) (1 + e phi) for phi > 1,
  *   C_M = c_m (b_M - exp(-M / M_0)) (b_2 alpha^2 + b_1 alpha + b_0) + c_e (delta_e - alpha)
  *       + c q / (2 V) (d_M M + d_0) (d_2 alpha^2 + d_1 alpha + d_q),
  *
  * with density rho = rho_0 exp(-(h - h_0) / h_s), speed of sound a = s_2 h^2 + s_1 h + s_0, gravity mu / r^2 and its
- * centrifugal relief V^2 / r, r = R + h. The thrust has no moment. Included by vehicle.h. */
+ * centrifugal relief V^2 / r, r = R + h. The thrust has no moment. Wang and Stengel have no lift of the elevator,
+ * l_2 = l_1 = l_0 = 0. Included by vehicle.h. */
 static inline real winged_cone_sound(real altitude, const Vehicle *p)
 {
     return (p->sound_speed_curvature * altitude + p->sound_speed_slope) * altitude + p->sound_speed_zero;
@@ -35,7 +37,9 @@ static __attribute__((noinline)) Forces winged_cone_forces(real altitude, real v
     const mask is_rich = real_part(fuel) > 1.0;
     Forces f;
     f.pressure = pressure;
-    f.lift = force * (alpha * (p->lift_alpha + p->lift_alpha_mach / mach));
+    f.lift = force * (alpha * (p->lift_alpha + p->lift_alpha_mach / mach) +
+                      (p->lift_elevator_alpha_squared * alpha2 + p->lift_elevator_alpha * alpha + p->lift_elevator) *
+                          elevator);
     f.drag = force * (p->drag_scale * (p->drag_alpha_squared * alpha2 + p->drag_alpha * alpha + 1.0) *
                       (p->drag_mach_squared * mach * mach + p->drag_mach * mach + 1.0));
     f.thrust = force * (p->thrust_scale * (1.0 + p->thrust_mach / mach) * select_real(is_rich, rich, lean));

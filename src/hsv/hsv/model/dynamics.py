@@ -85,6 +85,8 @@ class VehicleParameters(NamedTuple):
     sound_speed_slope: Annotated[float, "atmosphere", "s^-1"] = 0.0
     sound_speed_zero: Annotated[float, "atmosphere", "m/s"] = 0.0
     lift_alpha_mach: Annotated[float, "lift", "1"] = 0.0
+    lift_elevator_alpha_squared: Annotated[float, "lift", "1"] = 0.0
+    lift_elevator_alpha: Annotated[float, "lift", "1"] = 0.0
     drag_scale: Annotated[float, "drag", "1"] = 0.0
     drag_mach_squared: Annotated[float, "drag", "1"] = 0.0
     drag_mach: Annotated[float, "drag", "1"] = 0.0
@@ -161,6 +163,8 @@ class Structure:
 
     names: tuple[str, ...]
     elastic: bool
+    optional: tuple[str, ...] = ()
+    """Coefficients of ``names`` that a vehicle may leave out; they are then zero."""
 
     @cached_property
     def tables(self) -> dict[str, dict[str, str]]:
@@ -171,6 +175,8 @@ class Structure:
             found.setdefault(table, {})[name] = unit
         return found
 
+
+_ELEVATOR_LIFT = ("lift_elevator_alpha_squared", "lift_elevator_alpha", "lift_elevator")
 
 STRUCTURES = {
     "parker": Structure(
@@ -188,8 +194,10 @@ STRUCTURES = {
             *("thrust_scale", "thrust_mach", "thrust_fuel"),
             *("moment_scale", "moment_mach", "moment_mach_decay"),
             *("damping_mach", "damping_mach_zero", "damping_alpha_squared", "damping_alpha", "damping_zero"),
+            *_ELEVATOR_LIFT,
         ),
         elastic=False,
+        optional=_ELEVATOR_LIFT,
     ),
 }
 """All structures by name, in the order of their codes in ``core/vehicle.h``; the first is the default."""

@@ -35,7 +35,7 @@ from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, PUBLISHED_ALTITUDE, PUBL
 GROUP = "hsv.vehicles"
 """Group of the entry points of vehicles; each is ``package:file.toml``."""
 
-SHIPPED_VEHICLES = {name: f"hsv.model:vehicles/{name}.toml" for name in ("parker", "winged_cone")}
+SHIPPED_VEHICLES = {name: f"hsv.model:vehicles/{name}.toml" for name in ("parker", "winged_cone", "winged_cone_lift")}
 """Vehicle files of this library by name; those of other packages are entry points."""
 
 DEFAULT_VEHICLE = "parker"
@@ -212,10 +212,12 @@ class Vehicle:
     def to_parameters(self) -> dict[str, Any]:
         """Return the values of :data:`VEHICLE_PARAMETERS` that describe this vehicle, by name."""
         p = self.decoupled
+        # A coefficient that is left out does not change the digest of a vehicle that never had it.
+        coefficients = {name: getattr(p, name) for name in p.form.names}
         return {
             "vehicle.name": self.name,
             "vehicle.structure": self.structure,
-            **{f"vehicle.{name}": getattr(p, name) for name in p.form.names},
+            **{f"vehicle.{name}": n for name, n in coefficients.items() if n or name not in p.form.optional},
             "vehicle.coupling_sets.names": list(self.couplings),
             "vehicle.coupling_sets.values": [psi for pair in self.couplings.values() for psi in pair],
             "vehicle.altitude_range": list(self.altitude_range),
@@ -287,7 +289,8 @@ def _digest(vehicle: Vehicle) -> str:
 def missing_parameters(values: Mapping[str, Any]) -> list[str]:
     """Return the names of the parameters that ``values`` lacks for a complete vehicle of its structure."""
     form = STRUCTURES.get(str(values.get("vehicle.structure", DEFAULT_STRUCTURE)), STRUCTURES[DEFAULT_STRUCTURE])
-    optional = {"vehicle.structure", *(f"vehicle.{name}" for name in COEFFICIENT_UNITS if name not in form.names)}
+    required = {*form.names} - {*form.optional}
+    optional = {"vehicle.structure", *(f"vehicle.{name}" for name in COEFFICIENT_UNITS if name not in required)}
     names = (parameter.name for parameter in VEHICLE_PARAMETERS)
     return [name for name in names if name not in optional and name not in values]
 
@@ -409,15 +412,18 @@ def _parsed(tables: Mapping[str, Any], name: str) -> Vehicle:
     title = v.get("title", "")
     if not title.strip() and "title" in tables:
         raise QuantityError(f"title = {title!r}: expected a text that is not empty")
+    optional = {f"{row}.value" for row in coefficients if row.rpartition(".")[2] in form.optional}
     for field, unit in quantities.items():
-        if field not in v:
+        if field not in v and field not in optional:
             raise QuantityError(
                 f"{field}: missing, expected a quantity such as {'1.0' if unit == '1' else f'1.0 {unit}'!r}"
             )
     (altitude, velocity, *limits) = [(v[f"{row}.minimum"], v[f"{row}.maximum"]) for row in ends]
     low, high = zip(*limits, strict=True)
     psi = {one: [v[f"inertial_coupling.{one}.{key}.value"] for key in _PSI] for one in names}
-    known = {row.rpartition(".")[2]: (v[f"{row}.value"], v.get(f"{row}.uncertainty", 0.0)) for row in coefficients}
+    known = {
+        row.rpartition(".")[2]: (v.get(f"{row}.value", 0.0), v.get(f"{row}.uncertainty", 0.0)) for row in coefficients
+    }
     return Vehicle(
         name=name,
         title=title,

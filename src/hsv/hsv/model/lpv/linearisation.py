@@ -169,8 +169,13 @@ class Mode:
 
 def modes(A: np.ndarray) -> list[Mode]:
     """Return the modes of ``A`` (n, n), highest frequency first; an unstable real pole has the damping ratio -1."""
+    return as_modes(np.linalg.eigvals(A))
+
+
+def as_modes(poles: np.ndarray) -> list[Mode]:
+    """Return poles or zeros (rad/s), shape (n,), as modes: one for each complex pair, highest frequency first."""
     found = []
-    for pole in np.linalg.eigvals(A).tolist():
+    for pole in poles.tolist():
         if pole.imag >= 0.0:
             frequency = abs(pole)
             found.append(Mode(complex(pole), frequency, -complex(pole).real / frequency if frequency else 0.0))
