@@ -117,7 +117,7 @@ def test_no_more_parameters_are_uncertain_than_a_design_can_fly_the_corners_of()
         ("title = ", r"mine.toml': .*, expected a TOML file"),
         (
             'extends = "parkr"\n',
-            r"vehicle 'parkr': expected one of parker, winged_cone, winged_cone_lift or the path of a",
+            r"vehicle 'parkr': expected one of parker, winged_cone, winged_cone_lift or the path",
         ),
     ],
 )
