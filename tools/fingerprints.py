@@ -7,7 +7,7 @@ from pathlib import Path
 import tomli_w
 
 import hsv
-from hsv.control.design import find_design, read_design
+from hsv.control.design_file import find_design, read_design
 from hsv.flight import fingerprint
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly

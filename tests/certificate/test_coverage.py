@@ -1,7 +1,7 @@
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.control.design import find_design, read_design
+from hsv.control.design_file import find_design, read_design
 from hsv.control.hardware import uncovered_hardware
 from hsv.control.tube_law import TubeStatusCode
 from hsv.flight.assembly import assemble_flight, uncovered_of

@@ -17,14 +17,8 @@ from hsv.base.errors import DesignError
 from hsv.certificate.checks import Subject, gathered, leaves, load_subject, same, unchecked
 from hsv.certificate.tolerances import PARAMETERS, TOLERANCES, entry_size
 from hsv.certificate.verification import QUICK, RECOMPUTED, preflight
-from hsv.control.design import (
-    ControlDesign,
-    certificate_path,
-    find_design,
-    read_certificate,
-    read_parameters,
-    write_certificate,
-)
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import certificate_path, find_design, read_certificate, read_parameters, write_certificate
 
 PARTS = QUICK | RECOMPUTED
 DESIGNS = sorted(path.stem for path in Path(__file__).parents[2].glob("offline_design/*.toml"))

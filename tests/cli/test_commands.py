@@ -13,7 +13,7 @@ from hsv.base.units import PAPER_UNITS
 from hsv.cli.entry import COMMANDS, MOVED, TREE
 from hsv.cli.main import EXIT_CODES
 from hsv.cli.output import print_json, unit_key
-from hsv.control.design import find_design
+from hsv.control.design_file import find_design
 from hsv.flight.metrics import METRICS
 from hsv.flight.scenario import scenario_text
 from hsv.model.vehicle import load_vehicle

@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.certificate.checks import load_subject
-from hsv.control.design import find_design, read_design, read_parameters, write_design
+from hsv.control.design_file import find_design, read_design, read_parameters, write_design
 from hsv.design.inputs import find_inputs
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly

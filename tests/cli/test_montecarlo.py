@@ -5,7 +5,7 @@ from marking import long
 from node_processes import short_scenario
 
 from hsv.base.parameters import Parameter, validate
-from hsv.control.design import find_design
+from hsv.control.design_file import find_design
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from hsv.control.controller import (
     StepKernel,
     flat_input,
 )
-from hsv.control.design import find_design, read_design, read_parameters
+from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.control.robust_mpc import RobustMpc
 from hsv.control.tube_law import TubeStatusCode
 from hsv.model.vehicle import load_vehicle

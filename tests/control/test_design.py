@@ -10,17 +10,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.base.errors import DesignError, ParameterError
-from hsv.control.design import (
-    ControlDesign,
-    certified,
-    digest,
-    find_design,
-    find_file,
-    read_design,
-    read_parameters,
-    scheduled_changes,
-    write_design,
-)
+from hsv.control.design import ControlDesign, certified, digest, scheduled_changes
+from hsv.control.design_file import find_design, find_file, read_design, read_parameters, write_design
 
 DESIGNS = sorted((Path(__file__).parents[2] / "offline_design").glob("*.yaml"))
 VALUES = read_parameters(find_design("baseline"))

@@ -6,7 +6,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import GovernorError
-from hsv.control.design import PlanBounds, find_design, read_design
+from hsv.control.design import PlanBounds
+from hsv.control.design_file import find_design, read_design
 from hsv.control.governor import AT_REST, KEPT_FREE, NOTICE, Beginning, Governor, Leg, command_in_flight, legs_of
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.reference_trajectory import Corner, ReferenceTrajectory

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hsv.control.design import find_design, read_design
+from hsv.control.design_file import find_design, read_design
 from hsv.control.nominal_law import (
     MEMBERSHIP_TOLERANCE,
     NOT_IN_FAMILY,

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.base.errors import ParameterError
-from hsv.control.design import find_design, read_design, read_parameters
+from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.control.nominal_law import FamilyLaw, KothareLaw
 from hsv.control.nominal_trajectory import NominalStatus, NominalTrajectory
 from hsv.control.qp_law import QpLaw

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import solve_discrete_are
 
 from hsv.base.errors import DesignError, ParameterError
-from hsv.control.design import find_design, read_design, read_parameters
+from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.qp_law import BLOCK_TIME, BLOCKS, CHECKED_FAR, CHECKED_NEAR, NEAR_BLOCKS, QpLaw

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.base.errors import ParameterError
 from hsv.control.controller import ControllerInput
-from hsv.control.design import find_design, read_design
+from hsv.control.design_file import find_design, read_design
 from hsv.control.notch_filter import NotchFilter
 from hsv.control.tube_law import TubeLaw, TubeStatusCode
 from hsv.model.vehicle import load_vehicle

@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose
 
 from hsv.base.errors import SignalError
 from hsv.control.controller import ControllerInput
-from hsv.control.design import TubeSet, find_design, read_design
+from hsv.control.design import TubeSet
+from hsv.control.design_file import find_design, read_design
 from hsv.control.nominal_law import level
 from hsv.control.notch_filter import NotchFilter
 from hsv.control.tube_law import TubeLaw, TubeStatusCode

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hsv.control.design import find_design, read_design
+from hsv.control.design_file import find_design, read_design
 from hsv.flight.corners import corners
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.linear_loop import Feedback

@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import DesignError
-from hsv.control.design import find_design, read_design
+from hsv.control.design_file import find_design, read_design
 from hsv.design.baseline import disturbance_columns, initial_deviation
 from hsv.design.feedback import feedback_gain
 from hsv.lmi.nominal_gain import NominalProblem, nested_gains

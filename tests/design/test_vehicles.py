@@ -7,7 +7,7 @@ import pytest
 from hsv.base.errors import DesignError
 from hsv.certificate.checks import load_subject
 from hsv.cli.entry import main
-from hsv.control.design import read_design
+from hsv.control.design_file import read_design
 from hsv.control.tube_law import TubeStatusCode
 from hsv.design.inputs import read_inputs
 from hsv.flight.assembly import assemble_flight

@@ -13,7 +13,7 @@ from marking import long
 from page_blocks import blocks
 
 from hsv.base.errors import ControllerError, HsvError, ParameterError
-from hsv.control.design import find_design, read_design
+from hsv.control.design_file import find_design, read_design
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.export import exported_vehicle

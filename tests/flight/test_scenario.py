@@ -1,7 +1,7 @@
 import pytest
 
 from hsv.base.errors import ScenarioError
-from hsv.control.design import find_design
+from hsv.control.design_file import find_design
 from hsv.flight.assembly import assemble, assemble_flight, flight_parameters
 from hsv.flight.scenario import load_scenario, parse_scenario, scenario_text
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from hsv.certificate.checks import Subject, load_subject
 from hsv.certificate.verification import Tube
-from hsv.control.design import find_design
+from hsv.control.design_file import find_design
 from hsv.design.certified import load_certified
 from hsv.design.disturbance import ChannelModel
 from hsv.design.region import Region

@@ -25,7 +25,7 @@ from hsv.bags.steps import bag_warnings
 from hsv.base.errors import HsvError
 from hsv.base.units import parse_quantity
 from hsv.certificate.verification import preflight
-from hsv.control.design import certificate_path, find_design, read_design
+from hsv.control.design_file import certificate_path, find_design, read_design
 from hsv.flight.assembly import uncovered_of
 from hsv.flight.campaign.campaign import plan
 from hsv.flight.campaign.executors import Executor

@@ -13,7 +13,7 @@ from waiting import exit_code_of, output_of, used, wait_until
 from hsv.bags.description import graph
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import complete_steps, flown_parameters
-from hsv.control.design import find_design
+from hsv.control.design_file import find_design
 from hsv.graph.exclusive import is_published
 
 pytestmark = pytest.mark.graph

@@ -13,7 +13,7 @@ from waiting import output_of
 
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import flown_parameters
-from hsv.control.design import find_design, read_design, write_design
+from hsv.control.design_file import find_design, read_design, write_design
 from hsv.control.reference_trajectory import COLUMNS
 
 pytestmark = [pytest.mark.graph, pytest.mark.long]

@@ -3,7 +3,7 @@
 import pytest
 
 from hsv.base.errors import RecordingError
-from hsv.control.design import find_design, read_design
+from hsv.control.design_file import find_design, read_design
 from hsv.flight.fingerprint import as_published
 from hsv.flight.scenario import parse_scenario
 from hsv.graph.preparation import RunOptions, prepare

@@ -15,7 +15,7 @@ from numpy.testing import assert_array_equal
 
 import hsv.core
 from hsv.base.units import base_units
-from hsv.control.design import find_design, read_design
+from hsv.control.design_file import find_design, read_design
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario

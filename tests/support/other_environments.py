@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-from hsv.control.design import find_design, read_design
+from hsv.control.design_file import find_design, read_design
 from hsv.flight.fingerprint import as_published
 from hsv.flight.scenario import load_scenario
 from portability import Environment, own

@@ -12,7 +12,7 @@ from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.replay.engine import fly
 from hsv.bags.writer import BagWriter
-from hsv.control.design import find_file
+from hsv.control.design_file import find_file
 from hsv.flight.assembly import flight_parameters
 from hsv.flight.scenario import parse_scenario, scenario_text
 from hsv.model.faults.injector import FaultInjector

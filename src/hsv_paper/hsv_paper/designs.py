@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from hsv.base.units import FOOT
-from hsv.control.design import ControlDesign, TubeSet, certificate_path, find_design, read_certificate, read_design
+from hsv.control.design import ControlDesign, TubeSet
+from hsv.control.design_file import certificate_path, find_design, read_certificate, read_design
 from hsv.control.notch_filter import NotchSection, continuous, series
 from hsv.design.inputs import DesignInputs, inputs_from_report
 from hsv.design.model import polytopic_model

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from hsv.control.design import find_design
+from hsv.control.design_file import find_design
 from hsv.design.certified import Plan, load_certified
 from hsv.design.hardware import verdict
 from hsv.design.hardware.verdict import reaches

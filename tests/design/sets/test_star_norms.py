@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.control.design import find_design
+from hsv.control.design_file import find_design
 from hsv.design.certified import load_certified
 from hsv.design.compare import compare_sets
 from hsv.design.sets.counter_example import counter_examples

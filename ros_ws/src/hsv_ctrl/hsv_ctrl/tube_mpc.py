@@ -11,7 +11,8 @@ from rclpy.parameter import Parameter
 from hsv.bags.description import ROBUST_MPC, TUBE_MPC, NodeDescription
 from hsv.base.errors import DesignError, ParameterError
 from hsv.certificate.verification import preflight
-from hsv.control.design import CERTIFICATE_PARAMETERS, TAU
+from hsv.control.design import TAU
+from hsv.control.design_file import CERTIFICATE_PARAMETERS
 from hsv.control.effectiveness import EFFECTIVENESS_ENABLED, WATCHED_PARAMETERS, EffectivenessMode
 from hsv.control.hardware import uncovered_hardware
 from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS, RobustMpc

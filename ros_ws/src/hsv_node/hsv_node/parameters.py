@@ -84,7 +84,8 @@ def declare_design(node: Node, extra: tuple[Parameter, ...] = ()) -> tuple[dict[
     Unless ``design.name`` or ``design.hash`` is given, the defaults are those of the shipped baseline design. The
     design is None if ``design.name`` is ``none``. A warning is logged if its parameters do not match ``design.hash``.
     """
-    from hsv.control.design import DESIGN_PARAMETERS, design_of, find_design, read_parameters
+    from hsv.control.design import DESIGN_PARAMETERS, design_of
+    from hsv.control.design_file import find_design, read_parameters
 
     # If a complete design is given (with name or hash), the shipped one need not be parsed.
     whole = given(node, "design.hash") or given(node, "design.name")

@@ -8,7 +8,8 @@ from typing import Any, Self
 
 import yaml
 
-from hsv.control.design import DESIGN_PARAMETERS, TAU, parse_sections
+from hsv.control.design import DESIGN_PARAMETERS, TAU
+from hsv.control.design_file import parse_sections
 
 _ALL = "/**"
 

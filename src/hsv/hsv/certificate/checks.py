@@ -12,7 +12,8 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.certificate.tolerances import PARAMETERS, TOLERANCES, entry_size
-from hsv.control.design import ControlDesign, certificate_path, read_certificate, read_design
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import certificate_path, read_certificate, read_design
 from hsv.model.vehicle import Vehicle, load_vehicle
 
 

@@ -1,9 +1,9 @@
 """Independent verification of a design: recompute the statements of its certificate with numpy.
 
 This module imports no code that computes designs. It shares with that code only the vehicle model (:mod:`hsv.model`),
-the discretisation of the notch filter (:mod:`hsv.control.notch_filter`) and the reading of the files. The numbers in
-flight (vertices A_i, B_i, gains F and K) come from the design file, the statements about them from the certificate.
-The vertices are recomputed from the parameters of the vehicle, and every inequality from its matrices.
+the discretisation of the notch filter (:mod:`hsv.control.notch_filter`), the reading of the files, and names. The
+numbers in flight (vertices A_i, B_i, gains F and K) come from the design file, the statements about them from the
+certificate. The vertices are recomputed from the parameters of the vehicle, and every inequality from its matrices.
 :mod:`hsv.flight.verification` repeats the flights, and :func:`hsv.certificate.checks.unchecked` lists the fields that
 no check covers. The parts follow the paper: model (eq. 10 to 12), gain F (eq. 24), gains K (eq. 31 to 35), error system
 (eq. 22, 23), invariant set (eq. 25 to 28), tightened bounds (eq. 30), adjustable factor (eq. 47 to 54).
@@ -39,7 +39,8 @@ from hsv.certificate.checks import (
     same,
 )
 from hsv.certificate.tolerances import ROUNDING
-from hsv.control.design import ControlDesign, find_certificate, read_certificate
+from hsv.control.design import PLAN_SHIFT, ControlDesign
+from hsv.control.design_file import find_certificate, read_certificate
 from hsv.control.notch_filter import continuous, discretise, series
 from hsv.model.lpv.actuated import actuator_names, sampled_actuators
 from hsv.model.lpv.linearisation import (
@@ -50,26 +51,21 @@ from hsv.model.lpv.linearisation import (
     linearise,
     zero_order_hold,
 )
-from hsv.model.signals import INPUT_NAMES, N_INPUTS, N_RIGID, N_STATES, PITCH_RATE, STATE_NAMES
+from hsv.model.signals import (
+    ACCELERATED,
+    CHANNELS,
+    INPUT_NAMES,
+    N_INPUTS,
+    N_RIGID,
+    N_STATES,
+    PITCH_RATE,
+    STATE_NAMES,
+)
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from hsv.model.lpv.polytopic import PolytopicModel
-
-CHANNELS = {
-    "acceleration": "m/s^2",
-    "angle_of_attack_rate": "rad/s",
-    "pitch_acceleration": "rad/s^2",
-    "lost_elevator": "rad",
-    "filtered_nominal_rate": "rad/s",
-    "altitude_residual": "m",
-    "pitch_angle_residual": "rad",
-}
-"""Units of the channels of the disturbance set W, in the order of the columns of G in :class:`ErrorSystem`."""
-
-ACCELERATED, REMAINING = [1, 2, 4], [0, 3]
-"""Indices of the rigid states on which the three acceleration channels act, and of those with a residual channel."""
 
 STEERING = (
     "inputs.description",
@@ -87,8 +83,6 @@ _LONGEST = 10_000
 """Maximum length of a counter-example, steps."""
 
 _STATUS = ("optimal", "optimal_inaccurate")
-_KEPT_OFF = 0.05
-"""The input range of plans in flight is that of the certified plans, shifted down by this share of its width."""
 
 
 # --- algebra ----------------------------------------------------------------------------------------------------------
@@ -488,7 +482,7 @@ class Tube:
         self.c, self.Q, self.l = (np.array(stated[name]) for name in ("centre", "Q", "multipliers"))
         self.lam = float(stated["contraction"])
         channels = subject.stated(f"{field}.disturbance.channels")
-        self.lower, self.upper = (np.array([channels[name][side] for name in CHANNELS]) for side in ("lower", "upper"))
+        self.lower, self.upper = (np.array([channels[c.name][side] for c in CHANNELS]) for side in ("lower", "upper"))
         self.middle, self.half = 0.5 * (self.lower + self.upper), 0.5 * (self.upper - self.lower)
         self.star = None
         if "star_norms" in stated:
@@ -630,7 +624,7 @@ def set_checks(subject: Subject) -> Checks:
         # Not in the paper: plans in flight also keep to the range of the certified ones, shifted down.
         low, high = plan["pitch_acceleration"]
         lowest, highest = np.append(lowest, low), np.append(highest, high)
-        shift = _KEPT_OFF * (highest - lowest) * np.array([1.0, 1.0, 0.0])
+        shift = PLAN_SHIFT * (highest - lowest) * np.array([1.0, 1.0, 0.0])
         expected = bounds[0], bounds[1], lowest - shift, highest - shift
         names = "input_minimum", "input_maximum", "region_minimum", "region_maximum"
         of_plans = [f"tube.tightening.plan.{name}" for name in ("lowest", "highest", "pitch_acceleration")]
@@ -669,12 +663,12 @@ def _tube_checks(subject: Subject, tube: Tube) -> Checks:
         outward = widened(sign * np.array(measured[side]), inputs["inflation"])
         fields = (
             f"{field}.disturbance.measured.{side}",
-            *(f"{field}.disturbance.channels.{c}.{side}" for c in CHANNELS),
+            *(f"{field}.disturbance.channels.{c.name}.{side}" for c in CHANNELS),
         )
         check = same(f"{field}.disturbance, {side}", bounds, sign * inputs["share"] * outward, "disturbance bounds")
         yield replace(check, fields=fields)
-    for channel, unit in CHANNELS.items():
-        yield equal(subject, f"{field}.disturbance.channels.{channel}.unit", unit)
+    for channel in CHANNELS:
+        yield equal(subject, f"{field}.disturbance.channels.{channel.name}.unit", channel.unit)
     lag = lag_feedback(subject) if field == "tube" else ((0.0, 0.0), (0.0, 0.0))
     for side, bound in zip(("lower", "upper"), tube.tightened(lag), strict=True):
         check = recomputed(subject, f"{field}.tightening.{side}", bound, "tightened bounds")

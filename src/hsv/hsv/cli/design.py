@@ -196,7 +196,7 @@ def design(
     Example: hsv design baseline; hsv design adjustable --tau 0.8 --out softer.yaml; hsv design baseline --check
     """
     from hsv.certificate.checks import load_subject
-    from hsv.control.design import certificate_path, write_certificate, write_design
+    from hsv.control.design_file import certificate_path, write_certificate, write_design
     from hsv.design.adjustable import design_adjustable
     from hsv.design.baseline import design_baseline
     from hsv.design.inputs import find_inputs, read_inputs, with_tau
@@ -307,7 +307,7 @@ def verify(
     Example: hsv verify offline_design/baseline.yaml --scenario case1_qp
     """
     from hsv.certificate.checks import load_subject, unchecked
-    from hsv.control.design import find_design
+    from hsv.control.design_file import find_design
     from hsv.flight.scenario import load_scenario
     from hsv.flight.verification import bounding_corners, scenario_checks
     from hsv.flight.verification import verify as recompute
@@ -367,7 +367,7 @@ def certify(
 
     Example: hsv certify offline_design/realistic.yaml --sensors fine --turbulence "2 ft/s"
     """
-    from hsv.control.design import find_design
+    from hsv.control.design_file import find_design
     from hsv.design.certified import load_certified
     from hsv.design.hardware.models import declared, declared_actuators, described
     from hsv.design.hardware.verdict import certified_with
@@ -479,7 +479,7 @@ def export_controller(
 
     Example: hsv export-controller baseline --out controller
     """
-    from hsv.control.design import find_design, read_design
+    from hsv.control.design_file import find_design, read_design
     from hsv.plugins.export import controller_files, exported_controller, step_bounds
 
     if out is None and fmu is None:

@@ -131,7 +131,8 @@ def simulate(
     import numpy as np
 
     from hsv.cli.summary import FlightSummary, report_flight
-    from hsv.control.design import digest, find_design, read_design
+    from hsv.control.design import digest
+    from hsv.control.design_file import find_design, read_design
     from hsv.flight.assembly import assemble_flight, blamed_on, uncovered_of
     from hsv.flight.closed_loop import fly
     from hsv.flight.flight import step_statistics

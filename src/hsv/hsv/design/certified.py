@@ -14,9 +14,6 @@ import numpy as np
 from hsv.certificate.checks import Subject, load_subject
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import (
-    ACCELERATED,
-    CHANNELS,
-    REMAINING,
     ChannelModel,
     DisturbanceSet,
     acceleration_channels,
@@ -29,7 +26,7 @@ from hsv.design.sets.invariant_set import InvariantSet
 from hsv.design.tube_problem import tube_problem
 from hsv.flight.flight import Flight
 from hsv.model.lpv.actuated import respond, sampled_actuators
-from hsv.model.signals import N_RIGID
+from hsv.model.signals import ACCELERATED, CHANNELS, N_RIGID, REMAINING
 
 
 @dataclass(frozen=True)

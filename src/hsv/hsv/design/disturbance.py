@@ -36,33 +36,11 @@ from hsv.lmi.semidefinite import outward
 from hsv.model.lpv.actuated import respond, sampled_actuators
 from hsv.model.lpv.linearisation import linearise, zero_order_hold
 from hsv.model.lpv.polytope import Polytope
-from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
+from hsv.model.signals import ACCELERATED, CHANNELS, N_INPUTS, N_RIGID, N_STATES, PITCH_RATE, REMAINING
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
 
-
-class Channel(NamedTuple):
-    """One channel of the structured set: its name, SI unit and meaning."""
-
-    name: str
-    unit: str
-    meaning: str
-
-
-CHANNELS = (
-    Channel("acceleration", "m/s^2", "held acceleration along the velocity"),
-    Channel("angle_of_attack_rate", "rad/s", "held rate of the angle of attack"),
-    Channel("pitch_acceleration", "rad/s^2", "held pitch acceleration"),
-    Channel("lost_elevator", "rad", "actuator less command; total elevator, trim included"),
-    Channel("filtered_nominal_rate", "rad/s", "notch(q_n) - q_n, known from the plan"),
-    Channel("altitude_residual", "m", "altitude that the accelerations do not explain, per period"),
-    Channel("pitch_angle_residual", "rad", "pitch angle that the accelerations do not explain, per period"),
-)
-"""The channels of the structured set, in the order of the columns of G in the error system."""
-
 _FILTERED_NOMINAL = 4
-ACCELERATED, REMAINING = [1, 2, 4], [0, 3]
-"""Indices of the rigid states whose derivatives the accelerations change, and of those with a residual channel."""
 
 
 def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:

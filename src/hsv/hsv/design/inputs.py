@@ -21,7 +21,7 @@ from pydantic import (
 from hsv.base.errors import DesignError, DocumentError, QuantityError, one_of
 from hsv.base.files import follow_extends, is_path, parse_toml, read_text
 from hsv.base.units import parse_quantity
-from hsv.control.design import find_file
+from hsv.control.design_file import find_file
 from hsv.model.actuators import ACTUATOR_SETS
 from hsv.model.signals import N_RIGID
 from hsv.model.vehicle import Vehicle, load_vehicle

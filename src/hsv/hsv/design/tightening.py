@@ -15,14 +15,9 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.control.design import PlanBounds
+from hsv.control.design import PLAN_SHIFT, PlanBounds
 from hsv.design.sets.invariant_set import InvariantSet
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS
-
-_KEPT_OFF = 0.05
-"""How far other plans stay below the largest inputs of the certified plans, as a share of the ranges of these inputs.
-
-Without this distance the acceleration channel reaches 1.02 of its bound."""
 
 
 @dataclass(frozen=True)
@@ -77,15 +72,15 @@ def plan_bounds(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray
     """Return bounds for other nominal plans, within which the disturbance set should hold; flights have to confirm it.
 
     Another plan may hold a large input for a long time that the certified plans reach only briefly. Its input range is
-    therefore the range in the certified plans, both ends of which are lowered by 5 % of its width. The range of the
-    pitch acceleration is unchanged.
+    therefore the range in the certified plans, both ends of which are lowered by :data:`hsv.control.design.PLAN_SHIFT`
+    of its width. The range of the pitch acceleration is unchanged.
 
     Args:
         bounds: The tightened bounds.
         lowest: Smallest u_n + u_r by input, then smallest nominal pitch acceleration, of the certified plans, SI.
         highest: Their largest values.
     """
-    shift = _KEPT_OFF * (highest - lowest)
+    shift = PLAN_SHIFT * (highest - lowest)
     shift[2] = 0.0
     return PlanBounds(bounds.lower, bounds.upper, lowest - shift, highest - shift)
 

@@ -12,16 +12,8 @@ from hsv.base.errors import HsvError, ParameterError, ScenarioError, TrimError
 from hsv.base.parameters import table_values
 from hsv.certificate.coverage import uncovered
 from hsv.control.controller import NODE, SHIPPED_CONTROLLERS
-from hsv.control.design import (
-    TAU,
-    ControlDesign,
-    certificate_path,
-    design_of,
-    find_design,
-    read_certificate,
-    read_design,
-    read_parameters,
-)
+from hsv.control.design import TAU, ControlDesign, design_of
+from hsv.control.design_file import certificate_path, find_design, read_certificate, read_design, read_parameters
 from hsv.flight.blocks import LOOP
 from hsv.flight.closed_loop import Components
 from hsv.flight.scenario import Scenario

@@ -18,11 +18,8 @@ from hsv.base.processes import Progress
 from hsv.certificate.checks import Check, Checks, Subject, above, at_most, gathered, recomputed
 from hsv.certificate.tolerances import ROUNDING, TOLERANCES
 from hsv.certificate.verification import (
-    ACCELERATED,
-    CHANNELS,
     QUICK,
     RECOMPUTED,
-    REMAINING,
     Part,
     Tube,
     acceleration_channels,
@@ -42,7 +39,7 @@ from hsv.flight.side_by_side import fly_perturbed
 from hsv.model.lpv.actuated import respond, sampled_actuators
 from hsv.model.lpv.polytope import evaluate
 from hsv.model.plant import FlightStatus
-from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
+from hsv.model.signals import ACCELERATED, CHANNELS, N_INPUTS, N_RIGID, N_STATES, PITCH_RATE, REMAINING
 from hsv.model.trim import trim
 
 _FLIGHTS, _SEED = 48, 7
@@ -58,7 +55,7 @@ def region(subject: Subject, design: ControlDesign, share: float) -> Components:
 class Disturbances(NamedTuple):
     """Disturbances, tube error, and the feedback's response to the actuators' lag in a flight; one row per step, SI.
 
-    ``channels``, shape (n, 7), are the disturbances in the order of :data:`~hsv.certificate.verification.CHANNELS`.
+    ``channels``, shape (n, 7), are the disturbances in the order of :data:`~hsv.model.signals.CHANNELS`.
     ``error``, shape (n + 1, states), is the tube error e, less its response to the lag of the actuators behind the
     plan u_r + u_n. ``lag``, shape (n + 1, 2), is the response of the feedback to this lag, 0 without actuators.
     """
@@ -150,7 +147,7 @@ def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
     return Evidence(
         float(level(tube.Q, found.error - tube.c).max()),
         float(ratios[step, channel]),
-        list(CHANNELS)[channel],
+        CHANNELS[channel].name,
         int(step),
         np.append(plan.min(axis=0), turning.min()),
         np.append(plan.max(axis=0), turning.max()),

@@ -12,7 +12,7 @@ import numpy as np
 
 from hsv.bags.description import TUBE_STATUS
 from hsv.base.errors import CampaignError, ControllerError
-from hsv.control.design import find_design, read_parameters
+from hsv.control.design_file import find_design, read_parameters
 from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.flight.assembly import require_path_inside
 from hsv.flight.campaign.sample_runner import OUTCOMES, Outcome

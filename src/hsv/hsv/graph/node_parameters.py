@@ -20,7 +20,8 @@ from hsv.bags.infrastructure_parameters import LIVE_PARAMETERS, PACE_PARAMETERS,
 from hsv.base.errors import ParameterError, did_you_mean
 from hsv.base.parameters import Parameter
 from hsv.base.units import parse_quantity
-from hsv.control.design import CERTIFICATE_PARAMETERS, DESIGN_PARAMETERS
+from hsv.control.design import DESIGN_PARAMETERS
+from hsv.control.design_file import CERTIFICATE_PARAMETERS
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.notch_filter import NotchFilter
 from hsv.model.faults.injector import FaultInjector

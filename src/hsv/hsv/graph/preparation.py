@@ -15,16 +15,8 @@ from hsv.bags.infrastructure_parameters import STEP_TIMEOUT
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.base.errors import ParameterError, QuantityError, RecordingError, RunError
 from hsv.control.controller import NODE
-from hsv.control.design import (
-    DESIGN_PARAMETERS,
-    NO_DESIGN,
-    attached_certificate,
-    design_files,
-    digest,
-    find_certificate,
-    find_design,
-    read_design,
-)
+from hsv.control.design import DESIGN_PARAMETERS, NO_DESIGN, digest
+from hsv.control.design_file import attached_certificate, design_files, find_certificate, find_design, read_design
 from hsv.flight.assembly import assemble_flight, blamed_on, own_parameters
 from hsv.flight.scenario import Scenario, parse_scenario, scenario_text, with_controller
 from hsv.graph.exclusive import ports

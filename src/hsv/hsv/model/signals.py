@@ -95,6 +95,29 @@ def numbers_of(signal: SignalType) -> list[tuple[str, str]]:
     return [(f"{signal.name}{name}", units[i % len(units)]) for i, name in enumerate(names)]
 
 
+class Channel(NamedTuple):
+    """One channel of the disturbance set W (eq. 19): its name, SI unit and meaning."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+CHANNELS = (
+    Channel("acceleration", "m/s^2", "held acceleration along the velocity"),
+    Channel("angle_of_attack_rate", "rad/s", "held rate of the angle of attack"),
+    Channel("pitch_acceleration", "rad/s^2", "held pitch acceleration"),
+    Channel("lost_elevator", "rad", "actuator less command; total elevator, trim included"),
+    Channel("filtered_nominal_rate", "rad/s", "notch(q_n) - q_n, known from the plan"),
+    Channel("altitude_residual", "m", "altitude that the accelerations do not explain, per period"),
+    Channel("pitch_angle_residual", "rad", "pitch angle that the accelerations do not explain, per period"),
+)
+"""The channels of the disturbance set W, in the order of the columns of G in the error system."""
+
+ACCELERATED, REMAINING = [1, 2, 4], [0, 3]
+"""Indices of the rigid states whose derivatives the accelerations change, and of those with a residual channel."""
+
+
 def first_step(time: float, period: float) -> int:
     """Return the first step k with k * ``period`` >= ``time`` (s), with a tolerance of 1e-9 steps for rounding."""
     return math.ceil(time / period - 1e-9)

@@ -14,7 +14,7 @@ from hsv.bags.info import describe
 from hsv.bags.reader import Bag
 from hsv.bags.steps import completeness, joined
 from hsv.base.errors import HsvError
-from hsv.control.design import parse_parameters
+from hsv.control.design_file import parse_parameters
 from hsv.flight.limits import Verdict, verdicts
 from hsv.flight.scenario import Scenario, parse_scenario
 from hsv.model.signals import INPUT_NAMES

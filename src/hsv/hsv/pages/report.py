@@ -15,7 +15,7 @@ from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.bags.reader import Bag
 from hsv.base.errors import DesignError, RecordingError
 from hsv.base.units import UnitSystem
-from hsv.control.design import find_design, read_parameters
+from hsv.control.design_file import find_design, read_parameters
 from hsv.flight.flight import step_times_in_words
 from hsv.flight.limits import criteria_not_judged, limits_kept, verdict_sentence
 from hsv.flight.metrics import CRITERIA, METRICS, Group, Metric, in_words

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
-from hsv.control.design import ControlDesign, find_design, read_parameters
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_design, read_parameters
 from hsv.control.nominal_law import FamilyLaw
 from hsv.control.nominal_trajectory import nominal_data
 from hsv.control.notch_filter import NotchSection, discretise, flown_sections, notch_response
-from hsv.design.disturbance import CHANNELS, ChannelModel, DisturbanceSet
+from hsv.design.disturbance import ChannelModel, DisturbanceSet
 from hsv.design.tube import invariant_set
 from hsv.design.tube_problem import tube_problem
 from hsv.flight.assembly import assemble, flight_parameters
@@ -29,7 +30,7 @@ from hsv.flight.scenario import load_scenario
 from hsv.flight.side_by_side import fly_perturbed
 from hsv.lmi.semidefinite import spectral_radii
 from hsv.model.lpv.linearisation import bode, bode_difference, frequency_response
-from hsv.model.signals import N_RIGID, PITCH_RATE
+from hsv.model.signals import CHANNELS, N_RIGID, PITCH_RATE
 from hsv.model.vehicle import Vehicle, load_vehicle
 from hsv_paper import modes
 from hsv_paper.claims.evidence import Evidence, worst

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from hsv.control.design import ControlDesign, find_design, read_design, read_parameters
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.design.baseline import design_gains
 from hsv.design.inputs import find_inputs, read_inputs
 from hsv.flight.scenario import load_scenario

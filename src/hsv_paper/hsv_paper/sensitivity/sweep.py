@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from hsv.base.units import to_paper
-from hsv.control.design import ControlDesign, find_design, read_parameters
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_design, read_parameters
 from hsv.flight.assembly import assemble, scenario_parameters
 from hsv.flight.metrics import METRICS
 from hsv.flight.scenario import load_scenario

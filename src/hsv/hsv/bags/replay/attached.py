@@ -33,18 +33,8 @@ from hsv.bags.steps import cut_off, expected_stamps, joined
 from hsv.base.errors import DesignError, ParameterError, RecordingError
 from hsv.base.parameters import validate
 from hsv.control.controller import CONTROLLER_PARAMETERS
-from hsv.control.design import (
-    CERTIFICATE_PARAMETERS,
-    TAU,
-    ControlDesign,
-    change_parameters,
-    design_files,
-    find_design,
-    read_design,
-    read_parameters,
-    rigid_factors,
-    scheduled_changes,
-)
+from hsv.control.design import TAU, ControlDesign, change_parameters, rigid_factors, scheduled_changes
+from hsv.control.design_file import CERTIFICATE_PARAMETERS, design_files, find_design, read_design, read_parameters
 from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.control.reference_trajectory import COLUMNS
 from hsv.flight.assembly import blamed_on

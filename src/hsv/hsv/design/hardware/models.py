@@ -20,7 +20,7 @@ from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.core import Struct
 from hsv.core.arithmetic import LARGEST
 from hsv.design.certified import CertifiedDesign, Plan
-from hsv.design.disturbance import CHANNELS, DisturbanceSet
+from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import ErrorSystem
 from hsv.design.tube_problem import TubeProblem
 from hsv.flight.scenario import Scenario
@@ -30,7 +30,7 @@ from hsv.model.dynamics import derivative
 from hsv.model.links import command_link, computation, measurement_link
 from hsv.model.lpv.linearisation import linearise, zero_order_hold
 from hsv.model.sensors import ALPHA, PITCH, SENSOR_SETS, sensor_data
-from hsv.model.signals import INPUT_NAMES, N_RIGID, N_STATES, PITCH_RATE, STATE_NAMES, STATE_UNITS
+from hsv.model.signals import CHANNELS, INPUT_NAMES, N_RIGID, N_STATES, PITCH_RATE, STATE_NAMES, STATE_UNITS
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
 
