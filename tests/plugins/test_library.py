@@ -3,14 +3,16 @@
 import ctypes
 import hashlib
 import shutil
+import subprocess
+import textwrap
 
 import pytest
-from c_libraries import PROBE, build_probe
+from c_libraries import PROBE, WARNINGS, build_probe
 
 from hsv.base.errors import ParameterError
 from hsv.control.controller import CONTROLLER_INPUTS, CONTROLLER_OUTPUTS
 from hsv.model.signals import FILTER_STATE
-from hsv.plugins.library import library_digest, library_record, load_block
+from hsv.plugins.library import include_folder, library_digest, library_record, load_block
 
 
 def test_a_flight_keeps_digest_and_source_of_its_library(tmp_path):
@@ -71,3 +73,37 @@ def test_what_is_no_library_or_has_no_such_symbol_is_named(tmp_path):
         load_block(tmp_path / "text.so", "probe")
     with pytest.raises(ParameterError, match=r"^no symbol 'prob', expected a constant of the type hsv_block"):
         load_block(build_probe(tmp_path), "prob")
+
+
+COMPILERS = [("cc", "-std=c99", "c"), ("c++", "-std=c++17", "cpp"), ("c++", "-std=c++20", "cpp")]
+COMPILERS += [("clang", "-std=c99", "c"), ("clang++", "-std=c++20", "cpp")]
+
+
+def compile_block(folder, compiler, standard, suffix, text):
+    """Compile a block with every warning as an error, and return the library."""
+    source, library = folder / f"trimmed.{suffix}", folder / "trimmed.so"
+    source.write_text(text)
+    words = [compiler, standard, *WARNINGS, "-ffp-contract=off", f"-I{include_folder()}", "-shared", "-fPIC"]
+    subprocess.run([*words, "-o", library, source], check=True)
+    return library
+
+
+@pytest.mark.parametrize(("compiler", "standard", "suffix"), COMPILERS)
+def test_the_example_of_the_header_is_c_and_c_plus_plus_without_a_warning(tmp_path, compiler, standard, suffix):
+    if not shutil.which(compiler):
+        pytest.skip(f"no {compiler}")
+    comment = (include_folder() / "hsv_block.h").read_text().partition("*/")[0]
+    example = textwrap.dedent(comment[comment.index("*     #include") :].replace("\n *", "\n").removeprefix("*"))
+    library = compile_block(tmp_path, compiler, standard, suffix, example.partition("\n    cc")[0])
+    block = load_block(library, "trimmed")
+    assert (block.name, block.inputs) == ("trimmed", CONTROLLER_INPUTS[:-1])
+    assert [(parameter.name, parameter.default) for parameter in block.parameters] == [("trimmed.share", 1.0)]
+
+
+def test_a_symbol_that_c_plus_plus_has_mangled_is_named(tmp_path):
+    text = '#include "hsv_block.h"\nnamespace mine { extern const hsv_block trimmed; const hsv_block trimmed = {}; }\n'
+    library = compile_block(tmp_path, "c++", "-std=c++17", "cpp", text.replace("= {}", "{}"))
+    with pytest.raises(
+        ParameterError, match=r"no symbol 'trimmed', but _ZN4mine7trimmedE as C\+\+ names it: HSV_BLOCK"
+    ):
+        load_block(library, "trimmed")

@@ -108,7 +108,11 @@ def load_block(path: Path, symbol: str) -> CBlock:
     try:
         found = _Block.in_dll(library, symbol)
     except ValueError:
-        raise ParameterError(f"no symbol {symbol!r}, expected a constant of the type hsv_block") from None
+        mangled = re.search(
+            rf"_Z[0-9A-Za-z_]*?{len(symbol)}{re.escape(symbol)}E?", path.read_bytes().decode("latin-1"), re.ASCII
+        )
+        words = f", but {mangled[0]} as C++ names it: HSV_BLOCK({symbol}) = {{...}} exports it" if mangled else ""
+        raise ParameterError(f"no symbol {symbol!r}{words}, expected a constant of the type hsv_block") from None
     if found.abi_version != ABI_VERSION:
         raise ParameterError(f"abi_version = {found.abi_version}, expected {ABI_VERSION}, as of hsv_block.h")
     if not found.step:

@@ -7,6 +7,7 @@
  *
  *     static int32_t step(int64_t k, const double *in, double *out, double *state, const double *par)
  *     {
+ *         (void)k, (void)state;
  *         out[HSV_FUEL_EQUIVALENCE_RATIO] = in[HSV_REFERENCE_INPUT + HSV_FUEL_EQUIVALENCE_RATIO];
  *         out[HSV_ELEVATOR_DEFLECTION] = par[0] * in[HSV_REFERENCE_INPUT + HSV_ELEVATOR_DEFLECTION];
  *         return 0;
@@ -14,21 +15,18 @@
  *
  *     static const hsv_signal inputs[] = {HSV_CONTROLLER_INPUTS}, outputs[] = {HSV_CONTROLLER_OUTPUTS};
  *     static const double one = 1.0;
- *     static const hsv_parameter parameters[] = {
- *         {.name = "share", .unit = "1", .description = "times the elevator of the trim", .size = 1, .value = &one}};
+ *     static const hsv_parameter parameters[] = {{"share", "1", "times the elevator of the trim", 1, &one, 0.0, 0.0}};
  *
- *     const hsv_block trimmed = {
- *         .abi_version = HSV_BLOCK_ABI_VERSION, .name = "trimmed", .source = __FILE__, .step = step,
- *         .input_count = HSV_COUNT(inputs), .inputs = inputs,
- *         .output_count = HSV_COUNT(outputs), .outputs = outputs,
- *         .parameter_count = HSV_COUNT(parameters), .parameters = parameters};
+ *     HSV_BLOCK(trimmed) = {
+ *         HSV_BLOCK_ABI_VERSION, "trimmed", __FILE__, step, 0, HSV_COUNT(inputs), inputs,
+ *         HSV_COUNT(outputs), outputs, HSV_COUNT(parameters), parameters};
  *
  *     cc -std=c99 -O2 -ffp-contract=off -shared -fPIC -I"$(hsv include)" -o trimmed.so trimmed.c
  *
  * A scenario uses it with controller = "trimmed.so:trimmed", where the path is relative to the folder of the scenario;
  * the table [trimmed] of the scenario then has the key "share".
  *
- * The language is C99; units are SI, with angles in radians. With "-ffp-contract=off" a flight has the same bits on
+ * The language is C99, or C++ ("c++ -std=c++17" in place of "cc -std=c99"); units are SI, with angles in radians. With "-ffp-contract=off" a flight has the same bits on
  * every processor.
  */
 #ifndef HSV_BLOCK_H
@@ -81,8 +79,16 @@ typedef struct {
     const hsv_parameter *parameters;
 } hsv_block;
 
-/* Order of the entries of a vehicle state, of its reference and of a deviation from the reference. */
+/* Export a block: HSV_BLOCK(name) = {...}; where C++ would keep a constant to the file. */
+#ifdef __cplusplus
+#define HSV_BLOCK(name) extern "C" { extern const hsv_block name; } const hsv_block name
+#else
+#define HSV_BLOCK(name) extern const hsv_block name; const hsv_block name
+#endif
+
+/* One enumeration, because C++ warns of sums of two. */
 enum {
+    /* Order of the entries of a vehicle state, of its reference and of a deviation from the reference. */
     HSV_ALTITUDE,
     HSV_VELOCITY,
     HSV_ANGLE_OF_ATTACK,
@@ -92,24 +98,22 @@ enum {
     HSV_ELASTIC_RATE_1,
     HSV_ELASTIC_COORDINATE_2,
     HSV_ELASTIC_RATE_2,
-    HSV_STATES
+    HSV_STATES,
+    /* Order of the entries of a vehicle input. */
+    HSV_FUEL_EQUIVALENCE_RATIO = 0,
+    HSV_ELEVATOR_DEFLECTION,
+    HSV_INPUTS,
+    /* Positions of the signals in the input "in" of a controller. */
+    HSV_ESTIMATE = 0,                                    /* x, measured or estimated, pitch rate not filtered */
+    HSV_FILTERED_PITCH_RATE = HSV_ESTIMATE + HSV_STATES, /* q_f */
+    HSV_REFERENCE = HSV_FILTERED_PITCH_RATE + 1,         /* x_r */
+    HSV_REFERENCE_INPUT = HSV_REFERENCE + HSV_STATES,    /* u_r */
+    HSV_DEVIATION = HSV_REFERENCE_INPUT + HSV_INPUTS,    /* x_n, zero without a design */
+    HSV_NOMINAL_INPUT = HSV_DEVIATION + HSV_STATES,      /* u_n, zero without a design */
+    HSV_FILTER_STATE = HSV_NOMINAL_INPUT + HSV_INPUTS    /* s before this step's update, two a section */
 };
 #define HSV_STATE_UNITS "m, m/s, rad, rad, rad/s, kg^0.5 m, kg^0.5 m/s, kg^0.5 m, kg^0.5 m/s"
-
-/* Order of the entries of a vehicle input. */
-enum { HSV_FUEL_EQUIVALENCE_RATIO, HSV_ELEVATOR_DEFLECTION, HSV_INPUTS };
 #define HSV_INPUT_UNITS "1, rad"
-
-/* Positions of the signals in the input "in" of a controller. */
-enum {
-    HSV_ESTIMATE = 0,                                        /* x, measured or estimated, pitch rate not filtered */
-    HSV_FILTERED_PITCH_RATE = HSV_ESTIMATE + HSV_STATES,     /* q_f */
-    HSV_REFERENCE = HSV_FILTERED_PITCH_RATE + 1,             /* x_r */
-    HSV_REFERENCE_INPUT = HSV_REFERENCE + HSV_STATES,        /* u_r */
-    HSV_DEVIATION = HSV_REFERENCE_INPUT + HSV_INPUTS,        /* x_n, zero without a design */
-    HSV_NOMINAL_INPUT = HSV_DEVIATION + HSV_STATES,          /* u_n, zero without a design */
-    HSV_FILTER_STATE = HSV_NOMINAL_INPUT + HSV_INPUTS        /* s before this step's update, two a section */
-};
 
 /* The inputs and outputs of a controller. It may omit inputs at the end. If it reads the state of the notch filter,
  * HSV_FILTER_STATE_INPUT follows; its size must be that of the filter in flight. The output is the unsaturated input of
