@@ -101,8 +101,8 @@ def test_the_example_of_the_header_is_c_and_c_plus_plus_without_a_warning(tmp_pa
 
 
 def test_a_symbol_that_c_plus_plus_has_mangled_is_named(tmp_path):
-    text = '#include "hsv_block.h"\nnamespace mine { extern const hsv_block trimmed; const hsv_block trimmed = {}; }\n'
-    library = compile_block(tmp_path, "c++", "-std=c++17", "cpp", text.replace("= {}", "{}"))
+    text = '#include "hsv_block.h"\nnamespace mine { extern const hsv_block trimmed; const hsv_block trimmed{}; }\n'
+    library = compile_block(tmp_path, "c++", "-std=c++17", "cpp", text)
     with pytest.raises(
         ParameterError, match=r"no symbol 'trimmed', but _ZN4mine7trimmedE as C\+\+ names it: HSV_BLOCK"
     ):
