@@ -71,8 +71,8 @@ lint: setup ## set up, then check style, types and the direction of imports
 # Versions move only if named: make locks ARGS="--upgrade-package scipy"; --upgrade moves all, those of ROS too.
 LOCK := .venv/bin/uv pip compile --universal --system-certs --quiet --no-annotate --custom-compile-command "make locks"
 locks: setup ## set up, then write the exact versions of all requirements to constraints.txt and constraints-jazzy.txt
-	@$(LOCK) --python-version 3.11 requirements{,-ros,-test,-viewers,-docs}.txt --output-file constraints.txt $(ARGS)
-	@$(LOCK) --python-version 3.12 requirements{,-jazzy,-test,-viewers,-docs}.txt --output-file constraints-jazzy.txt $(ARGS)
+	@$(LOCK) --python-version 3.11 requirements{,-ros,-test,-viewers,-docs,-web}.txt --output-file constraints.txt $(ARGS)
+	@$(LOCK) --python-version 3.12 requirements{,-jazzy,-test,-viewers,-docs,-web}.txt --output-file constraints-jazzy.txt $(ARGS)
 
 references: lint ## run all tests, then fly the reference bags of bags/reference anew: all or none
 	@$(call TESTS,or reference) && python3 tools/references.py

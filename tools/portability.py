@@ -68,10 +68,24 @@ def aarch64(folder: Path) -> Environment:
         "CC": f"{compiler}/usr/bin/aarch64-linux-gnu-gcc --sysroot={compiler}",
         "LD_LIBRARY_PATH": str(compiler / "usr/lib" / f"{platform.machine()}-linux-gnu"),
     }
+    library = compiled(folder, variables)
+    return Environment(command, install(folder, version, "aarch64", "constraints.txt"), library)
+
+
+def zig(folder: Path) -> Environment:
+    """Return the environment of the project with a core that zig cc, clang with LLVM's run-time library, compiled."""
+    version = f"3.{sys.version_info.minor}"
+    compiler = install(folder, version, platform.machine(), "constraints.txt", "ziglang")
+    variables = {"CC": f"{compiler}/ziglang/zig cc", "ZIG_GLOBAL_CACHE_DIR": str(folder / "cache")}
+    return Environment(own().command, own().packages, compiled(folder, variables))
+
+
+def compiled(folder: Path, variables: dict[str, str]) -> str:
+    """Compile the library with other environment ``variables``; return its folder."""
     library = folder / "library"
     build = [sys.executable, "setup.py", "--quiet", "build", f"--build-base={folder / 'build'}"]
-    run("the core does not compile for aarch64", [*build, f"--build-lib={library}"], cwd=LIBRARY, variables=variables)
-    return Environment(command, install(folder, version, "aarch64", "constraints.txt"), str(library))
+    run("the core does not compile", [*build, f"--build-lib={library}"], cwd=LIBRARY, variables=variables)
+    return str(library)
 
 
 def python_3_12(folder: Path, pins: str = "constraints.txt") -> Environment:
@@ -82,6 +96,7 @@ def python_3_12(folder: Path, pins: str = "constraints.txt") -> Environment:
 ENVIRONMENTS: dict[str, Callable[[Path], Environment]] = {
     "nehalem": nehalem,
     "aarch64": aarch64,
+    "zig": zig,
     "python-3.12": python_3_12,
     "numpy-1.26": lambda folder: python_3_12(folder, "constraints-jazzy.txt"),
 }
@@ -151,17 +166,17 @@ def unpack(machine: str, name: str, *packages: str) -> Path:
     return partial.rename(folder)
 
 
-def install(folder: Path, version: str, machine: str, constraints: str) -> str:
-    """Install the wheels of :data:`PACKAGES` for another Python version or machine; return their folder."""
+def install(folder: Path, version: str, machine: str, constraints: str, *names: str) -> str:
+    """Install wheels for a Python version and machine, by default of :data:`PACKAGES`; return their folder."""
     packages = folder / "packages"
-    # pip takes wheels of exactly the named platforms, here from glibc 2.17 to the 2.36 of Debian 12.
-    platforms = [f"--platform=manylinux_2_{minor}_{machine}" for minor in range(36, 16, -1)]
+    # pip takes wheels of exactly the named platforms, here from glibc 2.12 to the 2.36 of Debian 12.
+    platforms = [f"--platform=manylinux_2_{minor}_{machine}" for minor in range(36, 11, -1)]
     command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--quiet"]
     command += ["--target", str(packages), "--only-binary=:all:", f"--python-version={version}", "--no-compile"]
     # pip would check the requirements of the wheels against its own Python; the pins were resolved for the other one.
     command += ["--ignore-requires-python", *platforms, f"--platform=manylinux2014_{machine}"]
     failure = f"pip has no wheels for Python {version} on {machine} under {constraints}"
-    run(failure, [*command, "--constraint", constraints, *PACKAGES])
+    run(failure, [*command, "--constraint", constraints, *(names or PACKAGES)])
     return str(packages)
 
 

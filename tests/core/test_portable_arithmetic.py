@@ -1,9 +1,12 @@
 """Code that decides a flight, in Python and in C, uses only exact operations and our own elementary functions."""
 
 import ast
+import os
 import re
+import shlex
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 import hsv
@@ -13,6 +16,10 @@ SOURCES = Path(hsv.__file__).parent
 
 HARMLESS = re.compile(r"sqrt|memcpy|memmove|memset|_?Py\w+|__\w+|_ITM_\w+")
 """C library functions with a unique result, and functions that Python, the compiler or the linker add."""
+
+FROM_ELSEWHERE = re.compile(r"sqrt|memcpy|memmove|memset|_GLOBAL_OFFSET_TABLE_|__cpu_model|__stack_chk_fail")
+"""Symbols that the core's own object code may leave to the linker: nothing of the compiler's run-time library that
+computes, such as the complex division __divdc3, which libraries round differently."""
 
 MATH = {"isfinite", "isnan", "inf", "nan", "pi", "ceil", "floor", "isqrt", "radians"}
 """Permitted names of :mod:`math`; radians() is a product with pi / 180."""
@@ -136,3 +143,16 @@ def inexact_symbols(library: Path) -> list[str]:
 
 def test_the_core_takes_nothing_inexact_from_elsewhere():
     assert inexact_symbols(Path(_core.__file__)) == []
+
+
+def test_the_core_computes_nothing_with_the_compilers_library(tmp_path):
+    compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC"))
+    sources = sorted((SOURCES / "core").glob("*.c"))
+    objects = ["-r", "-nostdlib", "-o", str(tmp_path / "core.o"), *map(str, sources)]
+    options = ["-std=gnu99", "-O0", "-fPIC", "-fno-math-errno", "-Wno-psabi"]
+    subprocess.run([*compiler, *options, *objects], check=True)
+    command = ["nm", "--undefined-only", "--format=posix", str(tmp_path / "core.o")]
+    listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    names = {line.split()[0] for line in listed.splitlines()}
+    assert "memcpy" in names
+    assert [name for name in names if not FROM_ELSEWHERE.fullmatch(name)] == []

@@ -22,6 +22,7 @@ from portability import Environment
         ("python-3.12", "python", "3.12."),
         ("aarch64", "machine", "aarch64"),
         ("numpy-1.26", "numpy", "1.26."),
+        ("zig", "compiler", "clang"),
     ],
 )
 def test_flights_are_as_published(name, field, begins):

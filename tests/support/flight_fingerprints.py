@@ -12,11 +12,12 @@ import math
 import platform
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hsv.core import instruction_set
+from hsv.core import _core, instruction_set
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario
@@ -37,6 +38,7 @@ def flown_on() -> dict[str, Any]:
         "python": platform.python_version(),
         "numpy": np.__version__,
         "instruction set": instruction_set(),
+        "compiler": "clang" if b"clang version" in Path(_core.__file__).read_bytes() else "gcc",
         "numpy dispatches to": [name for name in __cpu_dispatch__ if __cpu_features__[name]],
         "libm": hashlib.sha256(np.array(libm).tobytes()).hexdigest(),
         "blas": hashlib.sha256((matrix @ matrix).tobytes()).hexdigest(),
