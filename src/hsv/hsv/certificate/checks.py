@@ -149,17 +149,15 @@ def required(check: Check) -> Check:
     return replace(check, required=True)
 
 
-def gathered(name: str, checks: Callable[[], Checks]) -> list[Check]:
-    """Return the results of ``checks``; if an error ends them, the last is a failed, required check ``name``."""
-    done: list[Check] = []
+def gathered(name: str, checks: Callable[[], Checks]) -> Iterator[Check]:
+    """Yield the results of ``checks``; if an error ends them, the last is a failed, required check ``name``."""
     try:
-        done.extend(checks())
+        yield from checks()
     # Any field of a certificate may have any type and value.
     except (DesignError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
         missing = isinstance(error, KeyError)
         value = f"no field {error}" if missing else str(error)
-        done.append(Check(name, value, "to be recomputable", False, required=True))
-    return done
+        yield Check(name, value, "to be recomputable", False, required=True)
 
 
 def unchecked(subject: Subject, checks: Iterable[Check], *, whole: bool = True) -> list[str]:

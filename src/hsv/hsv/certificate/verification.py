@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise, product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -416,7 +416,13 @@ class ErrorSystem(NamedTuple):
     names: tuple[str, ...]
 
 
-def error_system(design: ControlDesign, vehicle: Vehicle, tau: np.ndarray, effectiveness: float = 1.0) -> ErrorSystem:
+def error_system(
+    design: ControlDesign,
+    vehicle: Vehicle,
+    tau: np.ndarray,
+    effectiveness: float = 1.0,
+    number: Callable[[Any], np.ndarray] = np.asarray,
+) -> ErrorSystem:
     """Return the error system (eq. 22, 23) for the feedback tau F, with notch filter and actuators in the state.
 
     The feedback uses the filtered pitch rate q_f = C_s s + D_s q, with s the state of the filter. Its output u drives
@@ -427,26 +433,29 @@ def error_system(design: ControlDesign, vehicle: Vehicle, tau: np.ndarray, effec
         vehicle: Vehicle of the design.
         tau: (5) factors of the feedback of the rigid states.
         effectiveness: Effectiveness of the elevator, from 0 to 1.
+        number: Conversion of the given numbers to an array; :func:`hsv.certificate.exact.rational` makes all sums and
+            products exact.
     """
-    period, polytope = design.period, design.polytope
-    A_s, B_s, C_s, D_s = series(discretise(design.notch, period))
-    actuators = design.actuator_sets
-    a = sampled_actuators(actuators, period)
-    r, x, s, n = len(polytope.A), N_RIGID, len(A_s), len(a.A)
+    period, polytope, actuators = design.period, design.polytope, design.actuator_sets
+    A_s, B_s, C_s, D_s = map(number, series(discretise(design.notch, period)))
+    sampled = sampled_actuators(actuators, period)
+    A_a, B_a, C_a, D_a = map(number, (sampled.A, sampled.B, sampled.C, sampled.D if actuators else np.eye(N_INPUTS)))
+    r, x, s, n = len(polytope.A), N_RIGID, len(A_s), len(A_a)
     filters, positions = slice(x, x + s), slice(x + s, x + s + n)
-    B_x = polytope.B[:, :x] * np.array([1.0, effectiveness])
-    A, B = np.zeros((r, x + s + n, x + s + n)), np.zeros((r, x + s + n, N_INPUTS))
-    A[:, :x, :x], A[:, :x, positions], A[:, positions, positions] = polytope.A[:, :x, :x], B_x @ a.C, a.A
+    zeros = partial(np.zeros, dtype=A_s.dtype)
+    B_x = number(polytope.B[:, :x]) * number([1.0, effectiveness])
+    A, B = zeros((r, x + s + n, x + s + n)), zeros((r, x + s + n, N_INPUTS))
+    A[:, :x, :x], A[:, :x, positions], A[:, positions, positions] = number(polytope.A[:, :x, :x]), B_x @ C_a, A_a
     A[:, filters, PITCH_RATE], A[:, filters, filters] = B_s, A_s
-    B[:, :x], B[:, positions] = B_x @ (a.D if actuators else np.eye(N_INPUTS)), a.B
-    rigid = design.feedback_gain[:, :x] * tau
-    F = np.zeros((N_INPUTS, x + s + n))
+    B[:, :x], B[:, positions] = B_x @ D_a, B_a
+    rigid = number(design.feedback_gain[:, :x]) * number(tau)
+    F = zeros((N_INPUTS, x + s + n))
     F[:, :x], F[:, filters] = rigid, np.outer(rigid[:, PITCH_RATE], C_s)
     F[:, PITCH_RATE] *= D_s
-    G, F_d = np.zeros((r, x + s + n, len(CHANNELS))), np.zeros((N_INPUTS, len(CHANNELS)))
-    G[:, :x, :3] = acceleration_channels(vehicle, period)
+    G, F_d = zeros((r, x + s + n, len(CHANNELS))), zeros((N_INPUTS, len(CHANNELS)))
+    G[:, :x, :3] = number(acceleration_channels(vehicle, period))
     G[:, :, 3], G[:, :, 4] = B[:, :, 1], B @ rigid[:, PITCH_RATE]  # lost elevator; notch(q_n) - q_n through F
-    G[:, 0, 5] = G[:, 3, 6] = 1.0
+    G[:, 0, 5] = G[:, 3, 6] = number(1.0)
     F_d[:, 4] = rigid[:, PITCH_RATE]
     names = STATE_NAMES[:x] + tuple(f"filter_{i + 1}" for i in range(s)) + actuator_names(actuators)
     return ErrorSystem(A + B @ F, G, F, F_d, names)
@@ -472,22 +481,31 @@ class Tube:
     of the extreme :func:`factors` tau; the F of the first, the smallest, is that of ``rows`` and of the bounds.
     """
 
-    def __init__(self, subject: Subject, design: ControlDesign, field: str) -> None:
-        """Read the tube under ``field`` of the certificate; compute the error systems at the extreme factors tau."""
+    def __init__(
+        self,
+        subject: Subject,
+        design: ControlDesign,
+        field: str,
+        number: Callable[[Any], np.ndarray] = np.asarray,
+    ) -> None:
+        """Read the tube under ``field`` of the certificate; compute the error systems at the extreme factors tau.
+
+        ``number`` converts all numbers, see :func:`error_system`.
+        """
         self.field, self.design = field, design
-        systems = [error_system(design, subject.vehicle, tau) for tau in factors(design)]
+        systems = [error_system(design, subject.vehicle, tau, number=number) for tau in factors(design)]
         self.system = systems[0]
         self.A, self.G = (np.concatenate([getattr(s, name) for s in systems]) for name in ("A", "G"))
         stated = subject.stated(f"{field}.invariant_set")
-        self.c, self.Q, self.l = (np.array(stated[name]) for name in ("centre", "Q", "multipliers"))
+        self.c, self.Q, self.l = (number(stated[name]) for name in ("centre", "Q", "multipliers"))
         self.lam = float(stated["contraction"])
         channels = subject.stated(f"{field}.disturbance.channels")
-        self.lower, self.upper = (np.array([channels[c.name][side] for c in CHANNELS]) for side in ("lower", "upper"))
-        self.middle, self.half = 0.5 * (self.lower + self.upper), 0.5 * (self.upper - self.lower)
+        self.lower, self.upper = (number([channels[c.name][side] for c in CHANNELS]) for side in ("lower", "upper"))
+        self.middle, self.half = (self.lower + self.upper) / 2, (self.upper - self.lower) / 2
         self.star = None
         if "star_norms" in stated:
-            self.star = StarNorms(*(np.array(stated["star_norms"][name]) for name in ("Q", "contraction")))
-        self.rows = np.vstack((np.eye(N_RIGID, len(self.c)), self.system.F))
+            self.star = StarNorms(*(number(stated["star_norms"][name]) for name in ("Q", "contraction")))
+        self.rows = np.vstack((number(np.eye(N_RIGID, len(self.c))), self.system.F))
 
     @property
     def columns(self) -> np.ndarray:
@@ -497,6 +515,17 @@ class Tube:
         """
         drift = self.A @ self.c + self.G @ self.middle - self.c
         return np.concatenate((self.G * self.half, drift[:, :, None]), axis=2)
+
+    def start_parts(self) -> dict[int, np.ndarray]:
+        """Return the parts (n) into which the start e = 0 is split, by the index of each acting channel.
+
+        The start e - c = -c (eq. 25) is their sum. A part is minus the steady response of the mean closed loop to the
+        mid-point of the channel, but the remainder for the last. The paper has no such split.
+        """
+        acting, mean = np.flatnonzero((self.columns != 0).any(axis=(0, 1))).tolist(), self.A.mean(axis=0)
+        steady = np.linalg.solve(mean - np.eye(len(mean)), self.G.mean(axis=0) * self.middle).T
+        parts = {j: steady[j] for j in acting[:-1]}
+        return parts | {acting[-1]: -self.c - np.sum(list(parts.values()), axis=0)}
 
     @property
     def half_width(self) -> np.ndarray:
@@ -579,16 +608,8 @@ class StarNorms(NamedTuple):
         )
 
     def start(self, tube: Tube) -> float:
-        """Split the start e = 0 by channel; return the parts' largest level in their ellipsoids, at most 1 inside.
-
-        The start e - c = -c (eq. 25) is the sum of one part for each acting channel: minus the steady response of the
-        mean closed loop to the mid-point of the channel, but the remainder for the last. The paper has no such split.
-        """
-        acting, mean = np.flatnonzero(tube.columns.any(axis=(0, 1))), tube.A.mean(axis=0)
-        terms = np.linalg.solve(mean - np.eye(len(mean)), tube.G.mean(axis=0) * tube.middle).T
-        terms = np.vstack((terms, np.zeros(len(mean))))
-        terms[acting[-1]] = -tube.c - terms[acting[:-1]].sum(axis=0)
-        return max(float(level(Q[j], terms[j])) for Q, j in product(self.Q, acting))
+        """Return the largest level of the parts of the start e = 0 in their ellipsoids; at most 1 inside."""
+        return max(float(level(Q[j], part)) for Q in self.Q for j, part in tube.start_parts().items())
 
 
 def set_checks(subject: Subject) -> Checks:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     import numpy as np
     from rich.table import Table
 
-    from hsv.certificate.checks import Subject
+    from hsv.certificate.checks import Check, Subject
     from hsv.control.design import ControlDesign
     from hsv.control.linear_model import LinearModel
     from hsv.model.lpv.linearisation import Mode
@@ -297,6 +298,7 @@ def verify(
     quick: Annotated[bool, Option("--quick", help="Omit flights and random sequences.")] = False,
     scenario: Annotated[str, Option(help="Fly this scenario, and check level, disturbances, inputs.")] = "",
     corners: Annotated[bool, Option("--corners", help="With --scenario: also corners.")] = False,
+    exact: Annotated[bool, Option("--exact", help="First prove the inequalities in rational numbers.")] = False,
     json: JsonOption = False,
 ) -> None:
     """Recompute what a design and its certificate state, and name the first item that fails.
@@ -306,7 +308,8 @@ def verify(
 
     Example: hsv verify offline_design/baseline.yaml --scenario case1_qp
     """
-    from hsv.certificate.checks import load_subject, unchecked
+    from hsv.certificate.checks import gathered, load_subject, unchecked
+    from hsv.certificate.exact import UNPROVED, exact_checks
     from hsv.control.design_file import find_design
     from hsv.flight.scenario import load_scenario
     from hsv.flight.verification import bounding_corners, scenario_checks
@@ -315,25 +318,33 @@ def verify(
     if corners and not scenario:
         raise QuantityError("corners: expected with --scenario only")
     subject = load_subject(find_design(file))
+    proofs = []
+    # Each proof is printed at once, so that an interruption leaves those that are finished.
+    for proof in gathered("exact arithmetic", partial(exact_checks, subject)) if exact else ():
+        proofs.append(proof)
+        if not json:
+            _say_check(proof)
     with output.stages() as progress:
         checks = recompute(subject, quick or bool(scenario), progress)
         if scenario:
             over = bounding_corners(subject) if corners else [{}]
             checks["scenario"] = list(scenario_checks(subject, load_scenario(scenario), over, progress))
-    rows = [(part, check) for part, made in checks.items() for check in made]
+    rows = [("exact arithmetic", proof) for proof in proofs]
+    rows += [(part, check) for part, made in checks.items() for check in made]
     failing = [(part, check) for part, check in rows if not check.ok]
     stated = unchecked(subject, [check for _, check in rows])
+    unproved = list(UNPROVED) if exact else []
     if json:
         claims = [{"part": part, **vars(check)} for part, check in rows]
-        output.print_json({"claims": claims, "stated": stated, "ok": not failing})
+        not_proved = {"not_proved": unproved} if exact else {}
+        output.print_json({"claims": claims, "stated": stated, **not_proved, "ok": not failing})
     else:
         for part, made in checks.items():
             if made:
                 output.say(Text(part, "bold"))
             for check in made:
-                expected = f", expected {check.expected}" if check.expected else ""
-                line = output.folded(f"{'ok' if check.ok else 'FAIL':4}  {check.name}: {check.shown}{expected}", 8)
-                output.say(line if check.ok else Text(line, "bold red"))
+                _say_check(check)
+        output.say(*(output.folded(f"not proved, {item}") for item in unproved))
         if stated:
             output.say(output.folded(f"stated, not checked: {', '.join(stated)}"))
         output.say(Text(f"{len(rows) - len(failing)} of {len(rows)} checks pass", "bold"))
@@ -341,6 +352,12 @@ def verify(
         part, check = failing[0]
         output.report_error(f"{part}: check fails: {check}")
         raise typer.Exit(1)
+
+
+def _say_check(check: Check) -> None:
+    expected = f", expected {check.expected}" if check.expected else ""
+    line = output.folded(f"{'ok' if check.ok else 'FAIL':4}  {check.name}: {check.shown}{expected}", 8)
+    output.say(line if check.ok else Text(line, "bold red"))
 
 
 def certify(

@@ -16,7 +16,7 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.control.design import PLAN_SHIFT, PlanBounds
-from hsv.design.sets.invariant_set import InvariantSet
+from hsv.design.sets.invariant_set import OUTWARD, InvariantSet
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS
 
 
@@ -63,7 +63,7 @@ def left_by(
     """Return U minus F Z without checking that it is not empty; the arguments are those of :func:`tighten`."""
     system, disturbance = found.problem.system, found.problem.disturbance
     middle = system.F @ found.centre + system.F_d @ disturbance.centre
-    half = found.feedback + np.abs(system.F_d) @ disturbance.half_width
+    half = OUTWARD * (found.feedback + np.abs(system.F_d) @ disturbance.half_width)
     bounds = TightenedInputs(minimum - middle + half, maximum - middle - half)
     return bounds if lag is None else TightenedInputs(bounds.lower - lag[0], bounds.upper - lag[1])
 

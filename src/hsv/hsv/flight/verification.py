@@ -280,6 +280,6 @@ def verify(subject: Subject, quick: bool = False, progress: Progress = lambda *_
     checks: dict[str, list[Check]] = {}
     for name, part in (QUICK | RECOMPUTED | ({} if quick else FLOWN)).items():
         progress(name, 0, 1)
-        checks[name] = gathered(name, partial(part, subject))
+        checks[name] = list(gathered(name, partial(part, subject)))
         progress(name, 1, 1)
     return checks

@@ -38,6 +38,9 @@ from hsv.model.signals import N_RIGID
 _INFLATION = 1.002
 """Factor on Q that keeps the set invariant if the gains change in their sixth digit."""
 
+OUTWARD = 1.0 + 1e-12
+"""Factor on half-widths and on the room for the feedback: after rounding they are still bounds in exact arithmetic."""
+
 
 @dataclass(frozen=True)
 class InvariantSet:
@@ -58,13 +61,13 @@ class InvariantSet:
     @property
     def half_width(self) -> np.ndarray:
         """Half-widths z (n) of Z (paper eq. 28)."""
-        return self._bounds(np.sqrt(np.diag(self.Q)), slice(N_RIGID))
+        return OUTWARD * self._bounds(np.sqrt(np.diag(self.Q)), slice(N_RIGID))
 
     @property
     def feedback(self) -> np.ndarray:
         """Half-range of the feedback F e over Z, for each input."""
         F = self.problem.system.F
-        return self._bounds(np.sqrt(np.einsum("ij,jk,ik->i", F, self.Q, F)), slice(N_RIGID, None))
+        return OUTWARD * self._bounds(np.sqrt(np.einsum("ij,jk,ik->i", F, self.Q, F)), slice(N_RIGID, None))
 
     def _bounds(self, bounds: np.ndarray, rows: slice) -> np.ndarray:
         if self.star_norms:
