@@ -12,7 +12,7 @@ All of them are also names of the package :mod:`hsv`::
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -143,7 +143,15 @@ def trim(
     return trim_at(described.coupled(coupling), *described.condition(altitude, velocity), climb_rate, acceleration)
 
 
-def plot(flights: Flight | Mapping[str, Flight], *, units: str = UnitSystem.metric) -> Figure:
+def plot(
+    flights: Flight | Mapping[str, Flight],
+    *,
+    units: str = UnitSystem.metric,
+    panels: Sequence[str] = (),
+    start: str = "",
+    end: str = "",
+    size: str = "",
+) -> Figure:
     """Return a figure of one or several flights: the paper's eight plots over time, or six if all vehicles are rigid.
 
     Only the first flight's reference is drawn, dotted, and its time from the first fault on is shaded.
@@ -151,12 +159,17 @@ def plot(flights: Flight | Mapping[str, Flight], *, units: str = UnitSystem.metr
     Args:
         flights: One flight, or several by label.
         units: ``metric`` (SI with degrees), ``si`` or ``paper`` (feet and degrees).
+        panels: Names of states and inputs to plot, or their beginnings; empty: the paper's panels.
+        start: First time to plot, with unit; empty: from the start.
+        end: Last time to plot, with unit; empty: to the end.
+        size: Width and height, such as ``85x60mm``; empty: as large as the panels need.
 
     Raises:
-        QuantityError: ``units`` is none of these.
+        QuantityError: ``units`` is none of these, or a time cannot be read.
+        ParameterError: A panel is unknown, the window is empty, or the size is none; the message names it.
     """
     # Imported here, because the import takes a second, and not every script plots.
-    from hsv.pages.plots import flight_figure
+    from hsv.pages.plots import Layout, flight_figure
 
     shown = {"flight": flights} if isinstance(flights, Flight) else flights
-    return flight_figure(shown, unit_system(units))
+    return flight_figure(shown, unit_system(units), layout=Layout.of(panels, start, end, size))

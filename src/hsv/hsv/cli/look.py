@@ -71,25 +71,30 @@ def report(
 def plot(
     bags: Annotated[list[Path], Argument(help="Bags to plot together.")],
     out: Annotated[Path, Option(help="File to write: .png, .svg or .pdf.")] = Path("flight.png"),
+    panels: Annotated[str, Option(help="States and inputs to plot, such as altitude,elevator.")] = "",
+    start: Annotated[str, Option("--from", help="First time to plot, with unit.")] = "",
+    end: Annotated[str, Option("--to", help="Last time to plot, with unit.")] = "",
+    size: Annotated[str, Option(help="Width and height for print, such as 85x60mm.")] = "",
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Plot trajectory, attitude, elastic rates and inputs of recorded flights.
+    """Plot trajectory, attitude, elastic rates and inputs of recorded flights, or the panels of your choice.
 
-    Example: hsv plot bags/case1_20260101T000000Z --units paper --out case1.png
+    Example: hsv plot bags/case1_20260101T000000Z --panels altitude,elevator --size 85x60mm --out case1.pdf
     """
     from hsv.bags.flight import flight_data, labels
     from hsv.bags.reader import Bag
     from hsv.bags.steps import bag_warnings
-    from hsv.pages.plots import flight_figure, save_figure
+    from hsv.pages.plots import Layout, flight_figure, save_figure
 
     check_target(out, "out", ".png", ".svg", ".pdf")
+    layout = Layout.of(panels.split(",") if panels else (), start, end, size)
     opened = [Bag(path) for path in bags]
     named = dict(zip(labels(opened), opened, strict=True))
     flights = {name: flight_data(bag) for name, bag in named.items()}
     remarks = [f"{name}: {'; '.join(words)}" for name, bag in named.items() if (words := bag_warnings(bag))]
     with writing(out, "out"):
-        save_figure(flight_figure(flights, units, remarks), out)
+        save_figure(flight_figure(flights, units, remarks, layout), out)
     output.print_written([out], json)
     output.print_bag_warnings(*opened)
 

@@ -1,9 +1,13 @@
-"""The paper's panels of a flight in one static figure: trajectory, attitude, elastic rates, inputs."""
+"""Panels of flights in one static figure; by default the paper's: trajectory, attitude, elastic rates, inputs."""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from io import BytesIO
+from itertools import cycle
 from pathlib import Path
 from textwrap import fill
 
@@ -11,7 +15,8 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from hsv.base.units import UnitSystem, in_system
+from hsv.base.errors import ParameterError, one_of
+from hsv.base.units import UnitSystem, in_system, parse_quantity
 from hsv.flight.metrics import FlightData
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 
@@ -21,46 +26,119 @@ _STATES = ("altitude", "velocity", "angle_of_attack", "pitch_rate", "elastic_rat
 _REMARK_WIDTH = 130
 """Maximum number of characters in a line of a remark."""
 
+_DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)))
+"""Line styles of the flights, in turn."""
 
-def flight_figure(flights: Mapping[str, FlightData], system: UnitSystem, remarks: Sequence[str] = ()) -> Figure:
+_ONE_COLUMN = 5.0
+"""Width (inches) up to which panels lie below each other, in smaller type: a column of a journal."""
+
+_INCH = 0.0254
+_SMALLEST, _LARGEST = 1.0, 40.0
+"""Limits of a figure's sides (inches)."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The choice of panels, times and size of a figure; the defaults are the paper's panels on a page's width."""
+
+    panels: tuple[str, ...] = ()
+    """Names of states and inputs, or their beginnings; empty: the paper's panels"""
+    start: float = 0.0
+    """First time (s) that is drawn"""
+    end: float = math.inf
+    """Last time (s) that is drawn"""
+    size: tuple[float, float] | None = None
+    """Width and height (inches); None: two columns of panels on 10 inches"""
+
+    @classmethod
+    def of(cls, panels: Sequence[str] = (), start: str = "", end: str = "", size: str = "") -> Layout:
+        """Return the layout that the texts describe: times with unit, a size such as ``85x60mm``.
+
+        Raises:
+            ParameterError: A panel is unknown, the window is empty, or the size is none; the message names it.
+            QuantityError: A time cannot be read.
+        """
+        first = parse_quantity(start, "s", "from") if start else 0.0
+        last = parse_quantity(end, "s", "to") if end else math.inf
+        if not first < last:
+            raise ParameterError(f"from = {start!r}: expected less than to = {end!r}")
+        chosen = []
+        for given in panels:
+            name = given.strip().replace(" ", "_")
+            found = [name] if name in _NAMES else [known for known in _NAMES if name and known.startswith(name)]
+            if len(found) != 1:
+                raise ParameterError(f"panels: {given!r}, expected {one_of(found or _NAMES, name)}")
+            chosen += found
+        if not size:
+            return cls(tuple(chosen), first, last)
+        read = re.fullmatch(r"([\d.]+)x([\d.]+) ?(mm|cm|in)", size)
+        sides = [parse_quantity(f"{side} {read[3]}", "m", "size") / _INCH for side in read.groups()[:2]] if read else []
+        if not sides or not all(_SMALLEST <= side <= _LARGEST for side in sides):
+            raise ParameterError(f"size = {size!r}: expected width x height from 1 to 40 inches, such as 85x60mm")
+        return cls(tuple(chosen), first, last, (sides[0], sides[1]))
+
+
+def flight_figure(
+    flights: Mapping[str, FlightData], system: UnitSystem, remarks: Sequence[str] = (), layout: Layout | None = None
+) -> Figure:
     """Return a figure of panels over time, with one curve per flight.
 
-    There are eight panels, or six if all vehicles are rigid. The references of altitude and velocity are dotted, and
-    the time from the first fault on is shaded; both are those of the first flight.
+    Without a choice in ``layout`` there are eight panels, or six if all vehicles are rigid. The references of altitude
+    and velocity are dotted, and the time from the first fault on is shaded; both are those of the first flight. Curves
+    that coincide stay visible: each flight has its own dashes, the first one lies below the others.
 
     Args:
         flights: The flights by label.
         system: Units of the axes.
         remarks: Remarks on the flights, such as missing steps, printed above the panels.
+        layout: Panels, times and size.
     """
+    layout = layout or Layout()
     histories = {label: np.hstack((flight.history.state, flight.history.command)) for label, flight in flights.items()}
-    panels = [
+    panels = [_NAMES.index(name) for name in layout.panels] or [
         column
         for column in map(_NAMES.index, (*_STATES, *INPUT_NAMES))
         if not _NAMES[column].startswith("elastic") or any(history[:, column].any() for history in histories.values())
     ]
-    rows = (len(panels) + 1) // 2
-    with matplotlib.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
-        figure = Figure(figsize=(10, 2.25 * rows), layout="constrained")
-        axes = figure.subplots(rows, 2, sharex=True).ravel()
+    columns = 2 if len(panels) > 1 and (not layout.size or layout.size[0] > _ONE_COLUMN) else 1
+    rows = -(-len(panels) // columns)
+    points = 9 if not layout.size or layout.size[0] > _ONE_COLUMN else 7
+    with matplotlib.rc_context({"font.size": points, "axes.spines.top": False, "axes.spines.right": False}):
+        figure = Figure(figsize=layout.size or (5.0 * columns, 2.25 * rows), layout="constrained")
+        axes = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         first = next(iter(flights.values()))
-        for axis, column in zip(axes, panels, strict=True):
+        for axis, column in zip(axes, panels, strict=False):
             factor, shown = in_system(1.0, _UNITS[column], system)
-            for name, flight in flights.items():
-                axis.plot(flight.time, factor * histories[name][:, column], linewidth=1.1, label=name)
+            for (name, flight), dashes in zip(flights.items(), cycle(_DASHES), strict=False):
+                drawn = (flight.time >= layout.start) & (flight.time <= layout.end)
+                curve = factor * histories[name][drawn, column]
+                axis.plot(flight.time[drawn], curve, linewidth=1.1, linestyle=dashes, label=name)
+            drawn = (first.time >= layout.start) & (first.time <= layout.end)
             if _NAMES[column] in ("altitude", "velocity"):
-                axis.plot(first.time, factor * first.reference[:, column], "k:", linewidth=1.0, label="reference")
-            if first.fault_start is not None:
-                axis.axvspan(first.fault_start, first.time[-1], color="tab:red", alpha=0.06, linewidth=0)
+                reference = factor * first.reference[drawn, column]
+                axis.plot(first.time[drawn], reference, "k:", linewidth=1.0, label="reference")
+            if first.fault_start is not None and first.fault_start < first.time[drawn].max(initial=0.0):
+                begun = max(first.fault_start, layout.start)
+                axis.axvspan(begun, first.time[drawn][-1], color="tab:red", alpha=0.06, linewidth=0)
             unit = "" if _UNITS[column] == "1" else f" [{_mathtext(shown)}]"
-            axis.set_title(_NAMES[column].replace("_", " ") + unit, loc="left", fontsize=9)
+            axis.set_title(_NAMES[column].replace("_", " ") + unit, loc="left", fontsize=points)
             axis.grid(alpha=0.25, linewidth=0.5)
             axis.margins(x=0)
+            axis.ticklabel_format(useOffset=False)
+        for axis in axes[len(panels) :]:
+            axis.set_visible(False)
         if remarks:
             figure.suptitle("\n".join(fill(remark, _REMARK_WIDTH) for remark in remarks), fontsize=8, color="tab:red")
-        axes[0].legend(frameon=False, loc="lower right")
-        for axis in axes[-2:]:
+        if layout.size:
+            labels = {
+                label: handle for axis in axes for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
+            }
+            figure.legend(labels.values(), labels, loc="outside upper left", ncols=2 * columns, frameon=False)
+        else:
+            axes[0].legend(frameon=False, loc="lower right")
+        for axis in axes[max(len(panels) - columns, 0) : len(panels)]:
             axis.set_xlabel("time [s]")
+            axis.tick_params(labelbottom=True)
     return figure
 
 
@@ -69,7 +147,8 @@ def save_figure(figure: Figure, path: Path) -> None:
     metadata: dict[str, str | None] = {}
     if path.suffix in (".svg", ".pdf"):
         metadata = {"Date" if path.suffix == ".svg" else "CreationDate": None}
-    with matplotlib.rc_context({"svg.hashsalt": "hsv"}):
+    # Text stays text, which an editor or a search finds.
+    with matplotlib.rc_context({"svg.hashsalt": "hsv", "pdf.fonttype": 42}):
         # Render in memory first: on a full disk, the exceptions of matplotlib would depend on the format.
         whole = BytesIO()
         figure.savefig(whole, format=path.suffix[1:], dpi=110, metadata=metadata)
