@@ -22,7 +22,6 @@ angle. With trims at q_r = 0 the defect would have to contain the whole turn.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Self
 
@@ -30,7 +29,7 @@ import numpy as np
 
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, check_lengths, validate
-from hsv.core import Struct, doubles, lib, vector
+from hsv.core import Struct, doubles, ffi, lib, vector
 from hsv.model.dynamics import VehicleParameters, vehicle_struct
 from hsv.model.signals import N_INPUTS, N_STATES
 from hsv.model.trim import CONVERGED, INITIAL_GUESS, check_equilibrium
@@ -99,24 +98,19 @@ class ReferenceTrajectory:
             ParameterError: The arrays have different lengths, times decrease, or the commands cannot be blended.
             TrimError: There is no equilibrium within the input limits at some step; the message names the time.
         """
-        commands = _commands(times, altitudes, velocities)
-        instants = _in_steps(np.asarray(times, float), period)
-        blends = _blends(times, blend)
-        half = blends / period
-        first = max(0, math.ceil(instants[0] - half[0]) - 2)
-        steps = np.arange(first, max(first, math.ceil(instants[-1] + half[-1])) + 1)
-        command, slope = _evaluate(instants, commands, steps)
-        bend = np.zeros(len(steps))
-        if np.any(half):
-            _blend(instants, commands, steps, half, command, slope, bend)
-        # A static trim has neither climb rate nor acceleration nor turn.
-        rate, bend = (slope / period, bend / (period * period)) if trim == "climbing" else (0.0 * slope, 0.0 * bend)
-        rows = len(steps)
+        _check_commands(times, altitudes, velocities)
+        corners = vector(np.column_stack((times, altitudes, velocities, _blends(times, blend))))
+        start = ffi.new("int64_t *")
+        rows = lib.hsv_reference_steps(len(corners), doubles(corners), period, start)
+        first = int(start[0])
+        command, rate, bend = np.empty((rows, 2)), np.empty((rows, 2)), np.empty(rows)
+        moving = map(doubles, (command, rate, bend))
+        lib.hsv_commands(len(corners), doubles(corners), period, trim == "climbing", first, rows, *moving)
         arrays = {name: np.zeros((rows, N_STATES)) for name in ("state", "defect")}
         self.data = Struct("hsv_reference", first=first, input=np.zeros((rows, N_INPUTS)), **arrays)
         """x_r (r, 9), u_r (r, 2), d_r (r, 9) from step ``first`` on; steps before and after equal the nearest row."""
         self._along: Struct | None = None
-        self.corners = tuple(map(Corner, *(map(float, column) for column in (times, altitudes, velocities, blends))))
+        self.corners = tuple(Corner(*corner) for corner in corners.tolist())
         """The corners of the commands in order of time."""
         size, inputs = np.full(rows, np.inf), self.data.input
         lib.hsv_reference_rows(
@@ -131,7 +125,7 @@ class ReferenceTrajectory:
         for row in np.flatnonzero(~good)[:1]:
             climb, acceleration = rate[row]
             where = (
-                f"reference at {steps[row] * period:.6g} s: altitude = {command[row, 0]:.6g} m, "
+                f"reference at {(first + row) * period:.6g} s: altitude = {command[row, 0]:.6g} m, "
                 f"velocity = {command[row, 1]:.6g} m/s, climb rate = {climb:.6g} m/s, "
                 f"acceleration = {acceleration:.6g} m/s^2"
             )
@@ -186,7 +180,7 @@ class ReferenceTrajectory:
         return np.asarray(self.data.state[-1])
 
 
-def _commands(times: Sequence[float], altitudes: Sequence[float], velocities: Sequence[float]) -> np.ndarray:
+def _check_commands(times: Sequence[float], altitudes: Sequence[float], velocities: Sequence[float]) -> None:
     if not len(times):
         raise ParameterError("parameter reference.times: empty, expected at least one time")
     columns = {"reference.times": times, "reference.altitudes": altitudes, "reference.velocities": velocities}
@@ -194,7 +188,6 @@ def _commands(times: Sequence[float], altitudes: Sequence[float], velocities: Se
     for index, (before, after) in enumerate(itertools.pairwise(times), start=1):
         if after < before:
             raise ParameterError(f"parameter reference.times[{index}] = {after:g}: expected at least {before:g}")
-    return np.column_stack((np.asarray(altitudes, float), np.asarray(velocities, float)))
 
 
 def _blends(times: Sequence[float], blend: float | Sequence[float]) -> np.ndarray:
@@ -218,55 +211,3 @@ def _blends(times: Sequence[float], blend: float | Sequence[float]) -> np.ndarra
         if half > 0.0 and time in (*times[:index][-1:], *times[index + 1 :][:1]):
             raise ParameterError(f"{where}: expected 0 with a step, as at {time:g} s, or a ramp in its place")
     return blends
-
-
-def _blend(
-    instants: np.ndarray,
-    commands: np.ndarray,
-    steps: np.ndarray,
-    half: np.ndarray,
-    command: np.ndarray,
-    slope: np.ndarray,
-    bend: np.ndarray,
-) -> None:
-    """Add the blends to ``command`` (r, 2), its ``slope`` (r, 2) and the altitude's second derivative ``bend`` (r).
-
-    These arrays change in place; their rows are for the ``steps`` (r). At the times ``instants`` (b) are the corners,
-    with altitude and velocity ``commands`` (b, 2) and blends of half-width ``half`` (b). All times are in steps.
-    """
-    before = np.zeros(commands.shape[1])
-    for index in range(len(instants)):
-        after = np.zeros_like(before)
-        if index + 1 < len(instants) and instants[index + 1] > instants[index]:
-            after = (commands[index + 1] - commands[index]) / (instants[index + 1] - instants[index])
-        change, width = after - before, half[index]
-        before = after
-        if width == 0.0:
-            continue
-        since = steps - instants[index]
-        left = np.maximum(width - np.abs(since), 0.0)[:, None]
-        command += change * (left * left * left / (6.0 * width * width))
-        slope += np.where(since[:, None] < 0.0, change, -change) * (left * left / (2.0 * width * width))
-        bend += change[0] * (left[:, 0] / (width * width))
-
-
-def _in_steps(times: np.ndarray, period: float) -> np.ndarray:
-    """Return ``times`` (s) in steps; a value that differs from an integer only by rounding becomes that integer."""
-    steps = times / period
-    nearest = np.round(steps)
-    return np.where(np.abs(steps - nearest) < 1e-9 * np.maximum(1.0, nearest), nearest, steps)
-
-
-def _evaluate(instants: np.ndarray, commands: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return altitude and velocity (r, 2) at the integer ``steps`` (r), and their change per step (r, 2) from there on.
-
-    The corners have the times ``instants`` (b), in steps, and the altitudes and velocities ``commands`` (b, 2).
-    """
-    piece = np.searchsorted(instants, steps, side="right") - 1
-    start, stop = np.clip(piece, 0, None), np.clip(piece + 1, None, len(instants) - 1)
-    length = instants[stop] - instants[start]
-    inside = (piece >= 0) & (length > 0.0)
-    slope = np.zeros((len(steps), commands.shape[1]))
-    slope[inside] = (commands[stop] - commands[start])[inside] / length[inside, None]
-    since = np.where(inside, steps - instants[start], 0.0)
-    return commands[start] + slope * since[:, None], slope

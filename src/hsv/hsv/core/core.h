@@ -280,6 +280,9 @@ void hsv_transitions(int64_t count, const double *x, const double *u, const doub
 void hsv_solve(int64_t n, int64_t m, double *A, double *b);
 double hsv_balance(const hsv_vehicle *rigid, double path_angle, double acceleration, double pitch_rate, double *unknown,
                    double *x, double *u);
+int64_t hsv_reference_steps(int64_t count, const double *corners, double period, int64_t *first);
+void hsv_commands(int64_t count, const double *corners, double period, int climbing, int64_t first, int64_t rows,
+                  double *command, double *rate, double *bend);
 void hsv_reference_rows(const hsv_vehicle *rigid, int64_t rows, const double *command, const double *rate,
                         const double *bend, const double *guess, double period, int64_t substeps, double *state,
                         double *input, double *defect, double *imbalance);

@@ -86,6 +86,69 @@ double hsv_balance(const hsv_vehicle *rigid, double path_angle, double accelerat
 
 static int equal(const double *a, const double *b) { return a[0] == b[0] && a[1] == b[1]; }
 
+enum { CORNER = 4 }; /* numbers of a corner of the commands: time, altitude, velocity, half-width of its blend */
+
+/* Return a time (s) in steps; a value that differs from an integer only by rounding becomes that integer. */
+static double in_steps(double time, double period)
+{
+    const double steps = time / period, nearest = (steps + 0x1.8p52) - 0x1.8p52;
+    return magnitude(steps - nearest) < 1e-9 * maximum(1.0, nearest) ? nearest : steps;
+}
+
+static int64_t rounded_up(double x) { return (int64_t)x + ((double)(int64_t)x < x); }
+
+/* Return the number of steps from before the first to after the last of the corners (count, 4); write the first. */
+int64_t hsv_reference_steps(int64_t count, const double *corners, double period, int64_t *first)
+{
+    const double *last = corners + CORNER * (count - 1);
+    const int64_t begin = rounded_up(in_steps(corners[0], period) - corners[3] / period) - 2;
+    const int64_t end = rounded_up(in_steps(last[0], period) + last[3] / period);
+    *first = begin > 0 ? begin : 0;
+    return (end > *first ? end : *first) + 1 - *first;
+}
+
+/* Write the commands of altitude and velocity (rows, 2) from step "first" on, their rates (rows, 2) and the vertical
+ * acceleration (rows): linear between the corners (count, 4), which are blended as hsv.control.reference_trajectory
+ * explains. A static trim has neither climb rate nor acceleration nor turn. */
+void hsv_commands(int64_t count, const double *corners, double period, int climbing, int64_t first, int64_t rows,
+                  double *command, double *rate, double *bend)
+{
+    for (int64_t row = 0, passed = 0; row < rows; row++) {
+        const double k = (double)(first + row);
+        while (passed < count && in_steps(corners[CORNER * passed], period) <= k) passed++;
+        const double *start = corners + CORNER * (passed > 0 ? passed - 1 : 0), *stop = start + CORNER;
+        const double begun = in_steps(start[0], period);
+        for (int j = 0; j < 2; j++) {
+            const double slope = passed > 0 && passed < count
+                                     ? (stop[1 + j] - start[1 + j]) / (in_steps(stop[0], period) - begun)
+                                     : 0.0;
+            command[2 * row + j] = start[1 + j] + slope * (k - begun);
+            rate[2 * row + j] = slope;
+        }
+        bend[row] = 0.0;
+    }
+    double change[2], before[2] = {0.0, 0.0};
+    for (const double *corner = corners, *end = corners + CORNER * count; corner < end; corner += CORNER) {
+        const double at = in_steps(corner[0], period), width = corner[3] / period;
+        const double length = corner + CORNER < end ? in_steps(corner[CORNER], period) - at : 0.0;
+        for (int j = 0; j < 2; j++) {
+            const double after = length > 0.0 ? (corner[CORNER + 1 + j] - corner[1 + j]) / length : 0.0;
+            change[j] = after - before[j], before[j] = after;
+        }
+        for (int64_t row = 0; row < rows && width != 0.0; row++) {
+            const double since = (double)(first + row) - at, left = maximum(width - magnitude(since), 0.0);
+            for (int j = 0; j < 2; j++) {
+                command[2 * row + j] += change[j] * (left * left * left / (6.0 * width * width));
+                rate[2 * row + j] += (since < 0.0 ? change[j] : -change[j]) * (left * left / (2.0 * width * width));
+            }
+            bend[row] += change[0] * (left / (width * width));
+        }
+    }
+    const double moving = climbing ? 1.0 : 0.0;
+    for (int64_t i = 0; i < 2 * rows; i++) rate[i] = moving * (rate[i] / period);
+    for (int64_t i = 0; i < rows; i++) bend[i] = moving * (bend[i] / (period * period));
+}
+
 /* Write x_r (rows, 9), u_r (rows, 2), the defect d_r (rows, 9) and the residuals of the trims (rows), for commands of
  * altitude and velocity (rows, 2), their rates (rows, 2), and the vertical acceleration "bend" (rows). A row of d_r is
  * the state one period after x_r with u_r held, minus the next x_r. "guess" (3) starts Newton's method. */
