@@ -6,7 +6,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hsv.base.errors import QuantityError
-from hsv.base.units import _KNOWN, PAPER_UNITS, _squared, factor, parse_quantity, percent, square_by_pint, to_paper
+from hsv.base.units import (
+    _KNOWN,
+    PAPER_UNITS,
+    _squared,
+    factor,
+    in_unit_of,
+    parse_quantity,
+    percent,
+    square_by_pint,
+    to_paper,
+)
 from hsv.cli.output import unit_key
 from hsv.flight.metrics import METRICS
 from hsv.model.signals import INPUT_UNITS, STATE_UNITS
@@ -39,10 +49,11 @@ def test_quantities_become_si(text, unit, value):
         ("__import__('os')", "m", "no number"),
         ("nan ft", "m", "no number"),
         ("1e999 ft", "m", "expected a finite quantity"),
-        # Angles need a unit, ratios are not lengths, and a frequency is not an angular frequency.
+        # Angles need a unit, and ratios are not lengths.
         ("12", "rad", "the unit is missing"),
         ("10 %", "m", "wrong unit"),
-        ("15 Hz", "rad/s", "wrong unit"),
+        ("15 1/s", "rad/s", "wrong unit"),
+        ("15 Hz", "rad", "wrong unit"),
         (True, "1", "expected a finite quantity"),
         (None, "m", "expected a finite quantity"),
     ],
@@ -54,6 +65,13 @@ def test_what_is_not_such_a_quantity_is_refused_by_name(text, unit, problem):
     assert message.startswith(f"some.field = {text!r}: {problem}")
     assert "expected a finite quantity such as" in message
     assert "\n" not in message
+
+
+def test_cycles_a_second_are_an_angular_frequency_where_one_is_expected():
+    assert parse_quantity("15 Hz", "rad/s", "field") == pytest.approx(30.0 * math.pi, rel=1e-15)
+    assert parse_quantity("0.5 kHz", "rad/s", "field") == pytest.approx(1000.0 * math.pi, rel=1e-15)
+    assert parse_quantity("1 Hz", "s^-1", "field") == 1.0
+    assert in_unit_of([math.pi], "rad/s", "15 Hz") == ([0.5], " Hz")
 
 
 @settings(max_examples=100)

@@ -221,6 +221,10 @@ def test_definitions_may_have_the_line_ends_of_windows_or_be_empty(hsv, bag, tmp
     assert "identical" in hsv("diff", str(bag), str(made)).out
     assert hsv("info", str(made)).code == 0
     assert hsv("export", str(made), "--csv", "--topic", "/hsv/state", "--out", "tables").code == 0
+    assert hsv("export", str(made), "--topic", "/hsv/state", "--out", "state.mat").out.split() == [
+        "written",
+        "state.mat",
+    ]
     assert '"altitude [m]"' in (tmp_path / "tables" / "hsv_state.csv").read_text()
 
 

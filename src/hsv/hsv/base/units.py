@@ -87,7 +87,7 @@ def rounded(value: float) -> float:
 @cache
 def factor(unit: str, to: str) -> float:
     """Return the factor that converts a value in ``unit`` into one in ``to``, a unit of the same dimension."""
-    return _scaled(Fraction(1), _squared(unit)[0] / _squared(to)[0])
+    return _scaled(Fraction(1), _squared_ratio(unit, to)[0])
 
 
 def unit_system(name: str) -> UnitSystem:
@@ -213,7 +213,7 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
 
     Raises:
         QuantityError: The text cannot be read, its unit has another dimension, or the value is not finite. Radians
-            count as a dimension: an angle needs its unit, and "15 Hz" is refused where rad/s are expected.
+            count as a dimension: an angle needs its unit. Where rad/s are expected, "15 Hz" means 15 cycles a second.
     """
     expected = f"expected a finite quantity such as {_EXAMPLES.get(unit, f'1.0 {unit}')!r}"
     if isinstance(text, bool) or not isinstance(text, str | int | float):
@@ -246,8 +246,20 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
 def _converted(text: str, unit: str) -> float | None:
     """Return the quantity ``text`` in ``unit``, or ``None`` if the dimensions differ; cached for campaigns."""
     number, written = _number_and_unit(text)
-    (square, dimension), (other_square, other) = _squared(written), _squared(unit)
-    return _scaled(number, square / other_square) if dimension == other else None
+    square, dimension = _squared_ratio(written, unit)
+    return None if dimension else _scaled(number, square)
+
+
+def _squared_ratio(unit: str, to: str) -> Square:
+    """Return the square of ``unit`` over that of ``to``; the dimension is empty if one can be converted to the other.
+
+    A number of Hz is one of cycles, of 2 pi rad each, where the other unit is one of an angular frequency.
+    """
+    (square, dimension), (other_square, other) = _squared(unit), _squared(to)
+    for name, own, opposite, sign in ((unit, dimension, other, 1), (to, other, dimension, -1)):
+        if name.endswith("Hz") and opposite == (("rad", 2), *own):
+            return square / other_square * (2 * _PI) ** (2 * sign), ()
+    return square / other_square, () if dimension == other else (*dimension, *other)
 
 
 def _number_and_unit(text: str) -> tuple[Fraction, str]:

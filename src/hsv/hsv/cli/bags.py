@@ -253,9 +253,11 @@ def export(
     if form and form not in formats:
         raise ParameterError(f"format = {form!r}: expected {one_of(formats, form)}")
     flags = {"csv": csv, "parquet": parquet, "npz": npz, form: bool(form)}
+    if out and not scene and not any(flags.values()) and out.suffix[1:] in formats:
+        flags[out.suffix[1:]] = True
     chosen = [tables.Format(name) for name, given in flags.items() if given]
     if len(chosen) + scene != 1:
-        raise ParameterError("format: expected one of --csv, --parquet, --npz and --scene, or --format mat")
+        raise ParameterError("format: choose --csv, --parquet, --npz, --scene or --format mat, or a suffix of --out")
     opened = Bag(bag)
     if scene:
         from hsv.pages.airframe.export import scene_path, write_scene
