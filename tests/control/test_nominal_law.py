@@ -7,7 +7,6 @@ import pytest
 
 from hsv.control.design_file import find_design, read_design
 from hsv.control.nominal_law import (
-    MEMBERSHIP_TOLERANCE,
     NOT_IN_FAMILY,
     SOLVE_STEPS,
     FamilyLaw,
@@ -16,13 +15,14 @@ from hsv.control.nominal_law import (
 )
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.reference_trajectory import ReferenceTrajectory
+from hsv.core import lib
 from hsv.lmi.nominal_gain import NominalProblem, nominal_gain
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 
 SMOOTH = read_design(find_design("smooth"))
 SWITCHED = dataclasses.replace(SMOOTH, interpolated=False)
-BOUNDARY = 1.0 + MEMBERSHIP_TOLERANCE
+BOUNDARY = lib.MEMBERSHIP_BOUNDARY
 
 
 def on_boundary(index, rng):

@@ -6,7 +6,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import ParameterError
-from hsv.control.notch_filter import MAX_SECTIONS, NOTCH_PARAMETERS, NotchFilter, NotchSection, series
+from hsv.control.notch_filter import NOTCH_PARAMETERS, NotchFilter, NotchSection, series
+from hsv.core import lib
 
 PERIOD = 0.02
 BASELINE = NotchSection(15.0, 0.02, 15.0, 0.5)
@@ -99,7 +100,7 @@ def test_a_centre_the_samples_cannot_show_is_refused(frequency):
     [
         ("notch.zero_frequency", [15], "parameter notch.zero_frequency[0] = 15: expected double array"),
         ("notch.zero_frequency", [], "parameter notch.zero_damping: 1 values, expected as many as"),
-        ("notch.zero_frequency", [15.0] * (MAX_SECTIONS + 1), "parameter notch.zero_frequency: 5 values, expected"),
+        ("notch.zero_frequency", [15.0] * (lib.MAX_SECTIONS + 1), "parameter notch.zero_frequency: 5 values, expected"),
         ("notch.pole_damping", [0.0], "parameter notch.pole_damping[0] = 0.0: expected"),
     ],
 )

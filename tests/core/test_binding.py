@@ -10,11 +10,12 @@ from flights import components
 from hsv.base.errors import ParameterError
 from hsv.control.nominal_law import level
 from hsv.control.notch_filter import NotchSection, discretise
-from hsv.core import Struct, ffi, fly, instruction_set, lanes, loop_memory
+from hsv.core import Struct, compare_enumerators, ffi, fly, instruction_set, lanes, loop_memory
 from hsv.core.arithmetic import solve
 from hsv.flight.closed_loop import flight_struct
 from hsv.flight.history import History
 from hsv.model.dynamics import VehicleParameters, derivative, jacobian, vehicle_struct
+from hsv.model.faults.table import FAULT_KINDS
 from hsv.model.vehicle import load_vehicle
 
 NOTCH = discretise([NotchSection(15.0, 0.02, 15.0, 0.5), NotchSection(20.0, 0.05, 21.0, 0.6)], 0.02)
@@ -25,6 +26,13 @@ def test_fields_of_the_vehicle_are_those_of_the_core_in_its_order():
     vehicle = load_vehicle().coupled()
     struct = vehicle_struct(vehicle)
     assert tuple(getattr(struct.pointer, name) for name in vehicle._fields) == vehicle
+
+
+def test_enumerators_that_differ_from_those_of_the_core_are_named():
+    numbers = {kind.enumerator: kind.code for kind in FAULT_KINDS.values()}
+    compare_enumerators("hsv_fault_kind", numbers)
+    with pytest.raises(ImportError, match=r"^enum hsv_fault_kind of the core: BIAS = 9, BIAS = 26, NEW = 27, expected"):
+        compare_enumerators("hsv_fault_kind", numbers | {"BIAS": 26, "NEW": 27})
 
 
 @pytest.mark.parametrize(

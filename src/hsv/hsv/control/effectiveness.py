@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsv.base.parameters import Parameter, validate
-from hsv.core import Struct
+from hsv.core import Struct, lib
 from hsv.model.dynamics import vehicle_struct
 from hsv.model.trim import INITIAL_PARAMETERS, initial_trim
 from hsv.model.vehicle import VEHICLE_PARAMETERS, Vehicle
@@ -38,9 +38,6 @@ EFFECTIVENESS_PARAMETERS = (
 
 WATCHED_PARAMETERS = (*INITIAL_PARAMETERS, *VEHICLE_PARAMETERS)
 """Parameters of the nominal vehicle and of the initial trim, which the estimator needs."""
-
-_MODE = 7
-"""Index of the mode in the field ``known`` of ``hsv_tube_memory``."""
 
 
 class EffectivenessMode(IntEnum):
@@ -104,4 +101,4 @@ def effectiveness_data(values: Mapping[str, Any], period: float) -> Struct | Non
 def effectiveness_in(memory: np.ndarray) -> Effectiveness:
     """Return the estimated effectiveness in the ``memory`` of the tube law, a record ``hsv_tube_memory``."""
     estimate, low, high = memory["known"][:3].tolist()
-    return Effectiveness(estimate, low, high, EffectivenessMode(int(memory["known"][_MODE])))
+    return Effectiveness(estimate, low, high, EffectivenessMode(int(memory["known"][lib.MODE])))

@@ -13,9 +13,6 @@ from hsv.control.design import ControlDesign
 from hsv.core import Struct, doubles, ffi, lib, vector
 from hsv.model.signals import N_RIGID, N_STATES
 
-MEMBERSHIP_TOLERANCE = 1e-6
-"""Relative tolerance of x' P x <= 1, as in ``core/nominal.h``; x_n(0) lies on the outermost boundary."""
-
 NOT_IN_FAMILY = 255
 """Index of a gain that does not belong to the nested family of the design."""
 

@@ -16,8 +16,6 @@ from hsv.core import Struct, doubles, lib
 from hsv.core.arithmetic import solve, tangent
 from hsv.model.signals import PITCH_RATE
 
-MAX_SECTIONS = 4
-
 DESIGN_NOTCH_PARAMETERS = (
     Parameter("period", 0.02, "control period T", "s", 1e-4, 1.0),
     Parameter("notch.zero_frequency", [15.0], "centre of the notch, one value per section", "rad/s", 0.1, 1e3),
@@ -176,10 +174,10 @@ def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
     standard = next((p for p in chosen if p in DESIGN_NOTCH_PARAMETERS), chosen[0])
     n = len(v[standard.name])
     for parameter, column in zip(chosen, columns, strict=True):
-        if len(column) != n or n > MAX_SECTIONS:
+        if len(column) != n or n > lib.MAX_SECTIONS:
             raise ParameterError(
                 f"parameter {parameter.name}: {len(column)} values, "
-                f"expected as many as {standard.name}, {n} (at most {MAX_SECTIONS})"
+                f"expected as many as {standard.name}, {n} (at most {lib.MAX_SECTIONS})"
             )
     return tuple(NotchSection(*row) for row in zip(*columns, strict=True))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from operator import index
@@ -24,6 +24,7 @@ from hsv.core._core import ffi, lib
 __all__ = [
     "Callback",
     "Struct",
+    "compare_enumerators",
     "doubles",
     "dtype",
     "ffi",
@@ -112,6 +113,18 @@ def dtype(kind: str) -> np.dtype[Any]:
             "itemsize": ffi.sizeof(kind),
         }
     )
+
+
+def compare_enumerators(kind: str, numbers: Mapping[str, int]) -> None:
+    """Compare the enumerators of ``enum kind`` in core.h with the ``numbers`` by name of a table in Python.
+
+    Raises:
+        ImportError: They differ: the core was built from other sources than the table.
+    """
+    compiled = ffi.typeof(f"enum {kind}").relements
+    if differing := sorted({*compiled.items()} ^ {*numbers.items()}):
+        listed = ", ".join(f"{name} = {number}" for name, number in differing)
+        raise ImportError(f"enum {kind} of the core: {listed}, expected the same in core.h and in Python; make setup")
 
 
 def vector(value: Any) -> np.ndarray:

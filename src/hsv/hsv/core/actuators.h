@@ -57,9 +57,9 @@ void hsv_actuator_step(int64_t order, const double *map, const double *state, do
 }
 
 /* Return the position of an effector with a fault, "elapsed" (s) after the start of the fault and "since" (s) after its
- * last onset. */
+ * last onset. If the fault replaces the position, set "held": whether the actuator is held there, too. */
 static double deflected(const hsv_fault *fault, const hsv_fault_memory *memory, double elapsed, double since,
-                        double alpha, double position)
+                        double alpha, double position, int *held)
 {
     const double *p = fault->parameter;
     switch (fault->code) {
@@ -71,12 +71,13 @@ static double deflected(const hsv_fault *fault, const hsv_fault_memory *memory, 
         const double turns = p[1] * elapsed;
         double sine, cosine;
         sine_cosine(6.283185307179586 * (turns - __builtin_floor(turns)) + p[2], &sine, &cosine);
-        return (fault->code == OSCILLATION ? position : memory->kept) + p[0] * sine;
+        if (fault->code == OSCILLATION) return position + p[0] * sine;
+        return *held = 1, memory->kept + p[0] * sine;
     }
-    case LOCK: return memory->kept;
-    case LOCK_AT: return p[0];
-    case FLOAT: /* zero, or aligned with the flow */ return -p[0] * alpha;
-    case HARD_OVER: return memory->kept + p[0] * since;
+    case LOCK: return *held = 1, memory->kept;
+    case LOCK_AT: return *held = 1, p[0];
+    case FLOAT: /* zero, or aligned with the flow */ return *held = 0, -p[0] * alpha;
+    case HARD_OVER: return *held = 1, memory->kept + p[0] * since;
     }
     return position;
 }
@@ -114,21 +115,20 @@ void hsv_move_effectors(const hsv_actuators *actuators, double *state, hsv_fault
         hsv_actuator_step(order, map, own, command[channel], low, high, rate, actuators->acceleration_limit[channel], h,
                           moved);
         double position = moved[2];
-        int replaced = 0;
+        int held = 0;
         for (int64_t i = 0; i < faults->count; i++) {
             const hsv_fault *fault = &faults->rows[i];
             hsv_fault_memory *memory = &faults->memory[i];
-            if (!memory->acting || fault->channel != channel || fault->code < SCALE) continue;
+            if (!memory->acting || fault->channel != channel) continue;
             if (memory->onset == (double)k && substep == 0.0) memory->kept = effector[channel];
-            if (fault->code >= LOCK) replaced = fault->code != FLOAT;
             const double elapsed = ((double)k - fault->start) * faults->period + middle;
             const double since = ((double)k - memory->onset) * faults->period + middle;
-            position = deflected(fault, memory, elapsed, since, alpha, position);
+            position = deflected(fault, memory, elapsed, since, alpha, position, &held);
         }
         position = limited(position, actuators->minimum[channel], actuators->maximum[channel]);
-        /* If a fault replaces the position, the actuator is held there and continues from there after the fault. */
-        own[POSITION] = replaced ? position : moved[0];
-        own[RATE] = replaced ? 0.0 : moved[1];
+        /* An actuator that is held continues from there after the fault. */
+        own[POSITION] = held ? position : moved[0];
+        own[RATE] = held ? 0.0 : moved[1];
         effector[channel] = position;
     }
 }

@@ -27,6 +27,8 @@ own = shlex.split(os.environ.get("HSV_CFLAGS", ""))
 header = (FOLDER / "core.h").read_text(encoding="utf-8")
 visible = header.split("/* begin */")[1].split("/* end */")[0]
 
+visible = re.sub(r"(static const double \w+) = [^;]+;", r"\1;", visible)  # cffi reads the value from the compiled core
+
 ffibuilder = FFI()
 ffibuilder.cdef(re.sub(r"#include \"(.*)\"", lambda found: (FOLDER / found[1]).read_text(encoding="utf-8"), visible))
 ffibuilder.cdef('extern "Python" int32_t hsv_call_python(int64_t, const double *, double *, double *, const double *);')

@@ -7,8 +7,15 @@
 /* begin */
 typedef double number;
 /* Numbers of states, inputs, rigid-body states (the first of the states), and conditions of air and engine; maximum
- * number of sections of the notch filter and of steps of a delay; number of states with integral action. */
+ * number of sections of the notch filter, and of steps of a delay, latency or jitter; number of states with integral
+ * action; substeps of a period for actuators that are not ideal. */
 enum { STATES = 9, INPUTS = 2, RIGID = 5, CONDITIONS = 7, MAX_SECTIONS = 4, MAX_DELAY = 50, INTEGRATED = 2 };
+enum { ACTUATOR_SUBSTEPS = 4 };
+/* Magnitude (SI) above which the receiver of a link regards a number as corrupted. */
+enum { LARGEST = 1000000 };
+/* Largest x' P x of a state inside an ellipsoid: 1 with a tolerance, because by design the first deviation lies on the
+ * boundary of the outermost ellipsoid. */
+static const double MEMBERSHIP_BOUNDARY = 1.0 + 1e-6;
 /* Columns of the history and of the auxiliary history, see hsv.flight.history; entries of a model summed at a time. */
 enum { HISTORY = 25, AUXILIARY = 3, SUMS = 12 };
 enum { ACTED = 21 };         /* first column of the history that the second half of a step writes */
@@ -17,12 +24,16 @@ enum { ALTITUDE, VELOCITY, ALPHA, PITCH, PITCH_RATE, ETA_1, ETA_1_RATE, ETA_2, E
 enum { FUEL, ELEVATOR };
 
 /* clang-format off */
-/* Kinds of faults in the order of composition: of the command, an actuator, an effector, the engine and a sensor. */
-enum {
-    LOSS, REVERSAL, DELAY, DEAD_ZONE, BACKLASH, BANDWIDTH, RATE_LIMIT, STOP_LIMIT,
-    SCALE, BIAS, DRIFT, OSCILLATION, LOCK, LOCK_AT, FLOAT, HARD_OVER, SOLID_OSCILLATION,
-    THRUST_LOSS, UNSTART, UNSTART_OUTSIDE,
-    SENSOR_SCALE, SENSOR_NOISE, SENSOR_BIAS, SENSOR_RUNAWAY, SENSOR_DROP_OUT, SENSOR_FREEZE
+/* Kinds of faults: of the command, an actuator, an effector, the engine and a sensor. hsv.model.faults.table has the
+ * same numbers, and the order of composition. Never change a number: random numbers of a flight depend on it. */
+enum hsv_fault_kind {
+    LOSS = 0, REVERSAL = 1, DELAY = 2, DEAD_ZONE = 3, BACKLASH = 4,
+    BANDWIDTH = 5, RATE_LIMIT = 6, STOP_LIMIT = 7,
+    SCALE = 8, BIAS = 9, DRIFT = 10, OSCILLATION = 11,
+    LOCK = 12, LOCK_AT = 13, FLOAT = 14, HARD_OVER = 15, SOLID_OSCILLATION = 16,
+    THRUST_LOSS = 17, UNSTART = 18, UNSTART_OUTSIDE = 19,
+    SENSOR_SCALE = 20, SENSOR_NOISE = 21, SENSOR_BIAS = 22, SENSOR_RUNAWAY = 23, SENSOR_DROP_OUT = 24,
+    SENSOR_FREEZE = 25
 };
 enum { ALWAYS, PERIODIC, RANDOM }; /* occurrence of a fault, see faults.h */
 enum { SSE2, AVX2, AVX512 }; /* instruction sets; on other processors than x86-64 the first is the only one */
@@ -103,10 +114,15 @@ typedef struct {
     const hsv_effectiveness *effectiveness; /* NULL: effectiveness is not estimated */
 } hsv_tube;
 
+/* Estimates of the effectiveness estimator: P by which the command is divided, interval of P, interval of the offset
+ * (rad/s), disturbance d (rad/s) if g = 0, effect e (rad/s) in the last healthy step, mode, number of steps that the
+ * hypotheses explain. */
+enum { EFFECTIVENESS, LOW, HIGH, OFFSET_LOW, OFFSET_HIGH, DISTURBANCE, EFFECT, MODE, COUNT, KNOWN };
+
 typedef struct {
     double planned[8], integral[2]; /* state s_n of the notch filter of the plan; integral of the error */
     double predicted[9], held[2];   /* effectiveness estimator: state of the previous step, input held since then */
-    double known[9];                /* effectiveness estimator: its estimates */
+    double known[KNOWN];            /* effectiveness estimator: its estimates */
 } hsv_tube_memory;
 
 /* State estimator: extended Kalman filter with constant gain, see estimator.h. */
@@ -145,8 +161,12 @@ typedef struct {
 
 typedef struct {
     double lagged, drift, walk, bias, scale, held, given;
-    double queue[51]; /* samples that wait for the latency */
+    double queue[MAX_DELAY + 1]; /* samples that wait for the latency */
 } hsv_sensor_memory;
+
+/* Memory of a link: step in which the last accepted payload was sent, whether the previous payload was lost, whether a
+ * payload was ever sent; then the last accepted payload, and the payloads that may still arrive. */
+enum { NEWEST, LOSING, BEGUN, ACCEPTED };
 
 typedef struct {
     int64_t channel, delay, jitter;
@@ -165,7 +185,7 @@ typedef struct {
 typedef struct {
     int64_t acting, away;
     double last, onset, since, kept; /* last and first step in action, step of unstart, kept value of the signal */
-    double queue[51];
+    double queue[MAX_DELAY + 1];
 } hsv_fault_memory;
 
 typedef struct {

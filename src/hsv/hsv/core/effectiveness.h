@@ -14,9 +14,6 @@
 #pragma once
 #include "vehicle.h"
 
-/* Estimates: P by which the command is divided, interval of P, interval of the offset (rad/s), disturbance d (rad/s) if
- * g = 0, effect e (rad/s) in the last healthy step, mode, number of steps that the hypotheses explain. */
-enum { EFFECTIVENESS, LOW, HIGH, OFFSET_LOW, OFFSET_HIGH, DISTURBANCE, EFFECT, MODE, COUNT, KNOWN };
 /* Modes. LOST: a loss of effectiveness explains all steps since the fault. OTHER: only an offset does. PENDING: a new
  * hypothesis has not yet explained the CONFIRMED steps that it needs to replace another. */
 static const double HEALTHY = 0.0, LOST = 1.0, OTHER = 2.0, PENDING = 3.0, CONFIRMED = 5.0;

@@ -1,11 +1,8 @@
 /* Occurrence of faults, and the faults of command and engine.
  *
  * A fault acts in the steps [start, stop): always, periodically, or at random as a two-state Markov chain. Rows are in
- * the order of composition, which is the order of the codes. Random numbers are drawn once per control period.
- *
- * Faults of the command: loss of effectiveness (paper eq. 14, eq. 15), reversal, delay, dead zone, backlash. Faults of
- * the engine: loss of thrust, unstarted inlet. Faults of actuators and effectors are in actuators.h, of sensors in
- * sensors.h. */
+ * the order of composition. Random numbers are drawn once per control period. Faults of actuators and effectors are in
+ * actuators.h, of sensors in sensors.h. */
 #pragma once
 #include "noise.h"
 
@@ -46,7 +43,7 @@ static double commanded(const hsv_fault *fault, hsv_fault_memory *memory, int64_
     const int fresh = memory->onset == (double)k;
     if (fresh) memory->kept = command;
     switch (fault->code) {
-    case LOSS: {
+    case LOSS: { /* paper eq. 14, eq. 15 */
         const double ramp = fault->parameter[1], elapsed = ((double)k - fault->start) * period;
         if (elapsed < ramp) value = 1.0 + (value - 1.0) * (elapsed / ramp);
         return value * command;

@@ -6,12 +6,6 @@
 #pragma once
 #include "noise.h"
 
-#define LARGEST 1e6 /* SI */
-
-/* Memory: step in which the last accepted payload was sent, whether the previous payload was lost, whether a payload
- * was ever sent; then the last accepted payload, and the payloads that may still arrive. */
-enum { NEWEST, LOSING, BEGUN, ACCEPTED };
-
 /* Fill a link with one payload, as if it had been sent in all earlier steps. */
 void hsv_fill_link(double *memory, int64_t size, const double *payload, int64_t n)
 {

@@ -11,8 +11,6 @@
 #pragma once
 #include "real.h"
 
-/* Tolerance of x' P x <= 1: by design the first deviation lies on the boundary of the outermost ellipsoid. */
-#define MEMBERSHIP_TOLERANCE 1e-6
 enum { MAX_VERTICES = 64, ENTRIES = STATES * (STATES + INPUTS), MAX_SIZE = 9 * SUMS };
 
 /* Return the level x' P x of the first "size" entries of x in the ellipsoid with P (size, size). */
@@ -38,14 +36,13 @@ static inline real gain_times_state(const double *row, const real *x)
  * the outermost gain is used. Without gains u_n is zero. */
 static inline mask nominal_input(const hsv_nominal *nominal, const real *x_n, real *u_n, real *index)
 {
-    const double boundary = 1.0 + MEMBERSHIP_TOLERANCE;
     const int count = (int)nominal->count;
     real held = all(0.0), beyond = all(0.0); /* levels in the smallest ellipsoid with x_n and in the next smaller */
     mask inside = count > 0 ? never() : opposite(never());
     *index = all(0.0);
     for (int g = count - 1; g >= 0; g--) {
         const real value = level(nominal->ellipsoids + RIGID * RIGID * g, RIGID, x_n);
-        const mask now = opposite(inside) & (value <= boundary);
+        const mask now = opposite(inside) & (value <= MEMBERSHIP_BOUNDARY);
         *index = choose(now, all(g), *index);
         held = choose(now, value, held);
         inside |= now;
@@ -59,7 +56,7 @@ static inline mask nominal_input(const hsv_nominal *nominal, const real *x_n, re
             const double *K = nominal->gains + STATES * (INPUTS * g + i);
             real total = gain_times_state(K, x_n);
             if (nominal->interpolated && g + 1 < count) {
-                const real share = (beyond - boundary) / (beyond - held);
+                const real share = (beyond - MEMBERSHIP_BOUNDARY) / (beyond - held);
                 const real inner = gain_times_state(K + STATES * INPUTS, x_n);
                 total = choose(inside, inner + share * (total - inner), total);
             }

@@ -6,8 +6,6 @@
 #pragma once
 #include "vehicle.h"
 
-enum { ACTUATOR_SUBSTEPS = 4 };
-
 #ifdef BASE
 #include "actuators.h"
 #include "atmosphere.h"

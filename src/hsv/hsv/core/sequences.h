@@ -113,7 +113,7 @@ void hsv_lag_response(const hsv_polytope *polytope, const double *gain, const hs
     }
 }
 
-/* Test of an ellipsoid by random sequences of vertices and disturbances, see hsv.design.sets.sampling. */
+/* Test of an ellipsoid by random sequences of vertices and disturbances, see hsv.flight.random_sequences. */
 enum { MAX_WIDTH = 32 };
 #define GOLDEN UINT64_C(0x9E3779B97F4A7C15)
 

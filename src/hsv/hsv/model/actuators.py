@@ -21,7 +21,7 @@ from hsv.core import Struct, doubles, lib
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS
 
-SUBSTEPS = 4
+SUBSTEPS = lib.ACTUATOR_SUBSTEPS
 """Number of substeps of a control period if an actuator is not ideal."""
 
 

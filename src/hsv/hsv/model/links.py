@@ -6,7 +6,7 @@ The receiver uses the most recently sent of the payloads that have arrived. Payl
 first one (sensors) or the input of the trim (controller).
 
 In a corrupted payload one of the 64 bits of one number is flipped. The receiver detects this by a checksum, if there is
-one, or if the number is not finite or beyond :data:`LARGEST`; the payload is then lost.
+one, or if the number is not finite or beyond ``LARGEST`` of ``core.h``; the payload is then lost.
 
 The computing time of the controller is split: whole periods delay the command link; the rest is the time within a
 period at which the actuators receive the command, see :func:`computation`.
@@ -23,12 +23,6 @@ from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, validate
 from hsv.core import Struct, doubles, lib, vector
 
-MAX_DELAY = 50
-"""Largest delay and largest jitter, in control periods."""
-
-LARGEST = 1e6
-"""Magnitude (SI) above which a receiver regards a number as corrupted."""
-
 MEASUREMENT_LINK, COMMAND_LINK = "measurement", "command"
 
 _CHANNELS = {MEASUREMENT_LINK: 0, COMMAND_LINK: 1}
@@ -36,7 +30,7 @@ _CHANNELS = {MEASUREMENT_LINK: 0, COMMAND_LINK: 1}
 
 
 def _parameters(link: str) -> tuple[Parameter, ...]:
-    where, longest = f"link.{link}", float(MAX_DELAY)
+    where, longest = f"link.{link}", float(lib.MAX_DELAY)
     return (
         Parameter(f"{where}.delay", 0.0, "age of a payload, control periods", "", 0.0, longest, whole=True),
         Parameter(
@@ -64,9 +58,6 @@ COMPUTATION_PARAMETER = Parameter(
 )
 MEASUREMENT_LINK_PARAMETERS = _parameters(MEASUREMENT_LINK)
 COMMAND_LINK_PARAMETERS = _parameters(COMMAND_LINK)
-
-_ACCEPTED = 3
-"""Numbers in the memory of a link before its payloads."""
 
 
 def computation(values: Mapping[str, object], period: float) -> tuple[int, float]:
@@ -117,7 +108,7 @@ def link_state(link: Struct, size: int, before: np.ndarray | None = None) -> np.
         size: Number of values in a payload.
         before: Payload, shape (size,), sent before the flight; None: equal to the first payload of the flight.
     """
-    memory = np.zeros(_ACCEPTED + size * (link.delay + link.jitter + 2))
+    memory = np.zeros(lib.ACCEPTED + size * (link.delay + link.jitter + 2))
     if before is not None:
         lib.hsv_fill_link(doubles(memory), len(memory), doubles(vector(before)), size)
     return memory

@@ -17,12 +17,9 @@ import numpy as np
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, one_or, validate
 from hsv.base.units import FOOT, readable
-from hsv.core import Struct, dtype
+from hsv.core import Struct, dtype, lib
 from hsv.core.arithmetic import exponential
 from hsv.model.signals import N_STATES, STATE_NAMES, STATE_UNITS
-
-MAX_LATENCY = 50
-"""Largest latency, in control periods."""
 
 ALPHA, PITCH = STATE_NAMES.index("angle_of_attack"), STATE_NAMES.index("pitch_angle")
 
@@ -49,7 +46,7 @@ FIELDS = (
     Field("scale", "relative error of the scale", "", -0.9, 10.0, 0.0),
     Field("scale_sigma", "standard deviation of a scale error drawn once per flight", "", 0.0, 1.0, 0.0),
     Field("lag", "bandwidth of a first-order lag; 0: none", "rad/s", 0.0, 1e4, 0.0),
-    Field("latency", "age of a sample, control periods", "", 0.0, float(MAX_LATENCY), 0.0, whole=True),
+    Field("latency", "age of a sample, control periods", "", 0.0, float(lib.MAX_DELAY), 0.0, whole=True),
     Field("drop_out", "probability that a sample is lost", "", 0.0, 1.0, 0.0),
     Field("quantum", "step of the quantisation; 0: none", "{}", 0.0, 1e6, 0.0),
     Field("minimum", "least measurement; none unless given", "{}", -1e6, 1e6, -math.inf),

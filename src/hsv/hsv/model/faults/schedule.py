@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsv.core import Struct, dtype, lib
-from hsv.model.faults.table import REPLACING, Fault
+from hsv.model.faults.table import FAULT_KINDS, Fault
 from hsv.model.signals import INPUT_NAMES, NEVER, STATE_NAMES
 
 
@@ -29,6 +29,8 @@ class ActiveFault(NamedTuple):
 
 
 _NOT_YET = -2.0
+_RANKS = {name: rank for rank, name in enumerate(FAULT_KINDS)}
+_FIRST_REPLACING = min(_RANKS[name] for name, kind in FAULT_KINDS.items() if kind.replaces)
 
 
 def fault_rows(
@@ -75,9 +77,9 @@ def _place(channel: str) -> int:
 
 def _order(row: tuple[Fault, int, int]) -> tuple[Any, ...]:
     fault, start, stop = row
-    code = fault.kind.code
+    rank = _RANKS[fault.type]
     # Faults that replace the position form a single stage, in which the one that started last comes last.
-    stage = (REPLACING[0], start, code) if code in REPLACING else (code, start, 0)
+    stage = (_FIRST_REPLACING, start, rank) if fault.kind.replaces else (rank, start, 0)
     return *stage, fault.channel, fault.values, stop
 
 

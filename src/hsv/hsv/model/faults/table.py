@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Self
 
 from hsv.base.errors import ParameterError, one_of
 from hsv.base.parameters import Parameter, read_number
 from hsv.base.units import UnitSystem, parse_quantity, readable
-from hsv.core import lib
+from hsv.core import compare_enumerators, lib
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 
 ENGINE = "engine"
@@ -50,12 +51,6 @@ CHANNELS = {
 """Channels by name: the control inputs, the engine, and the states, whose sensors can fail."""
 
 COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR = "command", "dynamics", "effector", "engine", "sensor"
-
-REPLACING = (lib.LOCK, lib.LOCK_AT, lib.FLOAT, lib.HARD_OVER, lib.SOLID_OSCILLATION)
-"""Codes of the kinds that replace the position of an effector; the one that started last prevails."""
-
-MAX_DELAY = lib.MAX_DELAY
-"""Largest delay of a command, in control periods."""
 
 
 @dataclass(frozen=True)
@@ -99,13 +94,19 @@ class FaultParameter:
 
 @dataclass(frozen=True)
 class FaultKind:
-    """A kind of fault: its code in the core, side, possible channels, meaning, and own parameters."""
+    """A kind of fault: code and enumerator in the core, meaning, own parameters, side and possible channels.
+
+    The code selects the random numbers of intermittent faults: it never changes, and a new kind gets the next number,
+    wherever it stands in :data:`FAULT_KINDS`. A kind that ``replaces`` sets the position of an effector.
+    """
 
     code: int
-    side: str
-    channels: tuple[str, ...]
+    enumerator: str
     meaning: str
     parameters: tuple[FaultParameter, ...] = ()
+    side: str = COMMAND
+    channels: tuple[str, ...] = INPUT_NAMES
+    replaces: bool = False
 
 
 _P = FaultParameter
@@ -136,92 +137,148 @@ _OUTSIDE = (
     _P("restart_time", "least time for which the inlet stays unstarted", "s", 0.0, 1e4, 0.0),
 )
 
-_MEANINGS = {
-    COMMAND: {
-        "loss_of_effectiveness": "the actuator receives effectiveness times the command (paper eq. 15); effectiveness "
-        "may be lost over a ramp",
-        "reversal": "the command is multiplied by -1",
-        "delay": "the actuator receives the command with a delay; at first it receives the one at the start of the "
-        "fault",
-        "dead_zone": "commands within a dead zone about the one at the start of the fault have no effect",
-        "backlash": "there is play between command and actuator, centred at the start of the fault",
-    },
-    DYNAMICS: {
-        "bandwidth": "the natural frequency is reduced; an ideal actuator becomes a first-order lag",
-        "rate_limit": "the rate of the actuator is limited",
-        "stop_limit": "the travel of the actuator is limited; from a position beyond the limits it returns at its "
-        "largest rate",
-    },
-    EFFECTOR: {
-        "effector_scale": "the position of the effector is a multiple of that of the actuator",
-        "bias": "a constant offset is added to the position of the effector",
-        "drift": "an offset that grows at a constant rate up to a limit is added to the position of the effector",
-        "oscillation": "an oscillation is added to the position of the effector (liquid failure)",
-        "lock_in_place": "the effector stays at its position at the start of the fault",
-        "lock_at": "the effector stays at a given position",
-        "float": "the effector moves freely: no force at zero deflection, or along the flow",
-        "hard_over": "the effector moves to a stop and stays there",
-        "solid_oscillation": "the effector oscillates about its position at the start of the fault, whatever the "
-        "command (solid failure)",
-    },
-    ENGINE_SIDE: {
-        "thrust_loss": "only a share of the thrust remains",
-        "inlet_unstart": "the inlet is unstarted: thrust, lift, drag and moment change",
-        "inlet_unstart_outside": "the inlet unstarts where angle of attack and Mach number leave an ellipse, or fuel "
-        "exceeds a limit",
-    },
-    SENSOR: {
-        "sensor_scale": "the output of the sensor is multiplied by a factor",
-        "sensor_noise": "white noise is added to the output of the sensor",
-        "sensor_bias": "a constant offset is added to the output of the sensor",
-        "sensor_runaway": "an offset that grows at a constant rate up to a limit is added to the output of the sensor",
-        "sensor_drop_out": "samples are lost at random; the last one is held",
-        "sensor_freeze": "the output of the sensor stays at its value at the start of the fault",
-    },
-}
-"""Meanings of all kinds by side and name, in the order of composition, which is that of the codes in core.h."""
-
 _ABOUT_START = "0: the whole command is reversed, 1: only its change since the start of the fault"
-_PARAMETERS = {
-    "loss_of_effectiveness": (
-        _P("effectiveness", "share of the command that remains", "", 0.0, 1.0),
-        _P("ramp_time", "time over which effectiveness is lost; 0: at once", "s", 0.0, 1e4, 0.0),
+
+_dynamics = partial(FaultKind, side=DYNAMICS)
+_effector = partial(FaultKind, side=EFFECTOR)
+_replacing = partial(FaultKind, side=EFFECTOR, replaces=True)
+_engine = partial(FaultKind, side=ENGINE_SIDE, channels=(ENGINE,))
+_sensor = partial(FaultKind, side=SENSOR, channels=STATE_NAMES)
+
+FAULT_KINDS = {
+    "loss_of_effectiveness": FaultKind(
+        0,
+        "LOSS",
+        "the actuator receives effectiveness times the command (paper eq. 15); effectiveness may be lost over a ramp",
+        (
+            _P("effectiveness", "share of the command that remains", "", 0.0, 1.0),
+            _P("ramp_time", "time over which effectiveness is lost; 0: at once", "s", 0.0, 1e4, 0.0),
+        ),
     ),
-    "reversal": (_P("about_start", _ABOUT_START, "", 0.0, 1.0, 0.0),),
-    "delay": (_P("steps", "delay in control periods", "", 1.0, float(MAX_DELAY), whole=True),),
-    "dead_zone": (_WIDTH,),
-    "backlash": (_WIDTH,),
-    "bandwidth": (_P("natural_frequency", "largest natural frequency", "rad/s", 0.1, 1e3),),
-    "rate_limit": (_P("rate", "largest rate", "{}/s", 1e-4, 100.0),),
-    "stop_limit": (_P("lower", "least position", "{}", -1.0, 1.0), _P("upper", "largest position", "{}", -1.0, 1.0)),
-    "effector_scale": (_P("factor", "multiple", "", -1.0, 2.0),),
-    "bias": (_P("offset", "offset of the position", "{}", -1.0, 1.0),),
-    "drift": _GROWING_OFFSET,
-    "oscillation": _OSCILLATION,
-    "lock_at": (_P("position", "position", "{}", -1.0, 1.0),),
-    "float": (_P("alignment", "0: zero deflection, 1: minus the angle of attack", "", 0.0, 1.0, 0.0),),
-    "hard_over": (_P("rate", "rate of the motion; its sign selects the stop", "{}/s", -100.0, 100.0),),
-    "solid_oscillation": _OSCILLATION,
-    "thrust_loss": (_P("share", "share that remains", "", 0.0, 1.0),),
-    "inlet_unstart": _UNSTART,
-    "inlet_unstart_outside": (*_UNSTART, *_OUTSIDE),
-    "sensor_scale": (_P("factor", "factor", "", -1.0, 2.0),),
-    "sensor_noise": (_P("standard_deviation", "standard deviation of the noise", "{}", 0.0, 1.0),),
-    "sensor_bias": (_P("offset", "offset, measurement minus truth", "{}", -1.0, 1.0),),
-    "sensor_runaway": _GROWING_OFFSET,
-    "sensor_drop_out": (_P("probability", "probability that a sample is lost", "", 0.0, 1.0),),
+    "reversal": FaultKind(
+        1, "REVERSAL", "the command is multiplied by -1", (_P("about_start", _ABOUT_START, "", 0.0, 1.0, 0.0),)
+    ),
+    "delay": FaultKind(
+        2,
+        "DELAY",
+        "the actuator receives the command with a delay; at first it receives the one at the start of the fault",
+        (_P("steps", "delay in control periods", "", 1.0, float(lib.MAX_DELAY), whole=True),),
+    ),
+    "dead_zone": FaultKind(
+        3, "DEAD_ZONE", "commands within a dead zone about the one at the start of the fault have no effect", (_WIDTH,)
+    ),
+    "backlash": FaultKind(
+        4, "BACKLASH", "there is play between command and actuator, centred at the start of the fault", (_WIDTH,)
+    ),
+    "bandwidth": _dynamics(
+        5,
+        "BANDWIDTH",
+        "the natural frequency is reduced; an ideal actuator becomes a first-order lag",
+        (_P("natural_frequency", "largest natural frequency", "rad/s", 0.1, 1e3),),
+    ),
+    "rate_limit": _dynamics(
+        6, "RATE_LIMIT", "the rate of the actuator is limited", (_P("rate", "largest rate", "{}/s", 1e-4, 100.0),)
+    ),
+    "stop_limit": _dynamics(
+        7,
+        "STOP_LIMIT",
+        "the travel of the actuator is limited; from a position beyond the limits it returns at its largest rate",
+        (_P("lower", "least position", "{}", -1.0, 1.0), _P("upper", "largest position", "{}", -1.0, 1.0)),
+    ),
+    "effector_scale": _effector(
+        8,
+        "SCALE",
+        "the position of the effector is a multiple of that of the actuator",
+        (_P("factor", "multiple", "", -1.0, 2.0),),
+    ),
+    "bias": _effector(
+        9,
+        "BIAS",
+        "a constant offset is added to the position of the effector",
+        (_P("offset", "offset of the position", "{}", -1.0, 1.0),),
+    ),
+    "drift": _effector(
+        10,
+        "DRIFT",
+        "an offset that grows at a constant rate up to a limit is added to the position of the effector",
+        _GROWING_OFFSET,
+    ),
+    "oscillation": _effector(
+        11, "OSCILLATION", "an oscillation is added to the position of the effector (liquid failure)", _OSCILLATION
+    ),
+    "lock_in_place": _replacing(12, "LOCK", "the effector stays at its position at the start of the fault"),
+    "lock_at": _replacing(
+        13, "LOCK_AT", "the effector stays at a given position", (_P("position", "position", "{}", -1.0, 1.0),)
+    ),
+    "float": _replacing(
+        14,
+        "FLOAT",
+        "the effector moves freely: no force at zero deflection, or along the flow",
+        (_P("alignment", "0: zero deflection, 1: minus the angle of attack", "", 0.0, 1.0, 0.0),),
+        channels=INPUT_NAMES[1:],
+    ),
+    "hard_over": _replacing(
+        15,
+        "HARD_OVER",
+        "the effector moves to a stop and stays there",
+        (_P("rate", "rate of the motion; its sign selects the stop", "{}/s", -100.0, 100.0),),
+    ),
+    "solid_oscillation": _replacing(
+        16,
+        "SOLID_OSCILLATION",
+        "the effector oscillates about its position at the start of the fault, whatever the command (solid failure)",
+        _OSCILLATION,
+    ),
+    "thrust_loss": _engine(
+        17,
+        "THRUST_LOSS",
+        "only a share of the thrust remains",
+        (_P("share", "share that remains", "", 0.0, 1.0),),
+    ),
+    "inlet_unstart": _engine(18, "UNSTART", "the inlet is unstarted: thrust, lift, drag and moment change", _UNSTART),
+    "inlet_unstart_outside": _engine(
+        19,
+        "UNSTART_OUTSIDE",
+        "the inlet unstarts where angle of attack and Mach number leave an ellipse, or fuel exceeds a limit",
+        (*_UNSTART, *_OUTSIDE),
+    ),
+    "sensor_scale": _sensor(
+        20,
+        "SENSOR_SCALE",
+        "the output of the sensor is multiplied by a factor",
+        (_P("factor", "factor", "", -1.0, 2.0),),
+    ),
+    "sensor_noise": _sensor(
+        21,
+        "SENSOR_NOISE",
+        "white noise is added to the output of the sensor",
+        (_P("standard_deviation", "standard deviation of the noise", "{}", 0.0, 1.0),),
+    ),
+    "sensor_bias": _sensor(
+        22,
+        "SENSOR_BIAS",
+        "a constant offset is added to the output of the sensor",
+        (_P("offset", "offset, measurement minus truth", "{}", -1.0, 1.0),),
+    ),
+    "sensor_runaway": _sensor(
+        23,
+        "SENSOR_RUNAWAY",
+        "an offset that grows at a constant rate up to a limit is added to the output of the sensor",
+        _GROWING_OFFSET,
+    ),
+    "sensor_drop_out": _sensor(
+        24,
+        "SENSOR_DROP_OUT",
+        "samples are lost at random; the last one is held",
+        (_P("probability", "probability that a sample is lost", "", 0.0, 1.0),),
+    ),
+    "sensor_freeze": _sensor(
+        25, "SENSOR_FREEZE", "the output of the sensor stays at its value at the start of the fault"
+    ),
 }
-
-_CHANNELS_OF = {ENGINE_SIDE: (ENGINE,), SENSOR: STATE_NAMES}
-
-FAULT_KINDS: dict[str, FaultKind] = {}
 """All kinds of faults by name, in the order in which faults that act at the same time are composed."""
 
-for _side, _meanings in _MEANINGS.items():
-    for _name, _meaning in _meanings.items():
-        _channels = INPUT_NAMES[1:] if _name == "float" else _CHANNELS_OF.get(_side, INPUT_NAMES)
-        _parameters = _PARAMETERS.get(_name, ())
-        FAULT_KINDS[_name] = FaultKind(len(FAULT_KINDS), _side, _channels, _meaning, _parameters)
+compare_enumerators("hsv_fault_kind", {kind.enumerator: kind.code for kind in FAULT_KINDS.values()})
 
 OCCURRENCE_PARAMETERS = (
     _P("intermittent_period", "the fault comes and goes with this period; 0: it stays", "s", 0.0, 1e4, 0.0),
