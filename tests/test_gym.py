@@ -1,6 +1,9 @@
 """The Gymnasium environments: their interface, and the bits of their flights."""
 
+import copy
+import multiprocessing
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -112,5 +115,70 @@ def test_what_is_wrong_is_named():
         hsv.gym.TrackEnv("case1_qp")
     env = hsv.gym.TrackEnv()
     env.reset()
-    with pytest.raises(ControllerError, match=r"action = \[\[nan, 0.0\]\]: expected finite numbers"):
-        env.step(np.array([np.nan, 0.0]))
+    for wrong in ([np.nan, 0.0], ["a", "b"], np.array(["2020", "2021"], "datetime64[s]"), [1j, 1.0]):
+        with pytest.raises(ControllerError, match=r"action = \[.*\]: expected finite numbers"):
+            env.step(wrong)
+
+
+def _flown(env, steps, seed):
+    """Step ``env`` with random actions; return all observations, rewards and nominal inputs."""
+    random = np.random.default_rng(seed)
+    found = [env.step(random.uniform(-0.2, 0.2, env.action_space.shape)) for _ in range(steps)]
+    return [(o.tolist(), np.asarray(r).tolist(), info["nominal_input"].tolist()) for o, r, _, _, info in found]
+
+
+COPIES = {"deepcopy": copy.deepcopy, "pickle": lambda env: pickle.loads(pickle.dumps(env))}
+REALISTIC = DRAWN | {"scenario": "case1_realistic"}
+
+
+@pytest.mark.parametrize("copied", COPIES.values(), ids=COPIES)
+@pytest.mark.parametrize("options", [{}, DRAWN, REALISTIC], ids=["alike", "drawn", "equipped"])
+@pytest.mark.parametrize("count", [None, 1, lanes() + 1])
+def test_a_copy_flies_on_with_the_same_bits(copied, options, count):
+    env = hsv.gym.TrackEnv(**options) if count is None else hsv.gym.TrackVectorEnv(count, **options)
+    env.reset(seed=5)
+    for steps in (0, 7):  # at the start, and in flight
+        _flown(env, steps, 1)
+        first, second = copied(env), copied(env)
+        _flown(second, 10, 3)  # a copy does not change the others
+        assert _flown(first, 20, 2) == _flown(env, 20, 2)
+    if count is None:
+        assert copied(env).flight.fingerprint == env.flight.fingerprint
+    assert np.array_equal(env.reset()[0], first.reset()[0])  # copies also draw the same next episodes
+
+
+def test_a_copy_in_a_forked_process_flies_on_with_the_same_bits():
+    env = hsv.gym.TrackVectorEnv(lanes() + 1, **DRAWN)
+    env.reset(seed=5)
+    _flown(env, 5, 1)
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        forked = pool.apply(_flown, (env, 20, 2))
+    assert forked == _flown(env, 20, 2)
+
+
+def test_a_copy_begins_the_next_episode_after_the_end_of_its_own():
+    env = hsv.gym.TrackEnv()
+    env.reset()
+    while not env.step(np.ones(2))[2]:
+        pass
+    copied = copy.deepcopy(env)
+    assert _flown(copied, 3, 1) == _flown(env, 3, 1)
+
+
+@pytest.mark.parametrize(
+    ("count", "action"),
+    [(None, 0.3), (None, [0.3]), (None, [[0.3, 0.3]]), (2, [0.3, 0.3]), (2, [[0.3], [0.3]]), (2, [[0.3], [0.1, 0.2]])],
+)
+def test_an_action_of_another_shape_is_refused_before_the_step(count, action):
+    env = hsv.gym.TrackEnv() if count is None else hsv.gym.TrackVectorEnv(count)
+    env.reset(seed=1)
+    before = copy.deepcopy(env)
+    with pytest.raises(ControllerError, match=r"action of shape \(.*\): expected \((2, )?2,?\)$"):
+        env.step(action)
+    assert _flown(env, 2, 1) == _flown(before, 2, 1)
+
+
+@pytest.mark.parametrize("seeds", [[], [4, 5], [4, 5, 6, 7]])
+def test_another_number_of_seeds_than_environments_is_refused(seeds):
+    with pytest.raises(ControllerError, match=f"seed: {len(seeds)} seeds, expected 3, one for each environment"):
+        hsv.gym.TrackVectorEnv(3, **DRAWN).reset(seed=seeds)

@@ -18,6 +18,7 @@ the episode is then terminated if this state is outside the range of the model, 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -34,7 +35,7 @@ from hsv import core
 from hsv.base.errors import ControllerError, RunError, ScenarioError
 from hsv.control.tube_law import no_tube
 from hsv.core import Struct, lanes, lib
-from hsv.flight.assembly import assemble_flight
+from hsv.flight.assembly import assemble_flight, without_code
 from hsv.flight.campaign.campaign import MAX_SAMPLES, plan
 from hsv.flight.campaign.variants import FlightVariants
 from hsv.flight.closed_loop import Components, flight_struct
@@ -67,12 +68,13 @@ class _Draws:
         name = Path(scenario).stem
         _, distributions = scenario_at_means(scenario_table(scenario_text(scenario), name), name)
         drawn = scale or factors or distributions
-        self._campaign = plan(scenario, samples=MAX_SAMPLES, scale=scale, factors=factors) if drawn else None
-        if self._campaign:
-            self._variants = FlightVariants(self._campaign.scenario, self._campaign.design)
+        self._campaign = None
+        if drawn:
+            self._campaign = plan(scenario, samples=MAX_SAMPLES, scale=scale, factors=factors, with_code=False)
+            self._variants = FlightVariants(without_code(self._campaign.scenario), self._campaign.design)
             components = self._variants.unchanged
         else:
-            components = assemble_flight(load_scenario(scenario))
+            components = assemble_flight(without_code(load_scenario(scenario)))
         if not components.nominal_trajectory.law.in_core:
             raise ScenarioError(f"scenario {name!r}: a nominal law that is solved in flight, expected one of the core")
         limits: Any = SimpleNamespace(in_core=True, kernel=no_tube(components.plant.vehicle), library=None)
@@ -85,8 +87,11 @@ class _Draws:
             return self.unchanged, 0
         flight = int(random.integers(MAX_SAMPLES))
         [sample], _ = self._campaign.draw(range(flight, flight + 1))
-        components = self._variants.components(self._campaign.flown(flight, sample.tolist()))
+        components = self._variants.components(without_code(self._campaign.flown(flight, sample.tolist())))
         return replace(components, controller=self._controller), flight
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> _Draws:
+        return self  # it does not change
 
 
 @dataclass
@@ -108,6 +113,13 @@ class _Group:
         """Simulate a half of the current step: ``lib.SENSE`` up to the nominal input, or ``lib.ACT`` after it."""
         core.fly(self.flights, self.memory, self.step, self.step + 1, half)
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        if len(self.flights) not in (1, lanes()):
+            raise RunError(f"environment: from a processor with {len(self.flights)} lanes, expected {lanes()} as here")
+        self.memory = core.loop_memory(len(self.flights))  # aligned, as the copied memory need not be
+        self.memory[:] = state["memory"]
+
 
 class _Episodes:
     """The current episodes of n environments, in groups of at most as many as the core has lanes."""
@@ -120,13 +132,35 @@ class _Episodes:
         width = lanes() if count > 1 else 1
         self._memory = np.zeros((-(-count // width) * width, History.numbers()))
         self._commands = np.zeros((len(self._memory), N_INPUTS))
-        parts: list[Any] = [part[:count, 0] for part in History.over(self._memory, 1) if part is not None]
-        self.history = History(*parts)
+        self.history = self._history()
         self.components: list[Components] = [draws.unchanged] * count
         self.numbers = np.zeros(count, np.int64)
         self._x_r, self._u_r = np.zeros((count, N_STATES)), np.zeros((count, N_INPUTS))
         chunks = [range(start, min(start + width, count)) for start in range(0, count, width)]
         self._groups = [group for rows in chunks for group in self._begun(rows)]
+
+    def _history(self) -> History:
+        parts: list[Any] = [part[: self._count, 0] for part in History.over(self._memory, 1) if part is not None]
+        return History(*parts)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> _Episodes:
+        # What does not change in an episode is shared, so that a copy costs little.
+        shared = [*self.components, *(reference for group in self._groups for reference in group.references)]
+        memo.update((id(part), part) for part in shared)
+        copied = object.__new__(_Episodes)
+        copied.__setstate__(deepcopy(vars(self), memo))
+        return copied
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Continue the episodes of a copy: its flights write to its own history, which is not shared."""
+        vars(self).update(state)
+        self.history = self._history()
+        for group in self._groups:
+            for lane, flight in enumerate(group.flights):
+                row = group.rows.start + lane
+                signals, auxiliary, estimated = History.over(self._memory[row], 1)
+                written = {"history": signals, "auxiliary": auxiliary, "estimated": estimated}
+                group.flights[lane] = flight.replaced(**written, commanded=self._commands[row])
 
     @property
     def nominal_input(self) -> np.ndarray:
@@ -140,18 +174,17 @@ class _Episodes:
         error[:, PITCH_RATE] = self.history.filtered_pitch_rate - self._x_r[:, PITCH_RATE]
         return np.concatenate((self.history.estimate, error), 1)
 
-    def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Simulate a step with finite ``actions``, shape (n, 2); an episode that is over begins anew instead.
+    def step(self, actions: object, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Simulate a step with finite ``actions`` of a ``shape``; an episode that is over begins anew instead.
 
         Returns:
             Three arrays of shape (n,): rewards, 0 for an episode that begins anew; a mask of the episodes that
             terminate; and a mask of those that are truncated.
 
         Raises:
-            ControllerError: An action is not finite.
+            ControllerError: The actions have another shape, or one is not a finite number.
         """
-        if not np.isfinite(actions).all():
-            raise ControllerError(f"action = {actions.tolist()}: expected finite numbers")
+        actions = _numbers(actions, shape).reshape(self._count, N_INPUTS)
         self._commands[: self._count] = self.nominal_input + SCALE * actions
         self._commands[self._count :] = self._commands[self._count - 1]
         period = self.components[0].plant.period
@@ -208,6 +241,19 @@ class _Episodes:
             self._x_r[i], self._u_r[i] = reference.state[k], reference.input[k]
 
 
+def _numbers(action: object, shape: tuple[int, ...]) -> np.ndarray:
+    """Return an ``action`` as an array; refuse another ``shape``, and anything but finite numbers."""
+    try:
+        given = np.asarray(action)
+    except ValueError:  # numpy refuses nested lists of different lengths
+        given = np.array(None)
+    if given.shape != shape:
+        raise ControllerError(f"action of shape {given.shape}: expected {shape}")
+    if given.dtype.kind not in "fiu" or not np.isfinite(given).all():
+        raise ControllerError(f"action = {given.tolist()}: expected finite numbers")
+    return np.asarray(given, float)
+
+
 class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """An environment in which the agent tracks the reference of a scenario by fuel and elevator, see :mod:`hsv.gym`.
 
@@ -246,7 +292,7 @@ class TrackEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         Return the observation, shape (18,), the reward, whether the episode terminates, whether it is truncated, and
         ``info``.
         """
-        [reward], [terminated], [truncated] = self._episodes.step(np.asarray(action, float)[None])
+        [reward], [terminated], [truncated] = self._episodes.step(action, (N_INPUTS,))
         return self._episodes.observation[0], float(reward), bool(terminated), bool(truncated), self._info
 
     @property
@@ -292,9 +338,17 @@ class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         """Begin all episodes, with one ``seed`` or with one per environment; ``options`` are not used.
 
         Return the first observations, shape (n, 18), and ``info`` with arrays over the n environments.
+
+        Raises:
+            ControllerError: There is another number of seeds than environments.
         """
         rows = range(self.num_envs)
-        seeds = [int(seed) + i for i in rows] if isinstance(seed, int | np.integer) else seed or [None for _ in rows]
+        if seed is None or isinstance(seed, int | np.integer):
+            seeds: list[int | None] = [None if seed is None else int(seed) + i for i in rows]
+        else:
+            seeds = [*seed]
+        if len(seeds) != self.num_envs:
+            raise ControllerError(f"seed: {len(seeds)} seeds, expected {self.num_envs}, one for each environment")
         self._randoms = [self._randoms[i] if each is None else np_random(each)[0] for i, each in enumerate(seeds)]
         self._episodes = _Episodes(self._draws, self._randoms)
         return self._episodes.observation, self._infos
@@ -305,7 +359,7 @@ class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         Return observations, shape (n, 18), and with shape (n,) rewards and masks of terminated and of truncated
         episodes; then ``info``.
         """
-        found = self._episodes.step(np.asarray(actions, float))
+        found = self._episodes.step(actions, (self.num_envs, N_INPUTS))
         return self._episodes.observation, *found, self._infos
 
     @property

@@ -10,6 +10,7 @@ import os
 import re
 from array import array
 from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from functools import cache
 from importlib.resources import files
 from operator import index
@@ -199,8 +200,10 @@ def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int, ha
 
 def loop_memory(flights: int) -> np.ndarray:
     """Return aligned memory (bytes) that holds the loop state of ``flights`` flights between calls of :func:`fly`."""
-    room = np.zeros(lib.hsv_memory_size(flights) + 64, np.uint8)
-    return room[-room.ctypes.data % 64 :]
+    size = lib.hsv_memory_size(flights)
+    room = np.zeros(size + 64, np.uint8)
+    start = -room.ctypes.data % 64
+    return room[start : start + size]
 
 
 class Struct:
@@ -237,6 +240,12 @@ class Struct:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (self.kind, self.values)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Struct:
+        """Return a copy that continues from the memory of this one; both share what the core only reads."""
+        constant = {name for name, pointer in _pointers(self.kind).items() if pointer.constant}
+        copied = {name: value if name in constant else deepcopy(value, memo) for name, value in self.values.items()}
+        return Struct(self.kind, **copied)
 
     def replaced(self, **changes: Any) -> Struct:
         """Return a copy with other values of some fields."""

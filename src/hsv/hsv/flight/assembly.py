@@ -46,6 +46,15 @@ def own_parameters(scenario: Scenario) -> dict[str, Any]:
     return table_values(controller_class(scenario.controller).PARAMETERS, scenario.own)
 
 
+def without_code(scenario: Scenario) -> Scenario:
+    """Return ``scenario`` with a placeholder instead of a custom controller, whose code is thus not loaded.
+
+    Commands that do not fly the controller assemble this scenario; it has the same vehicle, reference and faults.
+    """
+    shipped = scenario.controller in SHIPPED_CONTROLLERS
+    return scenario if shipped else scenario.model_copy(update={"controller": NODE, "own": {}})
+
+
 def design_parameters(scenario: Scenario) -> dict[str, Any]:
     """Check the design of ``scenario`` and return the parameters in its file; empty without a design."""
     if not scenario.design:

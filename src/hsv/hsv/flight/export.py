@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-from hsv.flight.assembly import assemble_flight
+from hsv.flight.assembly import assemble_flight, without_code
 from hsv.flight.closed_loop import Components
 from hsv.flight.scenario import Scenario
 from hsv.model.faults.table import COMMAND as COMMAND_SIDE
@@ -20,7 +20,7 @@ NUMBERS = "scenario.h"
 
 def exported_vehicle(scenario: Scenario) -> ExportedBlock:
     """Return the vehicle of ``scenario`` as a block in C, from which an FMU is made."""
-    components = assemble_flight(scenario)
+    components = assemble_flight(without_code(scenario))
     plant = components.plant
     source = files("hsv.flight").joinpath("export.c").read_text(encoding="utf-8")
     header = (include_folder() / HEADER).read_text(encoding="utf-8")

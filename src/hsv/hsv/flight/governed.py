@@ -12,7 +12,7 @@ from hsv.base.units import rounded, written
 from hsv.control.design import PlanBounds
 from hsv.control.governor import GovernedReference, Governor, legs_of
 from hsv.control.tube_law import TubeLaw
-from hsv.flight.assembly import assemble_flight
+from hsv.flight.assembly import assemble_flight, without_code
 from hsv.flight.scenario import load_scenario, scenario_table, scenario_text
 
 
@@ -34,7 +34,7 @@ def governed(name: str, blend: float) -> GovernedScenario:
             ``family``, ``blend`` is out of range, or no reference fits the commands.
     """
     scenario = load_scenario(name)
-    components = assemble_flight(scenario)
+    components = assemble_flight(without_code(scenario))
     law, controller = components.nominal_trajectory.law, components.controller
     if not isinstance(controller, TubeLaw) or controller.design.plan_bounds is None:
         raise GovernorError(

@@ -18,7 +18,7 @@ from hsv.base.files import parse_json
 from hsv.base.units import percent, rounded, written
 from hsv.control.design import design_of
 from hsv.core.arithmetic import SEED_PARAMETER
-from hsv.flight.assembly import assemble_flight, blamed_on, design_parameters
+from hsv.flight.assembly import assemble_flight, blamed_on, design_parameters, without_code
 from hsv.flight.campaign.run import Batch
 from hsv.flight.distribution import KINDS, Distribution
 from hsv.flight.scenario import Scenario, scenario_at_means, scenario_table, scenario_text, set_field
@@ -227,6 +227,7 @@ def plan(
     scale: float = 1.0,
     commit: str = "unknown",
     factors: Mapping[str, tuple[object, object]] | None = None,
+    with_code: bool = True,
 ) -> Campaign:
     """Return the campaign that varies the vehicle's uncertain parameters, the scenario's distributions and ``factors``.
 
@@ -238,6 +239,7 @@ def plan(
         scale: Factor on the vehicle's bounds of uncertain parameters (section 5.1 of the paper), not on distributions.
         commit: Git commit of the program.
         factors: Least and largest value, as in a scenario file, of fields or uncertain parameters, by name.
+        with_code: Whether a custom controller flies, whose code is then loaded to check its parameters.
 
     Raises:
         CampaignError, ScenarioError, DesignError: A setting is wrong; the message names it.
@@ -266,7 +268,7 @@ def plan(
     with blamed_on(scenario):
         design, library = design_parameters(scenario), library_digest(scenario.controller)
     campaign = Campaign(name, text, design, method, samples, seed, found, commit, library)
-    _check_ends(campaign)
+    _check_ends(campaign, with_code)
     return campaign
 
 
@@ -289,7 +291,7 @@ def _factors(scenario: Scenario, drawn: Mapping[str, Distribution], scale: float
     )
 
 
-def _check_ends(campaign: Campaign) -> None:
+def _check_ends(campaign: Campaign, with_code: bool) -> None:
     """Raise an error if the scenario does not admit the least or largest values of the factors.
 
     Three kinds of samples are tried: all factors at their least values, all at their largest, and one factor at its
@@ -297,7 +299,8 @@ def _check_ends(campaign: Campaign) -> None:
     """
     low, high, mean = ([getattr(f, end) for f in campaign.factors] for end in ("low", "high", "middle"))
     for ends in (low, high):
-        assemble_flight(campaign.flown(0, ends), design_of(campaign.design))
+        flown = campaign.flown(0, ends)
+        assemble_flight(flown if with_code else without_code(flown), design_of(campaign.design))
         for index, value in enumerate(ends):
             campaign.flown(0, [*mean[:index], value, *mean[index + 1 :]])
 
