@@ -1,7 +1,10 @@
 """Bags and campaigns are data: no code that they name runs and no path leaves the folder, unless they are trusted."""
 
 import json
+import re
 import sys
+from contextlib import nullcontext
+from pathlib import Path
 
 import pytest
 import yaml
@@ -9,10 +12,20 @@ from changed_bags import changed_bag
 from marking import long
 from pyarrow import parquet
 from recorded_flight import record_flight
+from typer.main import get_command
 
+import hsv as hsv_package
+from hsv.base.errors import GovernorError
+from hsv.cli.entry import COMMANDS
+from hsv.cli.main import application
+from hsv.control.design import find_design
 from hsv.flight.campaign.sample_runner import CAMPAIGN, DIGEST
 from hsv.flight.campaign.store import result_digest
+from hsv.flight.export import exported_vehicle
+from hsv.flight.governed import governed
+from hsv.gym import TrackEnv, TrackVectorEnv
 from hsv.model.vehicle import vehicle_text
+from hsv.plugins import library_process
 
 MODULE = """
 from pathlib import Path
@@ -165,3 +178,122 @@ def test_parameters_of_a_bag_bring_no_vehicle_from_another_file(hsv, flown, tmp_
     lacking = str(changed_bag(flown.path, tmp_path / "lacking", attachments=files))
     refused = hsv("replay", lacking, "--node", "plant")
     assert refused.code == 2 and refused.error.startswith("vehicle 'other': expected one of ")
+
+
+SCENARIO = 'extends = "case1"\ncontroller = "marked:Own"\ndesign = ""\nduration = "1 s"\nfault = []\n[limits]\n'
+
+# Words for every command that reads files. Their scenario, bag and campaign name the code of a controller.
+READERS = {
+    "report": "{bag} --out report.html",
+    "plot": "{bag} --out plot.png",
+    "info": "{bag}",
+    "view": "{bag} --with rerun",
+    "replay": "{bag} --scenario own.toml",
+    "diff": "{bag} {bag}",
+    "export": "{bag} --csv --out tables",
+    "recover": "{bag} --out recovered",
+    "conclude": "{bag} --no-report",
+    "verify": "own.toml --quick",
+    "certify": "{design} --scenario own.toml",
+    "govern": "own.toml --out governed.toml",
+    "export-vehicle": "own.toml --fmu vehicle.fmu",
+    "export-controller": "own.toml --out exported",
+    "design": "own.toml --out own.yaml",
+    "trim": "--vehicle own.toml",
+    "linearise": "--vehicle own.toml --out model.mat",
+    "list": "scenarios own.toml",
+    "bench": "--compare own.toml",
+    "montecarlo summary": "{campaign}",
+    "montecarlo replay": "{campaign} --flight 1",
+    "montecarlo scenario": "{campaign} --flight 1",
+}
+FLYING = {
+    "run": "own.toml",
+    "simulate": "own.toml",
+    "resilience": "--controllers own.toml",
+    "check": "own.toml",
+    "prepare": "own.toml",
+    "montecarlo fly": "own.toml",
+}
+IN_THE_GRAPH = ("set", "command", "watch", "topic", "fault inject", "fault clear", "fault list")
+OTHERS = ("include", "play")  # one prints a folder, the other publishes the messages of a bag
+
+
+def leaves(command, name=()):
+    if not hasattr(command, "commands"):
+        return [" ".join(name)]
+    return [leaf for key, sub in command.commands.items() for leaf in leaves(sub, (*name, key))]
+
+
+def test_every_command_is_one_that_flies_or_one_that_runs_no_code_of_files():
+    commands = leaves(get_command(application(COMMANDS)))
+    assert sorted([*READERS, *FLYING, *IN_THE_GRAPH, *OTHERS]) == sorted(commands)
+
+
+def test_no_command_but_those_that_fly_runs_the_code_that_a_file_names(hsv, campaign, loaded, crafted, tmp_path):
+    (tmp_path / "own.toml").write_text(SCENARIO)
+    places = {"bag": crafted("/**"), "campaign": campaign, "design": find_design("baseline")}
+    for command, words in READERS.items():
+        assert hsv(*command.split(), *words.format(**places).split()).code in (0, 1, 2), command
+        assert not loaded(), command
+    assert (tmp_path / "vehicle.fmu").is_file() and (tmp_path / "report.html").is_file()
+
+
+def test_a_command_that_flies_loads_the_controller(hsv, loaded, tmp_path):
+    (tmp_path / "own.toml").write_text(SCENARIO)
+    assert hsv("simulate", "own.toml").code == 0
+    assert loaded()
+
+
+@pytest.mark.parametrize("place", ["marked:Own", "marked.so:own", "marked.fmu"])
+def test_no_python_entry_point_but_those_that_fly_loads_the_controller(loaded, tmp_path, monkeypatch, place):
+    monkeypatch.chdir(tmp_path)
+    opened = []
+    monkeypatch.setattr(library_process.LibraryProcess, "describe", lambda *words: opened.append(words) or 1 / 0)
+    (tmp_path / "marked.so").touch()
+    (tmp_path / "marked.fmu").touch()
+    (tmp_path / "own.toml").write_text(SCENARIO.replace("marked:Own", place))
+    scenario = hsv_package.load("own.toml")
+    flying = {
+        "fly": lambda: hsv_package.fly(scenario),
+        "sweep": lambda: hsv_package.sweep("own.toml", "seed", [1]),
+        "montecarlo": lambda: hsv_package.montecarlo(
+            "own.toml", 4, factors={"initial.altitude": ("26000 m", "26010 m")}
+        ),
+    }
+    reading = {
+        "load": lambda: hsv_package.load("own.toml"),
+        "compare": lambda: hsv_package.compare({}),
+        "linearise": lambda: hsv_package.linearise(),
+        "trim": lambda: hsv_package.trim(),
+        "plot": None,  # of flights
+        "Flight": None,
+        "LinearModel": None,
+        "Scenario": None,
+        "Trim": None,  # classes
+        "gym.TrackEnv": lambda: TrackEnv("own.toml").reset(seed=1),
+        "gym.TrackEnv drawn": lambda: TrackEnv("own.toml", scale=1.0).reset(seed=1),
+        "gym.TrackVectorEnv": lambda: TrackVectorEnv(2, "own.toml").reset(seed=1),
+        "exported_vehicle": lambda: exported_vehicle(scenario),
+    }
+    assert {*hsv_package.__all__} <= {*flying, *reading}
+    with pytest.raises(GovernorError, match="expected tube_mpc"):
+        governed("own.toml", 1.0)
+    for name, call in reading.items():
+        if call:
+            call()
+        assert not loaded() and not opened, name
+    for name, call in flying.items():
+        with pytest.raises(ZeroDivisionError) if place != "marked:Own" else nullcontext():
+            call()
+        assert loaded() or opened, name
+        opened.clear()
+
+
+def test_all_code_of_files_goes_through_one_gate():
+    """Nothing else makes the classes that load a library, or imports a module by a name that a file may contain."""
+    sources = {path: path.read_text() for path in Path(hsv_package.__file__).parent.rglob("*.py")}
+    makers = {path.name for path, text in sources.items() if re.search(r"(?<!class )\b(LibraryClass|FmuClass)\(", text)}
+    assert makers == {"controllers.py"}
+    importers = {path.name for path, text in sources.items() if re.search(r"import_module\(", text)}
+    assert importers == {"controllers.py", "blocks.py", "main.py"}  # the latter two: modules of this library

@@ -17,7 +17,8 @@ from hsv.flight.closed_loop import fly
 from hsv.flight.repeatability import findings, from_copied_state
 from hsv.flight.scenario import load_scenario, scenario_text
 from hsv.graph.preparation import prepare
-from hsv.plugins.library import include_folder, library_digest, library_record
+from hsv.plugins.controllers import library_record
+from hsv.plugins.library import include_folder, library_digest
 from hsv.plugins.library_child import LoadedLibrary
 from hsv.plugins.library_process import SharedMemory
 

@@ -12,7 +12,8 @@ from c_libraries import PROBE, WARNINGS, build_probe
 from hsv.base.errors import ParameterError
 from hsv.control.controller import CONTROLLER_INPUTS, CONTROLLER_OUTPUTS
 from hsv.model.signals import FILTER_STATE
-from hsv.plugins.library import include_folder, library_digest, library_record, load_block
+from hsv.plugins.controllers import library_record
+from hsv.plugins.library import include_folder, library_digest, load_block
 
 
 def test_a_flight_keeps_digest_and_source_of_its_library(tmp_path):

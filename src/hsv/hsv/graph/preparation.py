@@ -21,7 +21,8 @@ from hsv.flight.assembly import assemble_flight, blamed_on, own_parameters
 from hsv.flight.scenario import Scenario, parse_scenario, scenario_text, with_controller
 from hsv.graph.exclusive import ports
 from hsv.graph.launcher import executable
-from hsv.plugins.library import library_digest, library_record
+from hsv.plugins.controllers import library_record
+from hsv.plugins.library import library_digest
 
 
 @dataclass(frozen=True)

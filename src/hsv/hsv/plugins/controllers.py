@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from hsv.base.errors import HsvError, ParameterError, one_of
@@ -33,7 +34,7 @@ from hsv.control.controller import (
 )
 from hsv.model.vehicle import Vehicle
 from hsv.plugins.fmu import FmuClass
-from hsv.plugins.library import LibraryClass, library_place
+from hsv.plugins.library import LibraryClass, library_digest, library_place
 
 if TYPE_CHECKING:
     from hsv.control.design import ControlDesign
@@ -63,6 +64,9 @@ def names_code(controller: str) -> bool:
 def controller_class(name: str) -> ControllerClass:
     """Return the class of the controller ``name``, or an object with its interface if it is in a library or an FMU.
 
+    This is the only place that loads code which a file names. What flies calls it; other commands assemble the
+    scenario of :func:`hsv.flight.assembly.without_code`.
+
     Raises:
         ParameterError: There is no such controller, or it cannot be loaded.
     """
@@ -86,6 +90,37 @@ def controller_class(name: str) -> ControllerClass:
     if not all(isinstance(parameter, Parameter) for parameter in found.PARAMETERS):
         raise ParameterError(f"controller = {name!r}: PARAMETERS: expected hsv.base.parameters.Parameter, each")
     return found
+
+
+@dataclass(frozen=True)
+class LibraryRecord:
+    """Data about a controller library or FMU that are stored with a recorded flight."""
+
+    sha256: str
+    """SHA-256 of the library file, hexadecimal."""
+    source_name: str
+    """Path of the source relative to the library's folder, as given by the block; empty if unknown or missing."""
+    source: bytes
+
+
+def library_record(controller: str) -> LibraryRecord | None:
+    """Return the data to store for a scenario's ``controller``, or None if it is not in a library or FMU.
+
+    Raises:
+        ParameterError: The library cannot be read or has no such controller.
+    """
+    place = library_place(controller)
+    if place is None:
+        return None
+    path, symbol = place
+    kind = controller_class(controller) if symbol else None
+    name, source = kind.block.source if isinstance(kind, LibraryClass) else "", b""
+    if name:
+        try:
+            source = (path.parent / name).read_bytes()
+        except OSError:
+            name = ""  # a flight does not need the source
+    return LibraryRecord(library_digest(controller), name, source)
 
 
 def class_place(name: str) -> str:

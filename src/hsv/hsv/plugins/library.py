@@ -226,36 +226,6 @@ def seen_from(controller: str, folder: Path) -> str:
     return f"./{controller.removeprefix(f'{folder.resolve()}/')}"
 
 
-@dataclass(frozen=True)
-class LibraryRecord:
-    """Data about a controller library or FMU that are stored with a recorded flight."""
-
-    sha256: str
-    """SHA-256 of the library file, hexadecimal."""
-    source_name: str
-    """Path of the source relative to the library's folder, as given by the block; empty if unknown or missing."""
-    source: bytes
-
-
-def library_record(controller: str) -> LibraryRecord | None:
-    """Return the data to store for a scenario's ``controller``, or None if it is not in a library or FMU.
-
-    Raises:
-        ParameterError: The library cannot be read or has no such controller.
-    """
-    place = library_place(controller)
-    if place is None:
-        return None
-    path, symbol = place
-    name, source = LibraryClass(controller, path, symbol).block.source if symbol else "", b""
-    if name:
-        try:
-            source = (path.parent / name).read_bytes()
-        except OSError:
-            name = ""  # a flight does not need the source
-    return LibraryRecord(library_digest(controller), name, source)
-
-
 def library_digest(controller: str) -> str:
     """Return the SHA-256, in hexadecimal, of the library or FMU of a scenario's ``controller``; empty for others.
 
