@@ -18,7 +18,7 @@ import hsv as hsv_package
 from hsv.base.errors import GovernorError
 from hsv.cli.entry import COMMANDS
 from hsv.cli.main import application
-from hsv.control.design import find_design
+from hsv.control.design_file import find_design
 from hsv.flight.campaign.sample_runner import CAMPAIGN, DIGEST
 from hsv.flight.campaign.store import result_digest
 from hsv.flight.export import exported_vehicle
