@@ -1,4 +1,4 @@
-"""Commands on models and designs: trim, linear models, design, verification, certification, governor and export."""
+"""Commands on designs: design, verification, certification and governor."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from rich.text import Text
 from typer import Argument, Option
 
 from hsv.base.errors import DesignError, ParameterError, QuantityError
-from hsv.base.files import json_text
 from hsv.base.units import UnitSystem, in_words, significant
 from hsv.cli import output
 from hsv.cli.options import (
@@ -20,9 +19,7 @@ from hsv.cli.options import (
     JsonOption,
     ScenarioArgument,
     UnitsOption,
-    check_folder,
     check_new,
-    check_target,
     writing,
 )
 
@@ -30,152 +27,15 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy as np
-    from rich.table import Table
 
     from hsv.certificate.checks import Check, Subject
     from hsv.control.design import ControlDesign
-    from hsv.control.linear_model import LinearModel
-    from hsv.model.lpv.linearisation import Mode
-    from hsv.plugins.fmu_export import ExportedBlock
 
 _DESIGN_SECONDS = {"baseline": 175.0, "adjustable": 294.0}
 """Measured computation times (s) of these two designs, with 1025 flights each."""
 
-AltitudeOption = Annotated[
-    str, Option(help="Altitude with unit, e.g. '85500 ft'; default: a published point, or the envelope's middle.")
-]
-VelocityOption = Annotated[str, Option(help="Velocity with unit, e.g. '7900 ft/s'; default likewise.")]
-CouplingOption = Annotated[
-    str, Option(help="Inertial coupling: a set of the vehicle, or a multiple of derived, as 0.65.")
-]
-VehicleOption = Annotated[str, Option(help="Vehicle, by name or path of a TOML file; default: the paper's.")]
-
-UNIT_SYSTEMS = {
-    UnitSystem.metric: "SI with degrees",
-    UnitSystem.si: "SI",
-    UnitSystem.paper: "ft, ft/s, deg, slug^0.5 ft",
-}
 HALF_WIDTHS = {"h": "m", "V": "m/s", "alpha": "rad", "theta": "rad", "q": "rad/s", "FZ fuel": "1", "FZ elevator": "rad"}
 """Headings of a table of invariant sets, with SI units: half-widths of the rigid states and of the feedback F Z."""
-
-
-def trim(
-    altitude: AltitudeOption = "",
-    velocity: VelocityOption = "",
-    climb_rate: Annotated[str, Option(help="Climb rate with unit, e.g. '10 ft/s'.")] = "0 m/s",
-    acceleration: Annotated[str, Option(help="Acceleration with unit, e.g. '4 ft/s^2'.")] = "0 m/s^2",
-    vehicle: VehicleOption = "",
-    coupling: CouplingOption = "",
-    units: UnitsOption = UnitSystem.metric,
-    json: JsonOption = False,
-) -> None:
-    """Compute the equilibrium at an altitude and a velocity (paper eq. 5): level, or climbing and accelerating.
-
-    Example: hsv trim --altitude "85500 ft" --velocity "7900 ft/s" --units paper
-    """
-    from hsv.model.dynamics import forces
-    from hsv.model.trim import trim_at
-    from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
-
-    described = load_vehicle(vehicle or DEFAULT_VEHICLE)
-    parameters = described.coupled(coupling)
-    found = trim_at(parameters, *described.condition(altitude, velocity), climb_rate, acceleration)
-    units_of_forces = {"lift": "N", "drag": "N", "thrust": "N", "pitching_moment": "N m", "dynamic_pressure": "Pa"}
-    acting = zip(units_of_forces.items(), forces(found.state, found.input, parameters), strict=True)
-    quantities = found.quantities | {name: (value, unit) for (name, unit), value in acting}
-    if json:
-        output.print_json(output.to_json(quantities, units) | {"largest_residual_si": found.residual})
-    else:
-        output.print_table("Trim", quantities, units, digits=5)
-
-
-def linearise(
-    altitude: AltitudeOption = "",
-    velocity: VelocityOption = "",
-    vehicle: VehicleOption = "",
-    coupling: CouplingOption = "",
-    model: Annotated[str, Option(help="Model: coupled (CM), decoupled (DM), with notch filter (ECM).")] = "CM",
-    reading: Annotated[str, Option(help="Pitch rate in eq. 40 (ECM): physical (q) or printed (q').")] = "",
-    out: Annotated[Path | None, Option(help="Also write the model to this .mat, .npz or .json file.")] = None,
-    units: UnitsOption = UnitSystem.metric,
-    json: JsonOption = False,
-) -> None:
-    """Compute the linear model at a trim point, its poles and zeros (paper eq. 6 to eq. 9; ECM: eq. 40 to eq. 43).
-
-    The zeros are those from both inputs to altitude and velocity. Files and JSON have A, B, C and D, the names and
-    units of states, inputs and outputs, and the operating point.
-
-    Example: hsv linearise --coupling derived --model ECM --out model.mat
-    """
-    from hsv.control.linear_model import linearise
-
-    if out:
-        check_target(out, "out", ".mat", ".npz", ".json")
-    found = linearise(altitude, velocity, vehicle=vehicle, coupling=coupling, model=model, reading=reading)
-    if json or out:
-        units = output.json_system(units)
-    shown = found.in_units(units)
-    poles, zeros = found.poles, found.zeros
-    described = _described(shown, units) | {"poles": [*map(_mode, poles)], "zeros": [*map(_mode, zeros)]}
-    if out:
-        with writing(out, "out"):
-            if out.suffix == ".json":
-                out.write_text(json_text(described, indent=2) + "\n", encoding="utf-8")
-            else:
-                shown.save(out)
-    if json:
-        output.print_json(described)
-        return
-    for name, matrix, columns in (("A", shown.A, shown.states), ("B", shown.B, shown.inputs)):
-        cells = [[significant(entry) for entry in row] for row in matrix.tolist()]
-        output.print_matrix(f"{name} ({UNIT_SYSTEMS[units]})", list(shown.states), list(columns), cells)
-    output.console.print(_modes_table("Poles", poles))
-    if zeros:
-        output.console.print(_modes_table("Zeros from both inputs to altitude and velocity", zeros))
-    if out:
-        output.say(f"written {out}")
-
-
-def _described(model: LinearModel, units: UnitSystem) -> dict[str, Any]:
-    """Return a linear model as JSON; its numbers are in ``units``, whose name is in the keys of the matrices."""
-    values = {name: value.tolist() if hasattr(value, "tolist") else value for name, value in model.as_dict().items()}
-    matrices = {f"{name}_{units}": values.pop(name) for name in "ABCD"}
-    points = (("state", model.states), ("input", model.inputs))
-    at = {
-        f"{name}{'_' * bool(output.unit_key(unit))}{output.unit_key(unit)}": value
-        for kind, signals in points
-        for (name, unit), value in zip(signals.items(), values.pop(f"operating_{kind}"), strict=True)
-    }
-    return values | matrices | {"operating_point": at}
-
-
-def _damping(mode: Mode) -> float | None:
-    """Return the damping ratio; None for a pole at the origin, where its sign would be that of a rounding error."""
-    return mode.damping_ratio if round(mode.natural_frequency, 9) else None
-
-
-def _mode(mode: Mode) -> dict[str, float | None]:
-    return {
-        "real_rad_per_s": mode.pole.real,
-        "imag_rad_per_s": mode.pole.imag,
-        "natural_frequency_rad_per_s": mode.natural_frequency,
-        "damping_ratio": _damping(mode),
-    }
-
-
-def _modes_table(title: str, modes: list[Mode]) -> Table:
-    headings = ("real rad/s", "imaginary rad/s", "frequency rad/s", "damping ratio")
-    table = output.new_table(*headings, title=title, right=headings)
-    for mode in modes:
-        damping = _damping(mode)
-        table.add_row(
-            # A pole at the origin has a rounding error.
-            significant(round(mode.pole.real, 9) + 0.0),
-            f"±{significant(mode.pole.imag)}" if mode.pole.imag else "0",
-            significant(round(mode.natural_frequency, 9)),
-            "-" if damping is None else significant(damping),
-        )
-    return table
 
 
 def design(
@@ -480,85 +340,3 @@ def govern(
     output.console.print(table)
     if out:
         output.say(f"written {out}")
-
-
-FMU_HELP = "FMU for co-simulation, FMI 3.0, to write; needs a C compiler."
-
-
-def export_controller(
-    design: Annotated[str, Argument(help="Name of a design in offline_design/, or path of its parameter file.")],
-    out: Annotated[Path | None, Option(help="Folder for the C files; new, or with such files only.")] = None,
-    fmu: Annotated[Path | None, Option(help=FMU_HELP)] = None,
-    force: ForceOption = False,
-    json: JsonOption = False,
-) -> None:
-    """Write the notch filter, nominal trajectory and tube law of a design as C99 or FMU; print the cost of a step.
-
-    Example: hsv export-controller baseline --out controller
-    """
-    from hsv.control.design_file import find_design, read_design
-    from hsv.plugins.export import controller_files, exported_controller, step_bounds
-
-    if out is None and fmu is None:
-        raise ParameterError("out, fmu: missing, expected --out FOLDER, --fmu FILE or both")
-    loaded = read_design(find_design(design))
-    texts = controller_files(loaded) if out else {}
-    if out:
-        check_folder(out, "out")
-        others = sorted({path.name for path in out.iterdir()} - texts.keys()) if out.exists() else []
-        if others:
-            raise ParameterError(
-                f"out = {str(out)!r}: holds {others[0]}, expected a new folder, or {', '.join(texts)} only"
-            )
-    if fmu:
-        _write_fmu(fmu, exported_controller(loaded), force)
-    for name, text in texts.items():
-        assert out
-        out.mkdir(parents=True, exist_ok=True)
-        with writing(out / name, "out"):
-            (out / name).write_text(text, encoding="utf-8")
-    bounds = step_bounds(loaded)
-    if not json:
-        counts = ("multiplications", "additions", "comparisons", "numbers of state")
-        table = output.new_table("most in a step", *counts, right=counts)
-        for name, bound in bounds.items():
-            table.add_row(name, *map(str, vars(bound).values()))
-        output.console.print(table)
-    costs = {name: vars(bound) for name, bound in bounds.items()}
-    written = [*([out / name for name in texts] if out else ()), *([fmu] if fmu else ())]
-    output.print_written(written, json, most_in_a_step=costs)
-
-
-def export_vehicle(
-    scenario: ScenarioArgument,
-    fmu: Annotated[Path, Option(help=FMU_HELP)],
-    force: ForceOption = False,
-    json: JsonOption = False,
-) -> None:
-    """Write the vehicle of a scenario, with its equipment, faults and reference, as an FMU.
-
-    Example: hsv export-vehicle case1 --fmu vehicle.fmu
-    """
-    from hsv.flight.export import exported_vehicle
-    from hsv.flight.scenario import load_scenario
-
-    _write_fmu(fmu, exported_vehicle(load_scenario(scenario)), force)
-    output.print_written([fmu], json)
-
-
-def _write_fmu(path: Path, block: ExportedBlock, force: bool) -> None:
-    from hsv.plugins.fmu_export import write_fmu
-
-    check_new(path, "fmu", force)
-    with writing(path, "fmu"):
-        write_fmu(path, block)
-
-
-def include() -> None:
-    """Print the folder of hsv_block.h, the header of controllers and other blocks in C, for a compiler's option -I.
-
-    Example: hsv include
-    """
-    from hsv.plugins.library import include_folder
-
-    print(include_folder())

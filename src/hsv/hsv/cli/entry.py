@@ -11,14 +11,17 @@ from hsv.base.processes import take_interrupts
 DESCRIPTION = "Fly a flexible air-breathing hypersonic vehicle under Tube-MPC, software in the loop."
 
 TREE = (
-    ("Fly", "hsv.cli.fly", "run simulate montecarlo resilience"),
+    ("Fly", "hsv.cli.fly", "run simulate"),
+    ("Fly", "hsv.cli.campaigns", "montecarlo resilience"),
     ("Look at flights", "hsv.cli.look", "report plot info view"),
     ("In flight", "hsv.cli.in_flight", "fault set command watch topic"),
     ("Bags", "hsv.cli.bags", "replay diff export recover play"),
-    ("Design", "hsv.cli.design", "trim linearise design verify certify govern export-controller export-vehicle"),
+    ("Design", "hsv.cli.models", "trim linearise"),
+    ("Design", "hsv.cli.design", "design verify certify govern"),
+    ("Design", "hsv.cli.code", "export-controller export-vehicle"),
     ("Know", "hsv.cli.know", "list check bench"),
     ("", "hsv.cli.fly", "prepare conclude"),
-    ("", "hsv.cli.design", "include"),
+    ("", "hsv.cli.code", "include"),
 )
 """The commands by subject: heading in the help, module, names. Commands without a heading are hidden."""
 

@@ -1,8 +1,9 @@
-"""The parameter reference of the documentation: ``python -m hsv.graph.reference > docs/parameters.md``."""
+"""Write docs/parameters.md. Usage, after "source env.sh": python3 tools/parameter_page.py."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
 from hsv.bags.description import CARRIED
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
@@ -16,10 +17,10 @@ from hsv.model.signals import VARYING
 from hsv.model.vehicle import VEHICLE_PARAMETERS
 
 _HEADER = """# Parameters of the nodes
-Made by `python -m hsv.graph.reference > docs/parameters.md` from the tables that the nodes declare. All values are in
-SI units. A value of the wrong type or outside its range ends the node before it joins the graph, with one line and exit
-code 2; floats need a decimal point (`-p duration:=200.0`). So does an unknown parameter, and the line
-names the most similar one; a file, unlike `-p`, may contain parameters of other nodes.
+Made by `python3 tools/parameter_page.py` from the tables that the nodes declare. All values are in SI units. A value of
+the wrong type or outside its range ends the node before it joins the graph, with one line and exit code 2; floats need
+a decimal point (`-p duration:=200.0`). So does an unknown parameter, and the line names the most similar one; a file,
+unlike `-p`, may contain parameters of other nodes.
 Parameters cannot be changed once a node runs, unless the last column says otherwise.
 
 The output of `ros2 param dump` for a node can be passed to it with `--params-file` and gives the same flight; the
@@ -97,4 +98,4 @@ def _faults() -> str:
 
 
 if __name__ == "__main__":
-    print(reference(), end="")
+    Path(__file__).parents[1].joinpath("docs", "parameters.md").write_text(reference(), encoding="utf-8")
