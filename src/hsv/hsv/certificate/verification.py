@@ -719,25 +719,30 @@ def _star_checks(subject: Subject, tube: Tube) -> Checks:
 
 
 def counter_example_checks(subject: Subject) -> Checks:
-    """Recompute the errors that counter-examples reach (eq. 22), if stated; no half-width (eq. 28) may be smaller.
-
-    At a constant vertex i and with W moved to the origin, an output y e reaches at most the sum over j < m of
-    |y A_i^j G_i| times the half-widths of W in m steps, namely with disturbances that have the signs of the terms.
-    """
+    """Recompute the errors that counter-examples reach (eq. 22); no half-width (eq. 28) may be smaller."""
     inside = "tube.invariant_set"
-    if "star_norms" not in subject.stated(inside):
-        return
     tube, stated = Tube(subject, subject.design, "tube"), subject.stated(f"{inside}.counter_examples")
-    driven = np.zeros(len(tube.rows))
-    for k, (row, vertex, steps) in enumerate(zip(tube.rows, stated["vertex"], stated["steps"], strict=True)):
-        for _ in range(min(steps, _LONGEST)):
-            driven[k] += np.abs(row @ tube.G[vertex]) @ tube.half
-            row = row @ tube.A[vertex]
+    outputs = zip(tube.rows, stated["sequences"], strict=True)
+    driven = np.array([reach(tube.A, tube.G * tube.half, row, sequence) for row, sequence in outputs])
     check = recomputed(subject, f"{inside}.counter_examples.half_range", driven, "half-widths")
-    names = "half_range", "vertex", "steps"
-    yield replace(check, fields=tuple(f"{inside}.counter_examples.{name}" for name in names))
+    yield replace(check, fields=(check.name, f"{inside}.counter_examples.sequences"))
     certified = np.concatenate((tube.half_width[:N_RIGID], tube.feedback))
     yield required(at_most("counter-examples, largest share of a half-width", (driven / certified).max(), 1.0))
+
+
+def reach(A: np.ndarray, columns: np.ndarray, row: np.ndarray, sequence: Sequence[tuple[int, int]]) -> float:
+    """Return the largest output ``row`` (n) of v+ = A_i v + g_i d with |d_j| <= 1 after a ``sequence`` from v = 0.
+
+    It is the sum of |l g_i| over all steps, with l the response of the output to the v after the step. ``columns`` (r,
+    n, d) are the g_i; the sequence has pairs of vertex i and number of steps, first step first.
+    """
+    reached, left = 0.0, _LONGEST
+    for vertex, steps in reversed(sequence):
+        for _ in range(min(steps, left)):
+            reached += float(np.abs(row @ columns[vertex]).sum())
+            row = row @ A[vertex]
+        left -= steps
+    return reached
 
 
 # --- adjustable factor, eq. 47 to 54 ----------------------------------------------------------------------------------

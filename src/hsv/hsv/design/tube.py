@@ -76,10 +76,9 @@ class MeasuredSet:
         """Return the disturbance set, the invariant set and the tightened inputs, for JSON."""
         found = self.found
         lag = {"lag_feedback": {"lower": self.lag[0].tolist(), "upper": self.lag[1].tolist()}} if self.lag else {}
-        driven = {"counter_examples": counter_examples(found.problem).as_dict()} if found.star_norms else {}
         return {
             "disturbance": _disturbance_report(self.measured, self.disturbance),
-            "invariant_set": {**found.report(), **driven, "certificate": self.certified},
+            "invariant_set": {**found.report(), "certificate": self.certified},
             "tightening": {**lag, "lower": self.bounds.lower.tolist(), "upper": self.bounds.upper.tolist()},
         }
 
@@ -131,6 +130,7 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
     plan["pitch_acceleration"] = [float(lowest[2]), float(highest[2])]
     report = tube.report()
     report["invariant_set"]["sampling"] = sampling
+    report["invariant_set"]["counter_examples"] = counter_examples(found.problem).as_dict()
     report["tightening"]["plan"] = plan
     report["flights"] = flights_report(flown)
     return Tube(found, bounds, allowed, report)
