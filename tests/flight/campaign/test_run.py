@@ -1,6 +1,8 @@
 """Campaigns complete in spite of interruption, damaged files, full disks and crashing flights."""
 
 import json
+import subprocess
+import sys
 from contextlib import ExitStack
 
 import numpy as np
@@ -199,3 +201,24 @@ def test_results_of_two_libraries_are_not_mixed(fly):
     build_probe(library_place(campaign.scenario.controller)[0].parent, "-DSTATE_SIZE=3")
     with pytest.raises(CampaignError, match=r"not the library that the campaign began with, expected the one of SHA-"):
         SampleRunner(campaign)
+
+
+def test_a_campaign_is_flown_and_summarised_without_pandas(short, tmp_path):
+    # The import takes longer than 50 flights, in each worker process; pyarrow imports pandas for many conversions.
+    program = """
+import sys
+from pathlib import Path
+from hsv.flight.campaign.campaign import plan
+from hsv.flight.campaign.executors import Executor
+from hsv.flight.campaign.run import run_campaign
+from hsv.flight.campaign.store import ResultStore
+from hsv.flight.campaign.summary import Results
+from hsv.pages.campaign import campaign_page
+
+campaign, out = plan(sys.argv[1], samples=2), Path(sys.argv[2])
+run_campaign(campaign, ResultStore(out, campaign), Executor())
+campaign_page(Results(out))
+sys.exit("pandas" in sys.modules)
+"""
+    command = [sys.executable, "-c", program, short, str(tmp_path / "flown.parquet")]
+    assert subprocess.run(command).returncode == 0

@@ -96,14 +96,14 @@ def step_times_in_words(step_times: dict[str, Any]) -> str:
     return "; ".join([*times, f"a period has {step_times['period_ms']:g} ms"])
 
 
-def flight_of(components: Components, history: History) -> Flight:
-    """Return the flight that ``components`` have flown, with this ``history``."""
+def flight_of(components: Components, history: History, memory: tuple[np.ndarray, np.ndarray] | None = None) -> Flight:
+    """Return the flight that ``components`` have flown, with this ``history``; ``memory`` is that of its curves."""
     plant = components.plant
     diverged = not in_model_range(history.state[-1], plant.vehicle.angle_limit)
     status = FlightStatus.DIVERGED if diverged else FlightStatus.FINISHED
     rows, trajectory = len(history.signals), components.nominal_trajectory.reference
     time, reference, start = np.arange(rows) * plant.period, trajectory.along(rows).state, fault_start(components, rows)
-    return Flight(time, history, reference, start, plant.period, trajectory, status)
+    return Flight(time, history, reference, start, plant.period, trajectory, status, memory=memory)
 
 
 def fault_start(components: Components, rows: int) -> float | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 
@@ -118,6 +118,11 @@ CURVES = 10
 """Number of rows of :attr:`FlightData.curves`."""
 
 
+def curve_memory(rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return uninitialised memory for the curves and the saturation of a flight of at most ``rows`` steps."""
+    return np.empty((CURVES, rows)), np.empty((rows, N_INPUTS), np.uint8)
+
+
 @dataclass(frozen=True)
 class FlightData:
     """The signals of a simulated or recorded flight in the steps k = 0 ... n, from which metrics are computed; SI."""
@@ -129,15 +134,17 @@ class FlightData:
     """Reference state x_r (n + 1, 9)"""
     fault_start: float | None
     """Time of the first fault (s), None without a fault"""
+    memory: tuple[np.ndarray, np.ndarray] | None = field(default=None, repr=False, kw_only=True)
+    """Memory from :func:`curve_memory` for :attr:`curves` and :attr:`saturated`; None: allocate it when needed"""
 
     @cached_property
     def _evaluated(self) -> tuple[np.ndarray, np.ndarray]:
         """The :attr:`curves`, shape (10, n + 1), and :attr:`saturated`, shape (n + 1, 2)."""
         rows = len(self.time)
-        curves, saturated = np.empty((CURVES, rows)), np.empty((rows, N_INPUTS), np.uint8)
+        curves, saturated = self.memory or curve_memory(rows)
         inputs = map(doubles, map(vector, (self.history.signals, self.history.auxiliary, self.reference)))
-        lib.hsv_curves(rows, rows, *inputs, doubles(curves), ffi.from_buffer("uint8_t *", saturated))
-        return curves, saturated.view(bool)
+        lib.hsv_curves(rows, curves.shape[1], *inputs, doubles(curves), ffi.from_buffer("uint8_t *", saturated))
+        return curves[:, :rows], saturated[:rows].view(bool)
 
     @property
     def curves(self) -> np.ndarray:

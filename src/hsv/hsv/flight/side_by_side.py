@@ -14,7 +14,7 @@ from hsv.core import Struct, doubles, lanes, lib, vector
 from hsv.flight.closed_loop import Components, flight_struct, fly, is_ideal
 from hsv.flight.flight import Flight, flight_of
 from hsv.flight.history import History
-from hsv.flight.metrics import FlightData
+from hsv.flight.metrics import FlightData, curve_memory
 from hsv.model.faults.table import ENGINE_SIDE
 
 Result = TypeVar("Result")
@@ -30,6 +30,7 @@ class FlightGroup:
         self.lanes = lanes()
         self._memory = core.loop_memory(self.lanes)
         self._numbers = np.empty((self.lanes, 0))
+        self._curves: list[tuple[np.ndarray, np.ndarray]] = []
 
     @staticmethod
     def takes(components: Sequence[Components], rows: int | None = None) -> bool:
@@ -55,13 +56,15 @@ class FlightGroup:
         """
         rows, estimated = components[0].plant.steps + 1, not is_ideal(components[0])
         if self._numbers.shape[1] != rows * History.numbers():
+            # Kept for the next flights, because the first access to new memory takes longer than the computation.
             self._numbers = np.empty((self.lanes, rows * History.numbers()))
+            self._curves = [curve_memory(rows) for _ in range(self.lanes)]
         histories = [History.over(lane, rows, estimated=estimated) for lane in self._numbers]
         full = [*components, *[components[-1]] * (self.lanes - len(components))]
         structs = [flight_struct(own, history, set=tube_set) for own, history in zip(full, histories, strict=True)]
         core.fly(structs, self._memory, 0, rows)
-        flown = zip(components, histories, (struct.pointer for struct in structs), strict=False)
-        return [(flight_of(own, history.cut(int(end.ended))), float(end.worst)) for own, history, end in flown]
+        flown = zip(components, histories, self._curves, (struct.pointer for struct in structs), strict=False)
+        return [(flight_of(own, history.cut(end.ended), curves), end.worst) for own, history, curves, end in flown]
 
 
 class TubeLevels:

@@ -162,11 +162,13 @@ class Plant:
         return self.varied(self.vehicle.perturbed(perturbation), self.data.seed)
 
     def varied(self, vehicle: VehicleParameters, seed: int) -> Plant:
-        """Return a plant with another ``seed`` and another ``vehicle``, which must have the same limits."""
+        """Return a plant with another ``seed`` and another ``vehicle``, which must have the same limits.
+
+        It flies in the core; before :meth:`step`, reset it.
+        """
         other = copy(self)
         other.vehicle = vehicle
         other.data = self.data.replaced(vehicle=vehicle_struct(vehicle), seed=seed)
-        other._begin()
         return other
 
     def is_ideal(self, scheduled: Sequence[ScheduledFault]) -> bool:
@@ -177,15 +179,12 @@ class Plant:
 
     def reset(self) -> PlantResult:
         """Reset the flight to its initial trim and return the result of step 0."""
-        self._begin()
-        return self._result()
-
-    def _begin(self) -> None:
         self._state = self.initial.state.copy()
         self._step = 0
         self._memory = self.memory()
         self._active: tuple[ActiveFault, ...] = ()
         self._faults = plant_faults((), self.period)
+        return self._result()
 
     def memory(self) -> Struct:
         """Return the equipment's state before step 0: actuators at rest in the trim, still air."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from io import BytesIO
@@ -124,14 +124,19 @@ class SampleRunner:
 
     def fly_batch(self, batch: int) -> bytes:
         """Fly a batch, given by its number; return its table of results and its envelope as a Parquet file."""
-        flights, envelope, rows = self.campaign.flights(batch), Envelope.empty(), []
+        flights, envelope, outcomes = self.campaign.flights(batch), Envelope.empty(), []
         samples, seeds = self.campaign.draw(flights)
-        for flight, sample, seed, flown in zip(flights, samples, seeds, self.fly_all(flights, samples), strict=True):
+        for flown in self.fly_all(flights, samples):
             if not isinstance(flown, ControllerError):
                 envelope.add(flown[0], self.steps)
-            drawn = {f"sample_{f.name}": float(x) for f, x in zip(self.campaign.factors, sample, strict=True)}
-            rows.append({"flight": flight, "seed": int(seed), **drawn, **self.outcome(flown)})
-        return encode(self.campaign, rows, envelope)
+            outcomes.append(self.outcome(flown))
+        drawn = zip((f"sample_{factor.name}" for factor in self.campaign.factors), samples.T, strict=True)
+        columns = {"flight": flights, "seed": seeds, **dict(drawn)}
+        columns |= {
+            name: [outcome.get(name) for outcome in outcomes]
+            for name in ("diverged", "crashed", *OUTCOMES, "fingerprint")
+        }
+        return encode(self.campaign, columns, envelope)
 
     def _fly_alone(self, components: Components) -> FlownSample:
         try:
@@ -165,12 +170,29 @@ def _number(name: str, unit: str) -> pa.Field:
     return pa.field(name, pa.float64(), metadata={"unit": unit})
 
 
-def encode(campaign: Campaign, rows: list[dict[str, Any]], envelope: Envelope) -> bytes:
-    """Return the rows (one per flight) and the envelope of a batch as the content of a Parquet file."""
-    table = pa.Table.from_pylist(rows, schema=schema(campaign).with_metadata({ENVELOPE: envelope.encode()}))
+def encode(campaign: Campaign, columns: Mapping[str, Sequence[Any]], envelope: Envelope) -> bytes:
+    """Return the columns (one value per flight) and the envelope of a batch as the content of a Parquet file."""
+    fields = schema(campaign).with_metadata({ENVELOPE: envelope.encode()})
+    table = pa.Table.from_arrays([_array(field.type, columns[field.name]) for field in fields], schema=fields)
     stream = BytesIO()
     pq.write_table(table, stream, **_BATCH_WRITTEN)
     return stream.getvalue()
+
+
+def _array(kind: pa.DataType, values: Sequence[Any]) -> pa.Array:
+    """Return an Arrow array of ``values``, some of which may be None.
+
+    It is made of its buffers, because every conversion by pyarrow imports pandas, which takes longer than 50 flights.
+    """
+    buffers: list[np.ndarray | bytes] = [np.packbits([value is not None for value in values], bitorder="little")]
+    if pa.types.is_string(kind):
+        texts = [(value or "").encode() for value in values]
+        buffers += [np.cumsum([0, *map(len, texts)], dtype=np.int32), b"".join(texts)]
+    elif pa.types.is_boolean(kind):
+        buffers.append(np.packbits(values, bitorder="little"))
+    else:
+        buffers.append(np.array([0 if value is None else value for value in values], kind.to_pandas_dtype()))
+    return pa.Array.from_buffers(kind, len(values), [*map(pa.py_buffer, buffers)])
 
 
 @lru_cache(maxsize=1)

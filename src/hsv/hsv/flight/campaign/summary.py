@@ -28,6 +28,8 @@ CONFIDENCE = 0.95
 CRASHED, DIVERGED = ENDED = ("crashed", "diverged")
 """Reasons why a flight did not reach its end; :attr:`WorstFlight.limit` has them in place of a limit."""
 
+_NAN = pa.Array.from_buffers(pa.float64(), 1, [None, pa.py_buffer(np.array([math.nan]))])[0]
+
 TUBE_LIMIT = 1.0
 """Tube level on the boundary of the invariant set."""
 
@@ -92,20 +94,20 @@ class Results:
         return SampleRunner(self.campaign)
 
     def column(self, name: str) -> np.ndarray:
-        """Return a column of the results, shape (flights,), in SI units; undefined numbers are NaN."""
-        return np.asarray(self._column(name).to_numpy())
+        """Return a column of numbers or truth values, shape (flights,), in SI units; undefined numbers are NaN."""
+        return _values(self._table[name])
 
     def frame(self) -> DataFrame:
         """Return the results as a table with one row per flight; ``attrs["units"]`` has the SI units by column."""
-        table = self._read()
-        frame = table.to_pandas()
-        frame.attrs["units"] = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in table.schema}
+        frame = self._table.to_pandas()
+        fields = self._table.schema
+        frame.attrs["units"] = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in fields}
         return frame
 
     @property
     def crashed(self) -> np.ndarray:
         """Whether each flight ended because the controller failed, shape (flights,)."""
-        return np.asarray(self._column("crashed").is_valid())
+        return _values(self._table["crashed"].is_valid())
 
     @property
     def samples(self) -> np.ndarray:
@@ -120,10 +122,8 @@ class Results:
         """
         if not 0 <= flight < self.campaign.samples:
             raise CampaignError(f"flight = {flight}: expected 0 to {self.campaign.samples - 1}")
-        rows = self._read(filters=[("flight", "==", flight)]).to_pylist()
-        if len(rows) != 1:
-            raise CampaignError(f"{self.path}: has {len(rows)} rows of flight {flight}, expected one")
-        return dict(rows[0])
+        [row] = self._table.slice(flight, 1).to_pylist()
+        return dict(row)
 
     def sample(self, flight: int) -> dict[str, float]:
         """Return the recorded sample of a flight (SI) by factor; errors as for :meth:`row`."""
@@ -134,20 +134,24 @@ class Results:
         """Return the scenario file of a flight; ``replaced`` overrides top-level keys. Errors as for :meth:`row`."""
         return self.campaign.file(flight, list(self.sample(flight).values()), **replaced)
 
-    def _column(self, name: str) -> pa.ChunkedArray:
-        column = self._read(columns=[name])[name]
-        if len(column) != self.campaign.samples:
-            raise self._damaged()
-        return column
-
-    def _read(self, **what: Any) -> pa.Table:
+    @cached_property
+    def _table(self) -> pa.Table:
         try:
-            return pq.read_table(self.path, page_checksum_verification=True, **what)
+            with pq.ParquetFile(self.path, page_checksum_verification=True) as file:
+                table = file.read()
+            if not np.array_equal(_values(table["flight"]), range(self.campaign.samples)):
+                raise ValueError("rows that are not those of the campaign's flights")
         except (OSError, ValueError) as error:
-            raise self._damaged() from error
+            raise CampaignError(f"{self.path}: damaged, expected the result of a campaign") from error
+        return table
 
-    def _damaged(self) -> CampaignError:
-        return CampaignError(f"{self.path}: damaged, expected the result of a campaign")
+
+def _values(column: pa.ChunkedArray) -> np.ndarray:
+    """Return a column as an array, without importing pandas, as ``to_numpy`` would."""
+    values = column.combine_chunks()
+    if pa.types.is_boolean(values.type):
+        return np.from_dlpack(values.cast(pa.uint8())).view(bool)
+    return np.from_dlpack(values.fill_null(_NAN) if values.null_count else values)
 
 
 def limits(results: Results) -> dict[str, float]:
