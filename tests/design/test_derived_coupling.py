@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
+from hsv.certificate.loops import Feedback
 from hsv.control.design_file import find_design, read_design
 from hsv.flight.corners import corners
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.linear_loop import Feedback
+from hsv_paper.linear_loop import TARGET
 
 
 def elastic_damping(name, corner, coupling="derived", effectiveness=1.0):
     """Return the largest real part (1/s) of the elastic modes of the sampled loop at the end of Case 1."""
     vehicle = load_vehicle().coupled(coupling).perturbed(corner)
-    poles = Feedback.of(read_design(find_design(name))).around(vehicle, effectiveness=effectiveness).poles
+    poles = Feedback.of(read_design(find_design(name))).around(vehicle, TARGET, effectiveness).poles
     return poles[np.abs(poles.imag) > 8.0].real.max()
 
 

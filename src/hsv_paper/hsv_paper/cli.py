@@ -92,9 +92,7 @@ def claims(
 
 
 def sensitivity(
-    name: Annotated[
-        str, typer.Argument(help="coupling, sampling, notch, parameters, fault, weights, ramp, factor or hardware.")
-    ],
+    name: Annotated[str, typer.Argument(help="coupling, sampling, notch, parameters, fault, weights, ramp or factor.")],
     out: StudyOption = Path("study"),
     coarseness: CoarsenessOption = 1.0,
 ) -> None:

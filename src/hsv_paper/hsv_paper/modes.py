@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import find_peaks
 
+from hsv.certificate.loops import ELEVATOR
 from hsv.control.notch_filter import NotchSection, notch_response
 from hsv.model.dynamics import jacobian
 from hsv.model.lpv.linearisation import Mode, bode, frequency_response, modes
 from hsv.model.signals import PITCH_RATE
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.linear_loop import ELEVATOR, START
+from hsv_paper.linear_loop import START
 
 Coupling = str | float
 """Name of a set of coupling coefficients, or a multiple of the derived set."""

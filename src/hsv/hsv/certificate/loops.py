@@ -69,6 +69,10 @@ class BrokenLoop:
         z = np.exp(1j * frequency * self.period)
         return np.asarray(np.eye(len(self.C)) + self.C @ np.linalg.solve(z * np.eye(len(self.A)) - self.A, self.B))
 
+    def transfer(self, frequency: float) -> complex:
+        """Return the loop transfer function L = 1 / S - 1 of a single signal at a ``frequency`` (rad/s)."""
+        return complex(1.0 / self.sensitivity_at(frequency)[0, 0] - 1.0)
+
     @cached_property
     def _modes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         poles, modes = np.linalg.eig(self.A)
@@ -147,9 +151,7 @@ class Feedback:
         """Return the feedback with ``factor`` times the gain F of a design, with or without its notch filter."""
         return cls(factor * design.feedback_gain, design.notch if notched else (), design.period, hardware)
 
-    def around(
-        self, vehicle: VehicleParameters, point: tuple[float, float], effectiveness: float = 1.0
-    ) -> SampledLoop:
+    def around(self, vehicle: VehicleParameters, point: tuple[float, float], effectiveness: float = 1.0) -> SampledLoop:
         """Return the loop around a vehicle in trim at ``point``: altitude (m) and velocity (m/s).
 
         Raises:

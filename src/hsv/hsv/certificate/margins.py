@@ -78,7 +78,11 @@ class ClassicalMargins:
 def grid(period: float, count: int = 540) -> np.ndarray:
     """Return frequencies (rad/s) from 0.01 to nearly the Nyquist frequency, closest where elastic modes lie."""
     top = 0.9999 * pi / period
-    parts = np.geomspace(0.01, 10.0, count // 2), np.linspace(10.0, 25.0, count // 3), np.geomspace(25.0, top, count // 6)
+    parts = (
+        np.geomspace(0.01, 10.0, count // 2),
+        np.linspace(10.0, 25.0, count // 3),
+        np.geomspace(25.0, top, count // 6),
+    )
     return np.unique(np.concatenate(parts).clip(max=top))
 
 
@@ -136,8 +140,8 @@ def crossings(loop: BrokenLoop, margin: float, scaling: float = 1.0) -> np.ndarr
 
     They are the eigenvalues on the unit circle of the symplectic pencil of G = S - 1/2, a discrete-time version of the
     test of Boyd, Balakrishnan and Kabamba. If the loop is stable and there are none, and S - 1/2 is smaller at one
-    frequency, then 1 / ``margin`` bounds it at all frequencies: no grid is involved. ``scaling`` multiplies the first of
-    two channels. The pencil is that of
+    frequency, then 1 / ``margin`` bounds it at all frequencies; no grid is involved. ``scaling`` multiplies the first
+    of two channels. The pencil is that of
 
         z x = A x + B w,    mu = z (A' mu + C' (C x + D w)),    gamma^2 w = D' (C x + D w) + B' mu,    D = I/2.
     """
@@ -231,20 +235,22 @@ def classical_margins(loop: BrokenLoop, frequencies: np.ndarray | None = None) -
     The upper gain margin of a discrete loop may lie at the Nyquist frequency, the lower one at frequency zero.
     """
     w = grid(loop.period, 2400) if frequencies is None else frequencies
-    L = 1.0 / loop.sensitivity(w)[:, 0, 0] - 1.0
-
-    def response(frequency: float) -> complex:
-        return complex(1.0 / loop.sensitivity_at(frequency)[0, 0] - 1.0)
-
+    L, response = 1.0 / loop.sensitivity(w)[:, 0, 0] - 1.0, loop.transfer
     real = [(f, response(f)) for f in (0.0, *_roots(lambda f: response(f).imag, w, L.imag), pi / loop.period)]
     factors = [(1.0 / abs(value), f) for f, value in real if value.real < 0.0 and np.isfinite(value)]
     up, at_up = min((each for each in factors if each[0] > 1.0), default=(inf, nan))
     down = max((factor for factor, _ in factors if factor < 1.0), default=0.0)
-    unit = _roots(lambda f: np.log(abs(response(f))), w, np.log(np.abs(L)))
-    lags = [(np.angle(response(f)) + pi, f) for f in unit]  # the lag that leads to -1, 0 to 2 pi
-    phase, at_phase = min(((min(lag, 2.0 * pi - lag), f) for lag, f in lags), default=(inf, nan))
-    delay = min((lag / f for lag, f in lags), default=inf)
+    unit = crossovers(loop, w)
+    phase, at_phase = min(((min(lag, 2.0 * pi - lag), f) for f, lag in unit), default=(inf, nan))
+    delay = min((lag / f for f, lag in unit), default=inf)
     return ClassicalMargins(up, down, float(phase), float(delay), at_phase, at_up)
+
+
+def crossovers(loop: BrokenLoop, frequencies: np.ndarray) -> list[tuple[float, float]]:
+    """Return the frequencies (rad/s) of unit loop gain, with the phase lag (rad, 0 to 2 pi) that leads from L to -1."""
+    values = np.log(np.abs(1.0 / loop.sensitivity(frequencies)[:, 0, 0] - 1.0))
+    unit = _roots(lambda f: float(np.log(abs(loop.transfer(f)))), frequencies, values)
+    return [(f, float(np.angle(loop.transfer(f))) + pi) for f in unit]
 
 
 def _roots(function: Callable[[float], float], at: np.ndarray, values: np.ndarray) -> list[float]:

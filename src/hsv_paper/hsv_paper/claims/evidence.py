@@ -11,6 +11,7 @@ import numpy as np
 
 from hsv.base.processes import Progress
 from hsv.base.units import to_paper
+from hsv.certificate.loops import Feedback, Hardware
 from hsv.control.notch_filter import NotchSection
 from hsv.flight.assembly import flight_parameters
 from hsv.flight.corners import Corner, corners, screening_corners
@@ -19,7 +20,7 @@ from hsv.model.actuators import ACTUATOR_SETS, IDEAL
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.designs import certificate, design
 from hsv_paper.flights import Point, Table, fly_over
-from hsv_paper.linear_loop import Feedback, Hardware
+from hsv_paper.linear_loop import growths
 
 ELEVATORS = {name: ACTUATOR_SETS[name] for name in ("elevator_150", "elevator_50", "elevator_20")}
 """Elevators that a claim may name, each flown with the fuel delivery of 10 rad/s; the paper's are ideal."""
@@ -96,7 +97,7 @@ class Evidence:
         """
         self._progress(f"poles, {coupling} coupling", 0, 1)
         loop = Feedback(factor * design(name).feedback_gain, notch, design(name).period, self.hardware)
-        return loop.growths(load_vehicle().coupled(coupling), self._loops)
+        return growths(loop, load_vehicle().coupled(coupling), self._loops)
 
 
 def certified(entry: str) -> np.ndarray:

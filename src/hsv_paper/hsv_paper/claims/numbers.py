@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
+from hsv.certificate.loops import ELEVATOR, Feedback
+from hsv.certificate.margins import crossovers
 from hsv.control.design import ControlDesign
 from hsv.control.design_file import find_design, read_parameters
 from hsv.control.nominal_law import FamilyLaw
@@ -45,7 +47,7 @@ from hsv_paper.designs import (
 )
 from hsv_paper.figures.frequency import POLE_DAMPINGS, POLE_FREQUENCIES
 from hsv_paper.flights import Point, flight_of, fly_over
-from hsv_paper.linear_loop import ELEVATOR, TARGET, Feedback, phase_margins
+from hsv_paper.linear_loop import TARGET, critical_coupling
 
 Numbers = dict[str, Any]
 
@@ -290,7 +292,7 @@ def without_notch(evidence: Evidence) -> Numbers:
 
     ``margin``: the coupling at which the nominal vehicle's loop becomes unstable (inf: none), over the paper-like one.
     """
-    limit = Feedback.of(design("baseline"), notched=False, hardware=evidence.hardware).critical_coupling()
+    limit = critical_coupling(Feedback.of(design("baseline"), notched=False, hardware=evidence.hardware))
     return {
         "paper_like": evidence.growth("paper_like", ()),
         "derived": evidence.growth("derived", ()),
@@ -326,7 +328,8 @@ def margins(evidence: Evidence, corner: Corner, *, notched: bool) -> np.ndarray:
     vehicle = load_vehicle().coupled("paper_like").perturbed(corner)
     loop = Feedback.of(flown, notched=notched, hardware=evidence.hardware).around(vehicle, TARGET)
     sign = 1.0 if loop.growth < 0.0 else -1.0
-    return np.asarray(phase_margins(frequencies, loop.elevator_loop(frequencies)) * [1.0, sign])
+    found = [(at, sign * min(lag, 2.0 * np.pi - lag)) for at, lag in crossovers(loop.broken("elevator"), frequencies)]
+    return np.array(found)
 
 
 def phase_margin(evidence: Evidence) -> Numbers:

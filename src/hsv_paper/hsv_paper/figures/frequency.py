@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from hsv.certificate.loops import ELEVATOR
 from hsv.control.notch_filter import notch_response
 from hsv.model.lpv.linearisation import bode, frequency_response, linearise, zero_order_hold
 from hsv.model.signals import PITCH_RATE
 from hsv.model.vehicle import load_vehicle
 from hsv_paper import plots
 from hsv_paper.designs import BETWEEN, CODESIGN_FREQUENCIES, codesigned_model, design, extended_model, inputs_of
-from hsv_paper.linear_loop import ELEVATOR
 from hsv_paper.modes import elastic_modes, linearised, pitch_rate_response
 
 POLE_FREQUENCIES = (10.0, 15.0, 20.0)

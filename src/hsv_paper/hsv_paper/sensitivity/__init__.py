@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hsv_paper.sensitivity import factor, flown, hardware, notch, weights
+from hsv_paper.sensitivity import factor, flown, notch, weights
 from hsv_paper.study import Study
 
 STUDIES = {
@@ -16,7 +16,6 @@ STUDIES = {
         Study("weights", "Weights of F and K, input bounds of K", weights.run, 5),
         Study("ramp", "Length of the ramp", flown.ramp, 2),
         Study("factor", "Adjustable factor τ", factor.run, 20),
-        Study("hardware", "Actuators, delay and noise", hardware.run, 8),
     )
 }
 """All sensitivity studies, by name."""

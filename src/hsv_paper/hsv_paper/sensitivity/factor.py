@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
+from hsv.certificate.loops import Feedback
 from hsv.control.design import ControlDesign
 from hsv.design.adjustable import certified_loops, relaxed_bound
 from hsv.design.baseline import design_gains, nominal_family, nominal_problem, with_family
@@ -22,7 +23,7 @@ from hsv.flight.corners import fraction, region_parameters
 from hsv.model.signals import N_RIGID
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
-from hsv_paper.linear_loop import Corners, Feedback, stability_limit
+from hsv_paper.linear_loop import Corners, largest_growth, stability_limit
 from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, RED, ZERO, new_figure
 from hsv_paper.study import Outcome, Scope, in_words, rounded
 
@@ -81,7 +82,7 @@ def run(scope: Scope) -> Outcome:
 
 def growth(gains: ControlDesign, coupling: str, over: Corners, tau: float) -> float:
     """Return the largest growth (1/s) of the loops at ``tau`` around the vehicles ``over``."""
-    return Feedback.of(gains, tau).growth(load_vehicle().coupled(coupling), over)
+    return largest_growth(Feedback.of(gains, tau), load_vehicle().coupled(coupling), over)
 
 
 def is_certified(gains: ControlDesign, inputs: DesignInputs, tau: float) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from hsv.certificate.loops import Feedback
 from hsv.control.design import ControlDesign
 from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.design.baseline import design_gains
@@ -17,7 +18,7 @@ from hsv.flight.tables import CommandTable
 from hsv.model.vehicle import load_vehicle
 from hsv_paper import plots
 from hsv_paper.flights import Point
-from hsv_paper.linear_loop import COUPLING_SCALES, Corners, Feedback
+from hsv_paper.linear_loop import COUPLING_SCALES, Corners, critical_coupling, growths
 from hsv_paper.sensitivity.sweep import (
     ALL,
     LOSSES,
@@ -228,7 +229,7 @@ def draw_growth(
     axis: Axes, kappas: np.ndarray, loop: Feedback, over: Corners, widths: tuple[float, float], **style: Any
 ) -> None:
     """Draw the growth of a loop over the coupling: solid for the nominal vehicle, first of ``over``, dashed: worst."""
-    values = np.array([loop.growths(load_vehicle().coupled(kappa), over) for kappa in kappas.tolist()])
+    values = np.array([growths(loop, load_vehicle().coupled(kappa), over) for kappa in kappas.tolist()])
     axis.plot(kappas, values[:, 0], linewidth=widths[0], **style)
     axis.plot(kappas, values.max(axis=1), "--", linewidth=widths[1], color=style["color"])
     axis.set_ylabel("largest real part (1/s)")
@@ -245,7 +246,7 @@ def mark_couplings(axes: Sequence[Axes], growths: Sequence[Axes]) -> None:
 
 def coupling_limits(loop: Feedback, over: Corners) -> dict[str, str]:
     """Return table cells with the kappa up to which the linear loop is stable: nominal vehicle, worst of ``over``."""
-    limits = {"nominal": loop.critical_coupling(), "worst": loop.critical_coupling(over)}
+    limits = {"nominal": critical_coupling(loop), "worst": critical_coupling(loop, over)}
     beyond = f"≥ {COUPLING_SCALES[-1]:g}"
     return {f"stable up to κ, {which}": beyond if k is None else f"{k:.2f}" for which, k in limits.items()}
 

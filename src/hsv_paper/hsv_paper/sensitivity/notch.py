@@ -14,7 +14,7 @@ from hsv.control.notch_filter import NotchSection
 from hsv.flight.scenario import load_scenario
 from hsv_paper.designs import design
 from hsv_paper.flights import Point
-from hsv_paper.linear_loop import Corners, stability_limit
+from hsv_paper.linear_loop import Corners, growths, stability_limit
 from hsv_paper.plots import BLUE, DOTTED_GREY, RED, letter, new_figure, plain_log
 from hsv_paper.sensitivity.sweep import Controller, sweep
 from hsv_paper.study import Outcome, Scope, in_words, rounded
@@ -121,7 +121,7 @@ def stable_range(coupled: Controller, over: Corners, centres: np.ndarray, depths
 def _growths(coupled: Controller, centre: float, zero_damping: float, over: Corners) -> np.ndarray:
     """Return the growths (1/s) by vehicle with the baseline's notch at another ``centre`` (rad/s) and zero damping."""
     section = NotchSection(centre, zero_damping, centre, design("baseline").notch[0].pole_damping)
-    return replace(coupled.loop, notch=(section,)).growths(coupled.vehicle, over)
+    return growths(replace(coupled.loop, notch=(section,)), coupled.vehicle, over)
 
 
 def _draw_map(axis: Axes, centres: np.ndarray, depths: np.ndarray, values: np.ndarray) -> Any:

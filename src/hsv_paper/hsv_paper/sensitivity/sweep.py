@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from hsv.base.units import to_paper
+from hsv.certificate.loops import Feedback
 from hsv.control.design import ControlDesign
 from hsv.control.design_file import find_design, read_parameters
 from hsv.flight.assembly import assemble, scenario_parameters
@@ -21,7 +22,6 @@ from hsv.flight.scenario import load_scenario
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.flights import Point, Table, fly_over
-from hsv_paper.linear_loop import Feedback
 from hsv_paper.plots import BLUE, GREEN, ORANGE, PURPLE, RED, letter, plain_log
 from hsv_paper.study import Scope
 

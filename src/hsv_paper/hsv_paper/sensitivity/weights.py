@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hsv.certificate.loops import Feedback
 from hsv.control.design import ControlDesign
 from hsv.design.baseline import disturbance_columns, nominal_family, nominal_problem, with_family
 from hsv.design.feedback import feedback_gain
@@ -18,7 +19,7 @@ from hsv.model.signals import N_RIGID, N_STATES
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.designs import design
 from hsv_paper.flights import Point
-from hsv_paper.linear_loop import Corners, Feedback
+from hsv_paper.linear_loop import Corners, largest_growth
 from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, ORANGE, PURPLE, RED, ZERO, new_figure
 from hsv_paper.sensitivity.sweep import RMPC_DECOUPLED, WITH_NOTCH, Columns, Controller, sweep
 from hsv_paper.study import Outcome, Scope, in_words, rounded
@@ -170,4 +171,4 @@ def run(scope: Scope) -> Outcome:
 def _growth(group: Group, factor: float, notched: bool, over: Corners) -> float:
     loop = Feedback.of(design("baseline"), notched=notched)
     vehicle = load_vehicle().coupled("paper_like")
-    return replace(loop, gain=varied("F", group, factor).feedback_gain).growth(vehicle, over)
+    return largest_growth(replace(loop, gain=varied("F", group, factor).feedback_gain), vehicle, over)
