@@ -8,21 +8,31 @@ singular value mu of two channels.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from math import atan, inf, nan, pi
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigvals
 from scipy.optimize import brentq, minimize_scalar
 
-from hsv.certificate.loops import BrokenLoop
+from hsv.certificate.loops import BrokenLoop, Feedback, Hardware, SampledLoop
+from hsv.control.design import ControlDesign
+from hsv.model.actuators import ACTUATOR_SETS
+from hsv.model.vehicle import Vehicle
 
 SLACK = 1e-6
 """Relative amount by which a proved disk margin is below the one attained at the stated frequency."""
 
 ON_CIRCLE = 1e-9
 """Distance from the unit circle up to which an eigenvalue of the pencil counts as one on it."""
+
+SLOW = Hardware((ACTUATOR_SETS["fuel_10"], ACTUATOR_SETS["elevator_50"]), 0.02)
+"""Hardware of the case "slow" of a certificate: fuel valve of 10 rad/s, elevator of 50 rad/s, 20 ms more delay."""
+
+CASES = ("designed", "slow")
 
 _REFINED = np.linspace(0.0, 1.0, 13)
 
@@ -32,7 +42,7 @@ class DiskMargin:
     """A disk margin: ``margin`` is proved, ``attained`` is reached by a perturbation at ``frequency`` (rad/s).
 
     The two differ by :data:`SLACK`, or, with both inputs, by what one constant ``scaling`` of the channels costs. An
-    unstable loop has the margin 0 and no frequency (NaN).
+    unstable loop has the margin 0 and the frequency 0.
     """
 
     margin: float
@@ -51,7 +61,7 @@ class DiskMargin:
         return guaranteed(self.margin)[1]
 
 
-UNSTABLE = DiskMargin(0.0, 0.0, nan)
+UNSTABLE = DiskMargin(0.0, 0.0, 0.0)
 
 
 def guaranteed(margin: float) -> tuple[float, float]:
@@ -119,12 +129,12 @@ def destabilising(M: np.ndarray) -> float:
 
 
 def search(loop: BrokenLoop, frequencies: np.ndarray) -> tuple[float, float]:
-    """Return the attained disk margin and its frequency (rad/s), by a search from ``frequencies``; (0, NaN): unstable.
+    """Return the attained disk margin and its frequency (rad/s), by a search from ``frequencies``; zeros: unstable.
 
     The largest value on the grid is refined between its neighbours, then evaluated by a linear system.
     """
     if loop.growth >= 0.0:
-        return 0.0, nan
+        return 0.0, 0.0
     half = 0.5 * np.eye(len(loop.C))
     w = frequencies
     for _ in range(6):
@@ -262,6 +272,83 @@ def _roots(function: Callable[[float], float], at: np.ndarray, values: np.ndarra
     ]
 
 
-def worst(margins: Iterable[DiskMargin]) -> tuple[int, DiskMargin]:
-    """Return index and value of the smallest disk margin."""
-    return min(enumerate(margins), key=lambda each: each[1].margin)
+@dataclass(frozen=True)
+class Place:
+    """A trim point, altitude (m) and velocity (m/s), and the effectiveness of the elevator there."""
+
+    point: tuple[float, float]
+    effectiveness: float = 1.0
+
+
+@dataclass(frozen=True)
+class WorstCorner:
+    """The smallest disk margin of a loop over the corners of a vehicle's bounds, by search.
+
+    ``corner`` has a sign for each uncertain parameter and is empty for the nominal vehicle; ``place`` is a name.
+    ``unstable`` counts the vehicles of all ``count`` whose loop is unstable at a place.
+    """
+
+    margin: float
+    frequency: float
+    corner: str
+    place: str
+    unstable: int
+    count: int
+
+
+@dataclass(frozen=True)
+class VehicleLoops:
+    """The loops of a ``feedback`` around a vehicle with its coupling, at named ``places``; nominal or at a corner."""
+
+    feedback: Feedback
+    vehicle: Vehicle
+    coupling: str
+    places: Mapping[str, Place]
+
+    def corners(self) -> list[str]:
+        """Return the nominal vehicle (an empty text), then all corners of the bounds as signs of the parameters."""
+        return ["", *map("".join, product("-+", repeat=len(self.vehicle.uncertainty)))]
+
+    def changes(self, corner: str) -> dict[str, float]:
+        """Return the relative changes of the vehicle's parameters at a ``corner``, by name."""
+        bounds = self.vehicle.uncertainty if corner else {}
+        return {name: float(f"{sign}1") * bound for sign, (name, bound) in zip(corner, bounds.items(), strict=True)}
+
+    def loop(self, corner: str, place: str) -> SampledLoop:
+        """Return the loop around the vehicle of a ``corner`` at a ``place``."""
+        vehicle, at = self.vehicle.coupled(self.coupling).perturbed(self.changes(corner)), self.places[place]
+        return self.feedback.around(vehicle, at.point, at.effectiveness)
+
+    def worst(
+        self, name: str, corners: Sequence[str], progress: Callable[[int, int], None] = lambda done, total: None
+    ) -> WorstCorner:
+        """Return the smallest disk margin of the loop broken at ``name`` over ``corners`` and all places.
+
+        On Ctrl-C, the corners that are done make the result; its ``count`` says how many.
+        """
+        frequencies, found = grid(self.feedback.period), []
+        try:
+            for done, corner in enumerate(corners, start=1):
+                each = [(*search(self.loop(corner, at).broken(name), frequencies), corner, at) for at in self.places]
+                found.append(min(each))
+                progress(done, len(corners))
+        except KeyboardInterrupt:
+            if not found:
+                raise
+        margin, frequency, corner, place = min(found)
+        return WorstCorner(margin, frequency, corner, place, sum(each[0] == 0.0 for each in found), len(found))
+
+
+def design_loops(design: ControlDesign, vehicle: Vehicle, inputs: Mapping[str, Any], case: str) -> VehicleLoops:
+    """Return the loops of a design around the coupled vehicle, at start and target of its ``inputs`` (a table in SI).
+
+    The place "fault" is the target after the declared loss of elevator effectiveness. The ``case`` is "designed", the actuators of the
+    design, or "slow", those of :data:`SLOW`.
+    """
+    start, target = (
+        (inputs["nominal"][end]["altitude"], inputs["nominal"][end]["velocity"]) for end in ("start", "target")
+    )
+    faulty = inputs["disturbance"]["elevator_effectiveness"]
+    places = {"start": Place(start), "target": Place(target), "fault": Place(target, faulty)}
+    hardware = SLOW if case == "slow" else Hardware(design.actuator_sets)
+    return VehicleLoops(Feedback.of(design, hardware=hardware), vehicle, design.coupling, places)

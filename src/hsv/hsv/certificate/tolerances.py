@@ -50,6 +50,8 @@ TOLERANCES = {
     "room of plans": Tolerance(1e-06, 1e-09),
     "inequalities": Tolerance(0.0, 1e-09),
     "flights": Tolerance(1e-05, 1e-12),
+    "disk margins": Tolerance(5e-06, 1e-12),
+    "frequencies of margins": Tolerance(1e-03, 1e-12),
     "random sequences": Tolerance(1e-06, 1e-12),
 }
 """Tolerances by kind of quantity."""
