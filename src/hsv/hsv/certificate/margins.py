@@ -9,7 +9,7 @@ singular value mu of two channels.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from math import atan, inf, nan, pi
 from typing import Any
@@ -21,6 +21,7 @@ from scipy.optimize import brentq, minimize_scalar
 from hsv.certificate.loops import BrokenLoop, Feedback, Hardware, SampledLoop
 from hsv.control.design import ControlDesign
 from hsv.model.actuators import ACTUATOR_SETS
+from hsv.model.dynamics import VehicleParameters
 from hsv.model.vehicle import Vehicle
 
 SLACK = 1e-6
@@ -298,26 +299,33 @@ class WorstCorner:
 
 @dataclass(frozen=True)
 class VehicleLoops:
-    """The loops of a ``feedback`` around a vehicle with its coupling, at named ``places``; nominal or at a corner."""
+    """The loops of a ``feedback`` around a vehicle at named ``places``; of the nominal vehicle or at a corner.
+
+    ``bounds`` are those of the relative changes of the parameters; ``own`` changes those of the nominal vehicle.
+    """
 
     feedback: Feedback
-    vehicle: Vehicle
-    coupling: str
+    vehicle: VehicleParameters
+    bounds: Mapping[str, float]
     places: Mapping[str, Place]
+    own: Mapping[str, float] = field(default_factory=dict)
 
     def corners(self) -> list[str]:
         """Return the nominal vehicle (an empty text), then all corners of the bounds as signs of the parameters."""
-        return ["", *map("".join, product("-+", repeat=len(self.vehicle.uncertainty)))]
+        return ["", *map("".join, product("-+", repeat=len(self.bounds)))]
 
     def changes(self, corner: str) -> dict[str, float]:
         """Return the relative changes of the vehicle's parameters at a ``corner``, by name."""
-        bounds = self.vehicle.uncertainty if corner else {}
-        return {name: float(f"{sign}1") * bound for sign, (name, bound) in zip(corner, bounds.items(), strict=True)}
+        if not corner:
+            return dict(self.own)
+        return {
+            name: float(f"{sign}1") * bound for sign, (name, bound) in zip(corner, self.bounds.items(), strict=True)
+        }
 
     def loop(self, corner: str, place: str) -> SampledLoop:
         """Return the loop around the vehicle of a ``corner`` at a ``place``."""
-        vehicle, at = self.vehicle.coupled(self.coupling).perturbed(self.changes(corner)), self.places[place]
-        return self.feedback.around(vehicle, at.point, at.effectiveness)
+        at = self.places[place]
+        return self.feedback.around(self.vehicle.perturbed(self.changes(corner)), at.point, at.effectiveness)
 
     def worst(
         self, name: str, corners: Sequence[str], progress: Callable[[int, int], None] = lambda done, total: None
@@ -342,8 +350,8 @@ class VehicleLoops:
 def design_loops(design: ControlDesign, vehicle: Vehicle, inputs: Mapping[str, Any], case: str) -> VehicleLoops:
     """Return the loops of a design around the coupled vehicle, at start and target of its ``inputs`` (a table in SI).
 
-    The place "fault" is the target after the declared loss of elevator effectiveness. The ``case`` is "designed", the actuators of the
-    design, or "slow", those of :data:`SLOW`.
+    The place "fault" is the target after the declared loss of elevator effectiveness. The ``case`` is "designed", the
+    actuators of the design, or "slow", those of :data:`SLOW`.
     """
     start, target = (
         (inputs["nominal"][end]["altitude"], inputs["nominal"][end]["velocity"]) for end in ("start", "target")
@@ -351,4 +359,5 @@ def design_loops(design: ControlDesign, vehicle: Vehicle, inputs: Mapping[str, A
     faulty = inputs["disturbance"]["elevator_effectiveness"]
     places = {"start": Place(start), "target": Place(target), "fault": Place(target, faulty)}
     hardware = SLOW if case == "slow" else Hardware(design.actuator_sets)
-    return VehicleLoops(Feedback.of(design, hardware=hardware), vehicle, design.coupling, places)
+    coupled = vehicle.coupled(design.coupling)
+    return VehicleLoops(Feedback.of(design, hardware=hardware), coupled, vehicle.uncertainty, places)

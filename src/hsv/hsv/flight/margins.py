@@ -1,0 +1,226 @@
+"""Margins of a flight: the loop of a scenario with its hardware, and borders of stability found by flying them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from hsv.base.errors import ScenarioError
+from hsv.certificate.loops import Feedback, Hardware
+from hsv.certificate.margins import Place, VehicleLoops, classical_margins
+from hsv.control.design import ControlDesign
+from hsv.control.tube_law import TubeLaw
+from hsv.flight.assembly import assemble, assemble_flight
+from hsv.flight.closed_loop import Components, fly
+from hsv.flight.scenario import Scenario
+from hsv.model.actuators import SUBSTEPS, ActuatorSet
+from hsv.model.signals import INPUT_NAMES, STATE_NAMES
+from hsv.model.trim import initial_trim
+
+LEG = 8
+"""Number of parts into which each leg of the commanded trajectory is divided."""
+
+BESIDE = 0.02
+"""Share of a border of the gain by which the flights on its two sides differ from it."""
+
+DEVIATION = 1e-4
+"""Initial error of the pitch angle, rad."""
+
+_E_FOLDS, _LONGEST = (4.0, 16.0), 400.0
+"""Durations of the flights inside and outside in times of decay or growth by e, and their maximum, s."""
+
+_LINEAR = 0.1
+"""Largest deviation of the elevator for which actuators do not reach their limits, rad."""
+
+_OMITTED = ("fault.", "tau_change.", "feedback.", "reference.", "sensors.", "wind.", "turbulence.", "gust.", "density.")
+"""Parameters of a flight that a flight at constant trim in still air, with ideal sensors, does not have."""
+
+
+def hardware_of(parts: Components) -> Hardware:
+    """Return the linear actuators of a flight, and the delay of its links and of the controller's computation (s)."""
+    plant, found = parts.plant, []
+    data = plant.data.actuators
+    for channel, order, frequency, damping in zip(
+        INPUT_NAMES, data.order, data.natural_frequency, data.damping_ratio, strict=True
+    ):
+        if order:
+            found.append(ActuatorSet(channel, int(order), float(frequency), float(damping), np.inf, np.inf, "scenario"))
+    periods = plant.data.link.delay + parts.fault_injector.link.delay + plant.data.late / SUBSTEPS
+    return Hardware(tuple(found), periods * plant.period)
+
+
+def refuse_other_loops(scenario: Scenario) -> None:
+    """Refuse a scenario whose loop is not the linear one of F, with the reason.
+
+    Raises:
+        ScenarioError: The message names the field; the margins of another loop are never given.
+    """
+    given = scenario.settings.get
+    tau = [*scenario.tube.tau, *(value for change in scenario.tube.change for value in change.tau)]
+    law = str(given("nominal.law", "family"))
+    random = [
+        name
+        for name in ("jitter", "loss", "corruption")
+        for link in ("measurement", "command")
+        if given(f"link.{link}.{name}")
+    ]
+    reasons = (
+        (not scenario.design, "design = '': no feedback F, expected a design"),
+        (
+            scenario.controller != "tube_mpc",
+            f"controller = {scenario.controller!r}: its loop is not that of F, expected 'tube_mpc'",
+        ),
+        (law != "family", f"nominal.law = {law!r}: solved in flight, its loop is not linear, expected 'family'"),
+        (any(value < 1.0 for value in tau), f"tube.tau = {min(tau, default=1.0):g}: expected 1"),
+        (given("estimator.enabled"), "estimator: its dynamics are not in the loop, expected none"),
+        (given("effectiveness.enabled"), "effectiveness: divides the command, not linear, expected no estimator"),
+        (given("integral.rate"), "integral: its states are not in the loop, expected no integral action"),
+        (random, f"link: random {' and '.join(dict.fromkeys(random))}, expected a constant delay"),
+    )
+    for applies, reason in reasons:
+        if applies:
+            raise ScenarioError(f"scenario {scenario.name!r}: no margins: {reason}")
+
+
+def scenario_loops(scenario: Scenario) -> VehicleLoops:
+    """Return the loops of a scenario: its vehicle, hardware and notch filter, along the commanded trajectory.
+
+    The places are the start, points that divide each leg of the commands into :data:`LEG` parts, and the target;
+    "fault" is the target with the elevator effectiveness that the faults leave. Other faults are not in the loop.
+
+    Raises:
+        ScenarioError: See :func:`refuse_other_loops`.
+    """
+    refuse_other_loops(scenario)
+    parts = assemble_flight(scenario)
+    design = _design(parts)
+    if np.any(design.tau < 1.0):
+        raise ScenarioError(f"scenario {scenario.name!r}: no margins: design {design.name!r} has tau below 1")
+    values = {**design.to_parameters(), **scenario.parameters()}
+    feedback = Feedback(design.feedback_gain, tuple(parts.notch_filter.sections), design.period, hardware_of(parts))
+    points = [(scenario.initial.altitude, scenario.initial.velocity)]
+    points += [*zip(scenario.commands.altitudes, scenario.commands.velocities, strict=True)]
+    places = {"start": Place(points[0])}
+    for leg, (before, after) in enumerate(pairwise(dict.fromkeys(points)), start=1):
+        for part in range(1, LEG):
+            share = part / LEG
+            at = tuple(a + share * (b - a) for a, b in zip(before, after, strict=True))
+            places[f"leg {leg}, {part}/{LEG}"] = Place((at[0], at[1]))
+    places["target"] = Place(points[-1])
+    lost = [
+        row.parameters["effectiveness"]
+        for row in scenario.fault
+        if row.type == "loss_of_effectiveness" and row.channel == INPUT_NAMES[1]
+    ]
+    if lost:
+        places["fault"] = Place(points[-1], float(np.prod(lost)))
+    own = dict(scenario.vehicle.perturbation)
+    return VehicleLoops(feedback, initial_trim(values)[0], scenario.vehicle.described.uncertainty, places, own)
+
+
+def _design(parts: Components) -> ControlDesign:
+    assert isinstance(parts.controller, TubeLaw)
+    return parts.controller.design
+
+
+@dataclass(frozen=True)
+class Border:
+    """A border of stability that was computed and flown.
+
+    ``kind`` is "gain up", "gain down" or "delay"; ``border`` the factor of the elevator's row of F, or the number of
+    further periods of delay of both commands that the loop tolerates. ``growth`` and ``flown_growth`` (1/s) have the
+    computed and the flown growth inside and outside; ``frequency`` and ``flown_frequency`` are in rad/s.
+    """
+
+    kind: str
+    border: float
+    growth: tuple[float, float]
+    flown_growth: tuple[float, float]
+    frequency: float
+    flown_frequency: float
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the flight inside is stable, the one outside is not, and its frequency is within 5 %."""
+        inside, outside = self.flown_growth
+        return inside < 0.0 < outside and abs(self.flown_frequency / self.frequency - 1.0) < 0.05
+
+
+def flown_borders(values: Mapping[str, Any], design: ControlDesign, loops: VehicleLoops) -> list[Border]:
+    """Fly the coupled vehicle on both sides of each border of stability, at the constant trim of the start.
+
+    The margins are those of the same trim. The flights begin with a pitch-angle error of :data:`DEVIATION`; what grows
+    is their difference from a flight without it. ``values`` are the flat parameters of the flight whose commands and
+    faults are omitted. The gain is that of a design in memory with a scaled row of F.
+    """
+    loop, feedback, place = loops.loop("", "start"), loops.feedback, loops.places["start"]
+    margins = classical_margins(loop.broken("elevator"))
+    found = []
+    for kind, border in (("gain up", margins.gain_up), ("gain down", margins.gain_down)):
+        if not 0.0 < border < np.inf:
+            continue
+        sides = [border * (1.0 - BESIDE), border * (1.0 + BESIDE)]
+        if kind == "gain down":
+            sides.reverse()
+        poles = [_fastest(loop.scaled(side, "elevator").poles) for side in sides]
+        designs = [replace(design, feedback_gain=design.feedback_gain * [[1.0], [side]]) for side in sides]
+        found.append(_border(kind, border, poles, [(values, each) for each in designs]))
+    vehicle = loops.vehicle.perturbed(loops.own)
+
+    def poles_at(periods: int) -> complex:
+        late = replace(feedback.hardware, delay=feedback.hardware.delay + periods * feedback.period)
+        return _fastest(replace(feedback, hardware=late).around(vehicle, place.point, place.effectiveness).poles)
+
+    last = next(n for n in range(200) if poles_at(n + 1).real >= 0.0)
+    field = "link.command.delay"
+    flights = [({**values, field: values.get(field, 0.0) + n}, design) for n in (last, last + 1)]
+    found.append(_border("delay", float(last), [poles_at(last), poles_at(last + 1)], flights))
+    return found
+
+
+def _fastest(poles: np.ndarray) -> complex:
+    """Return the pole with the largest real part and an imaginary part that is not negative."""
+    upper = poles[poles.imag >= 0.0]
+    return complex(upper[np.argmax(upper.real)])
+
+
+def _border(kind: str, border: float, poles: list[complex], flights: list[tuple[Any, ControlDesign]]) -> Border:
+    folds = zip(flights, poles, _E_FOLDS, strict=True)
+    flown = [_grown(*flight, min(count / abs(pole.real), _LONGEST)) for flight, pole, count in folds]
+    growth = (poles[0].real, poles[1].real)
+    return Border(kind, border, growth, (flown[0][0], flown[1][0]), poles[1].imag, flown[1][1])
+
+
+def _grown(values: Mapping[str, Any], design: ControlDesign, duration: float) -> tuple[float, float]:
+    """Return growth (1/s) and frequency (rad/s) of a deviation of the elevator command at constant trim.
+
+    Both are measured in the last two thirds of the flight, which ends where an input is limited or moves
+    by more than the loop is linear for.
+    """
+    period = design.period
+    constant = {
+        "duration": period * round(duration / period),
+        "reference.times": [0.0],
+        "reference.altitudes": [values["initial.altitude"]],
+        "reference.velocities": [values["initial.velocity"]],
+    }
+    kept = {name: value for name, value in values.items() if not name.startswith(_OMITTED)}
+    parts = assemble({**kept, **constant, **design.to_parameters()}, design)
+    calm = fly(parts).history
+    state = parts.plant.initial.state.copy()
+    state[STATE_NAMES.index("pitch_angle")] += DEVIATION
+    parts.plant.initial = replace(parts.plant.initial, state=state)
+    flown = fly(parts).history
+    steps = min(len(calm.command), len(flown.command))
+    moved = (flown.command[:steps] - calm.command[:steps])[:, 1]
+    beyond = np.any(flown.command != flown.u_unsaturated, axis=1)[:steps] | (np.abs(moved) > _LINEAR)
+    steps = int(np.argmax(beyond)) if beyond.any() else steps
+    middle, end = moved[steps // 3 : 2 * steps // 3], moved[2 * steps // 3 : steps]
+    growth = np.log(np.abs(end).max() / np.abs(middle).max()) / (len(end) * period)
+    turns = np.flatnonzero(np.sign(end[1:]) != np.sign(end[:-1]))
+    frequency = np.pi * (len(turns) - 1) / ((turns[-1] - turns[0]) * period) if len(turns) > 2 else 0.0
+    return float(growth), float(frequency)
