@@ -1,6 +1,7 @@
 """Controllers in shared libraries."""
 
 import ctypes
+import dataclasses
 import hashlib
 import shutil
 import subprocess
@@ -31,7 +32,7 @@ def test_a_flight_keeps_digest_and_source_of_its_library(tmp_path):
 def test_the_layout_of_the_header_is_that_of_the_bench(tmp_path):
     library = build_probe(tmp_path, "-DINPUTS=HSV_CONTROLLER_INPUTS,HSV_FILTER_STATE_INPUT(4)")
     block = load_block(library, "probe")
-    assert block.inputs == (*CONTROLLER_INPUTS[:-1], FILTER_STATE._replace(size=4))
+    assert block.inputs == (*CONTROLLER_INPUTS[:-1], dataclasses.replace(FILTER_STATE, size=4))
     assert block.outputs == CONTROLLER_OUTPUTS
     ends = [0]
     for signal in CONTROLLER_INPUTS[:-1]:

@@ -14,8 +14,7 @@ from hsv.base.errors import ParameterError
 from hsv.control.controller import NODE
 from hsv.flight import blocks
 from hsv.flight.blocks import Block
-from hsv.model import signals
-from hsv.model.signals import SignalType
+from hsv.model.signals import SIGNALS, SignalType
 
 CLOCK = "clock"
 STATE = "hsv/state"
@@ -61,32 +60,13 @@ TOPICS = {
 """Message types of the step topics, by role, in order of recording. A step topic has exactly one message per step. Not
 every controller publishes the tube status, see :func:`step_topics`."""
 
-CARRIED: dict[str, dict[SignalType, str]] = {
-    MEASUREMENT: {signals.MEASUREMENT: "state", signals.STATUS: "status"},
-    STATE: {signals.STATE: "altitude", signals.STATUS: "status"},
-    FORCES: {signals.FORCES: "lift", signals.EFFECTOR: "effector", signals.AIR: "wind_forward"},
-    FILTERED_STATE: {
-        signals.MEASUREMENT: "state",
-        signals.ESTIMATE: "estimate",
-        signals.FILTERED_PITCH_RATE: "filtered_pitch_rate",
-        signals.FILTER_STATE: "filter_state",
-        signals.STATUS: "status",
-    },
-    NOMINAL: {
-        signals.REFERENCE: "reference",
-        signals.REFERENCE_INPUT: "reference_input",
-        signals.DEVIATION: "deviation",
-        signals.NOMINAL_INPUT: "input",
-        signals.GAIN: "gain",
-        signals.GAIN_INDEX: "gain_index",
-        signals.NOMINAL_STATUS: "status",
-    },
-    COMMAND: {signals.COMMAND: "fuel_equivalence_ratio", signals.SATURATED: "saturated"},
-    TUBE_STATUS: {signals.DIAGNOSTICS: "level"},
-    ACTUATOR: {signals.ACTUATOR: "fuel_equivalence_ratio", signals.ACTIVE_FAULTS: "active"},
-}
-"""The signals in the messages of each topic, with the field at which each signal begins: a nested message, a sequence,
-or the first of several consecutive numbers."""
+CARRIED: dict[str, dict[SignalType, str]] = {topic: {} for topic in TOPICS if topic != CLOCK}
+"""The signals in the messages of each topic, with the field at which each signal begins, see
+:class:`hsv.model.signals.SignalType`."""
+
+for _signal in SIGNALS.values():
+    for _topic, _, _field in (place.partition(".") for place in _signal.fields):
+        CARRIED[f"hsv/{_topic}"][_signal] = _field
 
 TOPIC_OF = {signal.name: topic for topic, carried in CARRIED.items() for signal in carried}
 """The topic that contains each signal, by the signal's name; the last topic if several contain it."""

@@ -25,7 +25,7 @@ from hsv.bags.description import CARRIED, CLOCK, TOPICS, TUBE_STATUS, WIRE_ALIGN
 from hsv.base.errors import ParameterError, RunError, SignalError
 from hsv.flight.blocks import LOOP
 from hsv.model import signals as types
-from hsv.model.signals import N_INPUTS, N_STATES, NEVER, VARYING, SignalType
+from hsv.model.signals import DIAGNOSED, N_INPUTS, NEVER, VARYING, SignalType
 
 if TYPE_CHECKING:
     from hsv.flight.blocks import Signals
@@ -90,13 +90,20 @@ class Structure:
                 "itemsize": self.size,
             }
         )
-        self._checked = [(ENCAPSULATION + at, value.to_bytes(4, "little")) for at, value in self.lengths.values()]
+        # The bytes that decide the layout, encapsulation and lengths, are compared as one integer.
+        decisive = [(0, _LITTLE_ENDIAN)]
+        decisive += [(ENCAPSULATION + at, length.to_bytes(4, "little")) for at, length in self.lengths.values()]
+        self._decided = decisive[-1][0] + len(decisive[-1][1])
+        mask, expected = bytearray(self._decided), bytearray(self._decided)
+        for at, octets in decisive:
+            mask[at : at + len(octets)], expected[at : at + len(octets)] = b"\xff" * len(octets), octets
+        self._mask, self._expected = (int.from_bytes(octets, "little") for octets in (mask, expected))
 
     def fits(self, message: bytes) -> bool:
         """Return whether ``message`` has this layout, possibly followed by further bytes."""
-        if len(message) < ENCAPSULATION + self.size or message[:2] != _LITTLE_ENDIAN:
+        if len(message) < ENCAPSULATION + self.size:
             return False
-        return all(message[at : at + 4] == value for at, value in self._checked)
+        return int.from_bytes(message[: self._decided], "little") & self._mask == self._expected
 
     def rows(self, messages: Sequence[bytes]) -> NDArray[Any] | None:
         """Return the messages as an array of :attr:`dtype`, shape (n,); None if one has another layout or length."""
@@ -169,32 +176,11 @@ class Structure:
 _NEEDED = {signal for block in LOOP for signal in (*block.inputs, *block.delayed, *block.state)} | {types.STATUS}
 """The signals to unpack: the inputs and states of the blocks, and the status, which nodes pass on."""
 
-_SIZES: dict[SignalType, tuple[Callable[[int], bool], str]] = {
-    types.FILTER_STATE: (lambda size: size % 2 == 0, "two for each section of the notch filter"),
-    types.GAIN: (lambda size: size in (0, N_INPUTS * N_STATES), f"{N_INPUTS * N_STATES}, or none"),
-    types.ESTIMATE: (lambda size: size in (0, N_STATES), f"{N_STATES}, or none"),
-}
-"""Signals that are sent as sequences: test of their size, and the admitted sizes in words for error messages."""
-
 _VALUES: dict[SignalType, Callable[[Signals], Any]] = {
     types.ESTIMATE: lambda signals: () if signals.estimate is signals.measurement else signals.estimate,
     types.GAIN: lambda signals: signals.gain.ravel(),
 }
 """Functions that return the numbers to send for a signal, if these differ from the value of the signal."""
-
-_TUBE = {
-    "level": 1,
-    "u_nominal": N_INPUTS,
-    "u_feedback": N_INPUTS,
-    "u_unsaturated": N_INPUTS,
-    "inside": 1,
-    "status": 1,
-    "error": VARYING,
-    "tube_centre": VARYING,
-    "tube_half_width": VARYING,
-    "tau": VARYING,
-}
-"""Sizes of the attributes of the controller's diagnostics in the tube status."""
 
 
 class StepMessages:
@@ -207,64 +193,73 @@ class StepMessages:
         carried = CARRIED.get(topic, {})
         self._has_faults = types.ACTIVE_FAULTS in carried
         numbers = {signal: field for signal, field in carried.items() if signal is not types.ACTIVE_FAULTS}
-        self._sequences = {signal: field for signal, field in numbers.items() if signal in _SIZES}
+        self._sequences = {signal: field for signal, field in numbers.items() if signal.sequence}
         self._needed = {signal.name: (field, _size(signal)) for signal, field in numbers.items() if signal in _NEEDED}
         if topic == TUBE_STATUS:
-            sent = {name: (size, attrgetter(f"diagnostics.{name}")) for name, size in _TUBE.items()}
+            sent = {name: (size, attrgetter(f"diagnostics.{name}")) for name, size in DIAGNOSED.items()}
             sent["u_reference"] = N_INPUTS, attrgetter("reference_input")
         else:
             sent = {field: (_size(s), _VALUES.get(s, attrgetter(s.name))) for s, field in numbers.items()}
-        self._sent = sent
+        self._sent = {field: size for field, (size, _) in sent.items()}
+        self._values = [value for _, value in sent.values()]
+        self._varying = [i for i, size in enumerate(self._sent.values()) if size == VARYING]
         stamp = "clock" if topic == CLOCK else "header.stamp"
         self._front = {path: (path, 1) for path in (f"{stamp}.sec", f"{stamp}.nanosec", "step")[: 2 + bool(carried)]}
         """Fields at the beginning of every message: stamp and, except for the clock, the step."""
         self._received: Structure | None = None
+        self._checked: bytes | None = None
+        """The last message whose layout was checked."""
         self._list = b""
         self._faults: tuple[ActiveFault, ...] = ()
-        self._lengths: tuple[object, ...] | None = None
+        self._layout: tuple[object, ...] | None = None
 
     def step(self, message: bytes) -> int:
         """Return the step number of a message; raise a MessageError or SignalError if the message is invalid."""
-        return int(self._numbers(message)[2])
+        self._check(message)
+        return int.from_bytes(message[self._step_at : self._step_at + 8], "little")
 
     def unpack(self, message: bytes, signals: Signals) -> None:
         """Write stamp, step and the values that blocks need from a message into ``signals``.
 
         If the message is invalid, raise a MessageError or SignalError and leave ``signals`` unchanged.
         """
-        seconds, nanoseconds, step, *values = self._numbers(message)
-        found = dict(zip(self._needed, values, strict=True))
-        if self._has_faults:
-            found["active_faults"] = self._active_faults(message)
-        if "estimate" in found and not len(found["estimate"]):
-            found["estimate"] = found["measurement"]
+        if message is not self._checked:
+            self._check(message)
+        faults = self._active_faults(message) if self._has_faults else ()
+        # A copy without the header aligns the numbers.
+        seconds, nanoseconds, step, *values = np.frombuffer(message[ENCAPSULATION:], self._dtype, 1).item()
         signals.stamp, signals.step = (seconds, nanoseconds), step
-        vars(signals).update(found)
+        vars(signals).update(zip(self._needed, values, strict=True))
+        if self._has_faults:
+            signals.active_faults = faults
+        if types.ESTIMATE in self._sequences and not len(signals.estimate):
+            signals.estimate = signals.measurement
 
     def pack(self, signals: Signals) -> bytes:
         """Return the message (CDR) with the values of ``signals``, padded as over DDS."""
-        values = [value(signals) for _, value in self._sent.values()]
-        lengths = [len(value) for value, (size, _) in zip(values, self._sent.values(), strict=True) if size == VARYING]
-        faults = signals.active_faults if self._has_faults else ()
-        if self._lengths != (*lengths, faults):
-            self._allocate(lengths, faults)
-            self._lengths = *lengths, faults
+        values = [value(signals) for value in self._values]
+        layout = [len(values[i]) for i in self._varying], signals.active_faults if self._has_faults else ()
+        if self._layout != layout:
+            self._allocate(*layout)
+            self._layout = layout
         front = (*signals.stamp, signals.step)[: len(self._front)]
-        self._rows[0] = (*front, *values)
+        for view, value in zip(self._views, (*front, *values), strict=True):
+            view[...] = value
         return bytes(self._buffer)
 
-    def _numbers(self, message: bytes) -> tuple[Any, ...]:
+    def _check(self, message: bytes) -> None:
+        """Raise a MessageError or SignalError if ``message`` is invalid; adapt to its layout if it is another one."""
         if self._received is None or not self._received.fits(message):
             structure = Structure(self._store.fielddefs, self.type, message)
             for signal, field in self._sequences.items():
-                admitted, words = _SIZES[signal]
-                if field in structure.lengths and not admitted(size := structure.lengths[field][1]):
-                    raise SignalError(signal.name, f"{field}: {size} numbers, expected {words}")
+                if field in structure.lengths and not signal.admits(length := structure.lengths[field][1]):
+                    raise SignalError(signal.name, f"{field}: {length} numbers, expected {signal.sequence}")
             self._dtype = structure.select(self._front | self._needed)
+            fields = self._dtype.fields
+            assert fields is not None
+            self._step_at = ENCAPSULATION + fields["step"][1]
             self._received = structure
-        # A copy without the header aligns the numbers.
-        numbers: tuple[Any, ...] = np.frombuffer(message[ENCAPSULATION:], self._dtype, 1).item()
-        return numbers
+        self._checked = message
 
     def _active_faults(self, message: bytes) -> tuple[ActiveFault, ...]:
         assert self._received is not None
@@ -284,7 +279,7 @@ class StepMessages:
         message = blank(self._store, self.type)
         if hasattr(message, "header"):
             message.header.frame_id = FRAME
-        sequences = (field for field, (size, _) in self._sent.items() if size == VARYING)
+        sequences = (field for field, size in self._sent.items() if size == VARYING)
         for field, length in zip(sequences, lengths, strict=True):
             setattr(message, field, np.zeros(length))
         if faults:
@@ -297,12 +292,13 @@ class StepMessages:
         data = bytes(self._store.serialize_cdr(message, self.type))
         self._buffer = bytearray(data + bytes(-len(data) % WIRE_ALIGNMENT))
         structure = Structure(self._store.fielddefs, self.type, data)
-        dtype = structure.select(self._front | {field: (field, size) for field, (size, _) in self._sent.items()})
-        self._rows = np.frombuffer(self._buffer, dtype, 1, ENCAPSULATION)
+        dtype = structure.select(self._front | {field: (field, size) for field, size in self._sent.items()})
+        row = np.frombuffer(self._buffer, dtype, 1, ENCAPSULATION)
+        self._views = [row[name].reshape(row[name].shape[1:]) for name in dtype.names or ()]
 
 
 def _size(signal: SignalType) -> int:
-    return VARYING if signal in _SIZES else signal.size
+    return VARYING if signal.sequence else signal.size
 
 
 def fault_in(message: Any) -> Fault:

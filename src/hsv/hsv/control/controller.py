@@ -87,15 +87,7 @@ class ControllerInput(NamedTuple):
     """States (2 per section) of the notch filter before its update; empty without a notch filter"""
 
 
-CONTROLLER_INPUTS = (
-    signals.ESTIMATE,
-    signals.FILTERED_PITCH_RATE,
-    signals.REFERENCE,
-    signals.REFERENCE_INPUT,
-    signals.DEVIATION,
-    signals.NOMINAL_INPUT,
-    signals.FILTER_STATE,
-)
+CONTROLLER_INPUTS = tuple(signals.SIGNALS[name] for name in ControllerInput._fields[1:])
 """Inputs in the order in which a compiled controller receives them, see ``hsv_block.h``."""
 
 CONTROLLER_OUTPUTS = (signals.UNSATURATED_INPUT,)

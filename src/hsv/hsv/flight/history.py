@@ -7,12 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsv.model.signals import N_INPUTS, N_STATES
+from hsv.model.signals import GAIN_INDEX as GAIN
+from hsv.model.signals import N_STATES, UNSATURATED_INPUT
+from hsv.model.signals import SIGNALS as TYPES
 
-X, Q_F, X_N, U_N, U, ACTUATOR, SIGNAL_COLUMNS = accumulate((0, N_STATES, 1, N_STATES, N_INPUTS, N_INPUTS, N_INPUTS))
+_COLUMNS = "state", "filtered_pitch_rate", "deviation", "nominal_input", "command", "actuator"
+X, Q_F, X_N, U_N, U, ACTUATOR, SIGNAL_COLUMNS = accumulate((0, *(TYPES[name].size for name in _COLUMNS)))
 """First column of x, q_f, x_n, u_n, command u and actuator input in :attr:`History.signals`, and the total number."""
 
-GAIN_INDEX, U_UNSATURATED, AUXILIARY_COLUMNS = accumulate((0, 1, N_INPUTS))
+GAIN_INDEX, U_UNSATURATED, AUXILIARY_COLUMNS = accumulate((0, GAIN.size, UNSATURATED_INPUT.size))
 """First column of gain index and unsaturated input in :attr:`History.auxiliary`, and the total number."""
 
 

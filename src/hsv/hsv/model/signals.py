@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 STATE_NAMES = (
     "altitude",
@@ -36,62 +37,130 @@ VARYING = -1
 """Marks a signal whose size depends on the flight."""
 
 
-class SignalType(NamedTuple):
-    """Type of a signal between blocks: name, unit and size."""
+@dataclass(frozen=True)
+class SignalType:
+    """Type of a signal between blocks; two are equal if name, unit and size are."""
 
     name: str
     unit: str
     """SI unit, or ``"1"``; several, separated by commas, apply to the numbers in turn; empty for mixed contents"""
     size: int
+    meaning: str = field(default="", compare=False)
+    fields: tuple[str, ...] = field(default=(), compare=False)
+    """Places in messages: topic below ``hsv``, and the field at which the signal begins, which is a nested message, a
+    sequence, or the first of several consecutive numbers"""
+    components: tuple[str, ...] = field(default=(), compare=False)
+    """Names of its numbers"""
+    sequence: str = field(default="", compare=False)
+    """Lengths that are admitted, in words, if it is sent as a sequence; else empty"""
+
+    def admits(self, length: int) -> bool:
+        """Return whether a sequence of this length may be the signal, which is left out if it has a fixed size."""
+        return length % len(self.unit.split(", ")) == 0 if self.size == VARYING else length in (0, self.size)
 
 
-def _state(name: str) -> SignalType:
-    return SignalType(name, ", ".join(STATE_UNITS), N_STATES)
+SIGNALS: dict[str, SignalType] = {}
+"""All signals by name, in the order of the loop."""
 
 
-def _input(name: str) -> SignalType:
-    return SignalType(name, ", ".join(INPUT_UNITS), N_INPUTS)
+def _signal(name: str, unit: str, size: int, meaning: str, *fields: str, **others: Any) -> SignalType:
+    SIGNALS[name] = SignalType(name, unit, size, meaning, fields, **others)
+    return SIGNALS[name]
 
 
-STATE = _state("state")
-STATUS = SignalType("status", "1", 1)
-FORCES = SignalType("forces", "N, N, N, N m, Pa", 5)
-EFFECTOR = _input("effector")
-AIR = SignalType("air", "m/s, m/s, 1", 3)
-MEASUREMENT = _state("measurement")
-ESTIMATE = _state("estimate")
-FILTERED_PITCH_RATE = SignalType("filtered_pitch_rate", "rad/s", 1)
-FILTER_STATE = SignalType("filter_state", "rad, rad s", VARYING)
-REFERENCE = _state("reference")
-REFERENCE_INPUT = _input("reference_input")
-DEVIATION = _state("deviation")
-NOMINAL_INPUT = _input("nominal_input")
-GAIN = SignalType("gain", "", VARYING)
-GAIN_INDEX = SignalType("gain_index", "1", 1)
-NOMINAL_STATUS = SignalType("nominal_status", "1", 1)
-UNSATURATED_INPUT = _input("wanted_input")
-COMMAND = _input("command")
-SATURATED = SignalType("saturated", "1", N_INPUTS)
-DIAGNOSTICS = SignalType("diagnostics", "", VARYING)
-ACTUATOR = _input("actuator")
-ACTIVE_FAULTS = SignalType("active_faults", "", VARYING)
+def _state(name: str, meaning: str, *fields: str, sequence: str = "") -> SignalType:
+    units = ", ".join(STATE_UNITS)
+    return _signal(name, units, N_STATES, meaning, *fields, components=STATE_NAMES, sequence=sequence)
 
-_COMPONENTS = {
-    **dict.fromkeys(("state", "measurement", "estimate", "reference", "defect", "deviation"), STATE_NAMES),
-    **dict.fromkeys(
-        ("effector", "reference_input", "nominal_input", "wanted_input", "command", "actuator"), INPUT_NAMES
-    ),
-    "forces": ("lift", "drag", "thrust", "pitching_moment", "dynamic_pressure"),
-    "air": ("wind_forward", "wind_up", "relative_density"),
+
+def _input(name: str, meaning: str, *fields: str) -> SignalType:
+    return _signal(name, ", ".join(INPUT_UNITS), N_INPUTS, meaning, *fields, components=INPUT_NAMES)
+
+
+STATE = _state("state", "x, the true state", "state.altitude")
+STATUS = _signal(
+    "status",
+    "1",
+    1,
+    "whether the flight goes on, has finished or has diverged",
+    "measurement.status",
+    "state.status",
+    "filtered_state.status",
+)
+FORCES = _signal(
+    "forces",
+    "N, N, N, N m, Pa",
+    5,
+    "forces on the vehicle",
+    "forces.lift",
+    components=("lift", "drag", "thrust", "pitching_moment", "dynamic_pressure"),
+)
+EFFECTOR = _input("effector", "positions of the effectors", "forces.effector")
+AIR = _signal(
+    "air",
+    "m/s, m/s, 1",
+    3,
+    "wind, and density relative to the model atmosphere",
+    "forces.wind_forward",
+    components=("wind_forward", "wind_up", "density_factor"),
+)
+MEASUREMENT = _state("measurement", "y, the measured state", "measurement.state", "filtered_state.state")
+ESTIMATE = _state("estimate", "x, estimated or measured", "filtered_state.estimate", sequence=f"{N_STATES}, or none")
+FILTERED_PITCH_RATE = _signal(
+    "filtered_pitch_rate", "rad/s", 1, "q_f, behind the notch filter", "filtered_state.filtered_pitch_rate"
+)
+FILTER_STATE = _signal(
+    "filter_state",
+    "rad, rad s",
+    VARYING,
+    "s, state of the notch filter before its update",
+    "filtered_state.filter_state",
+    sequence="two for each section of the notch filter",
+)
+REFERENCE = _state("reference", "x_r", "nominal.reference")
+REFERENCE_INPUT = _input("reference_input", "u_r", "nominal.reference_input")
+DEFECT = _state("defect", "d_r, defect of the reference")
+DEVIATION = _state("deviation", "x_n", "nominal.deviation")
+NOMINAL_INPUT = _input("nominal_input", "u_n", "nominal.input")
+GAIN = _signal(
+    "gain",
+    "",
+    N_INPUTS * N_STATES,
+    "K, if it was found in flight",
+    "nominal.gain",
+    sequence=f"{N_INPUTS * N_STATES}, or none",
+)
+GAIN_INDEX = _signal("gain_index", "1", 1, "gain of the family that gave u_n", "nominal.gain_index")
+NOMINAL_STATUS = _signal("nominal_status", "1", 1, "flags of the nominal trajectory", "nominal.status")
+UNSATURATED_INPUT = _input("wanted_input", "input before the limits")
+COMMAND = _input("command", "u, within the limits", "command.fuel_equivalence_ratio")
+SATURATED = _signal("saturated", "1", N_INPUTS, "whether the limits have changed each input", "command.saturated")
+DIAGNOSTICS = _signal("diagnostics", "", VARYING, "numbers of the tube", "tube_status.level")
+ACTUATOR = _input("actuator", "input that reaches the actuators", "actuator.fuel_equivalence_ratio")
+ACTIVE_FAULTS = _signal("active_faults", "", VARYING, "faults that act", "actuator.active")
+
+DIAGNOSED = {
+    "level": 1,
+    "u_nominal": N_INPUTS,
+    "u_feedback": N_INPUTS,
+    "u_unsaturated": N_INPUTS,
+    "inside": 1,
+    "status": 1,
+    "error": VARYING,
+    "tube_centre": VARYING,
+    "tube_half_width": VARYING,
+    "tau": VARYING,
 }
+"""Sizes of the controller's diagnostics by name; these are also the fields of the tube status."""
 
 
 def numbers_of(signal: SignalType) -> list[tuple[str, str]]:
     """Return name and unit of every number in a signal: ``measurement.altitude`` in m, ``filter_state[1]`` in rad."""
     units = signal.unit.split(", ")
-    if signal.size == 1 and signal.name not in _COMPONENTS:
+    components = SIGNALS[signal.name].components if signal.name in SIGNALS else ()
+    if signal.size == 1 and not components:
         return [(signal.name, units[0])]
-    names = [f".{name}" for name in _COMPONENTS.get(signal.name, ())] or [f"[{i + 1}]" for i in range(signal.size)]
+    names = [f".{name}" for name in components] or [f"[{i + 1}]" for i in range(signal.size)]
     return [(f"{signal.name}{name}", units[i % len(units)]) for i, name in enumerate(names)]
 
 

@@ -10,7 +10,7 @@ import hashlib
 import re
 from collections.abc import Mapping
 from ctypes import POINTER, Structure, c_char_p, c_double, c_int64, c_void_p
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from types import SimpleNamespace
@@ -296,7 +296,7 @@ class LibraryClass:
 
 def _inputs(filter_states: int) -> tuple[SignalType, ...]:
     """Return the inputs of a controller in a flight whose notch filter has ``filter_states`` states."""
-    return (*CONTROLLER_INPUTS[:-1], CONTROLLER_INPUTS[-1]._replace(size=filter_states))
+    return (*CONTROLLER_INPUTS[:-1], replace(CONTROLLER_INPUTS[-1], size=filter_states))
 
 
 def _check_signals(field: str, found: tuple[SignalType, ...], expected: tuple[SignalType, ...]) -> None:
