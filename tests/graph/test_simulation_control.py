@@ -21,7 +21,8 @@ from hsv.flight.scenario import load_scenario
 pytestmark = pytest.mark.graph
 
 CLIENT = Path(__file__).parents[1] / "support" / "simulation_client.py"
-STOPPED, OK, FAILED, UNSUPPORTED, ALREADY, INCORRECT = 0, 1, 4, 0, 101, 103
+STOPPED, OK, NOT_FOUND, FAILED, UNSUPPORTED, ALREADY, INCORRECT = 0, 1, 2, 4, 0, 101, 103
+SUCCEEDED, CANCELED = 4, 5
 
 
 @pytest.mark.parametrize(
@@ -36,11 +37,17 @@ def test_pause_steps_reset_and_the_whole_flight_again(processes, scenario, pace,
     answers = output_of(client)
     assert client.returncode == 0, answers
     told = json.loads(answers.splitlines()[-1])
-    assert {20, 24, 25, 26, 31, 32} == {*told["features"]}
+    assert {10, 20, 24, 25, 26, 31, 32, 33} == {*told["features"]}
     assert (told["at first"], told["pause while stopped"]) == (STOPPED, INCORRECT)
-    assert (told["steps at first"], told["play while steps are flown"], told["play"]) == (OK, OK, ALREADY)
+    assert (told["steps at first"], told["at"]) == ([OK, OK, OK], 5)
+    assert (told["play while steps are flown"], told["play"]) == (OK, ALREADY)
+    assert told["steps of a played flight"] == FAILED
     assert told["step while playing"] == FAILED and told["pause"] == [OK, ALREADY]
     assert told["steps"] == OK and told["to"] == told["from"] + 50
+    assert told["entities"] == ["vehicle"] and told["pitch"][0] == pytest.approx(told["pitch"][1], abs=1e-12)
+    assert told["nobody"] == NOT_FOUND
+    done, canceled = told["action"]
+    assert done == [SUCCEEDED, OK, 30] and canceled[:2] == [CANCELED, FAILED]
     assert told["scope"] == UNSUPPORTED and told["reset"] == OK and told["after reset"] == STOPPED
     assert told["play again"] == OK
 
@@ -52,7 +59,7 @@ def test_pause_steps_reset_and_the_whole_flight_again(processes, scenario, pace,
         assert as_published(same.fingerprint, None, "")
     before = Bag(processes.folder / "flown_reset_1")
     states = before.columns("hsv/state")
-    assert len(states["step"]) == told["to"] + 1 and "design.yaml" in before.attachments
+    assert len(states["step"]) == told["last"] + 1 > told["to"] + 35 and "design.yaml" in before.attachments
     assert_each_has_its_own(before, Bag(bag))
 
 

@@ -121,6 +121,21 @@ class PlantNode(LockstepNode):
         """Whether the flight is paused; False while requested steps are executed."""
         return bool(self.values["paused"]) and self.step >= self._stepping_to
 
+    @property
+    def run_id(self) -> str:
+        """Identifier of the current run."""
+        return str(self._run.run_id)
+
+    @property
+    def state(self) -> list[float]:
+        """The current state, shape (9,), SI."""
+        return [float(number) for number in self._signals.state]
+
+    @property
+    def stamp(self) -> tuple[int, int]:
+        """Simulated time of the current step: seconds and nanoseconds."""
+        return self._signals.stamp
+
     def fly_on(self, steps: int) -> None:
         """Execute ``steps`` steps of a paused flight."""
         self._paced_from = time.monotonic(), self.step
@@ -197,6 +212,7 @@ class PlantNode(LockstepNode):
             # Not earlier: the actuator message is the last message of a step that a node waits for.
             self.get_logger().info(f"run {short_id(self._run)} reset at {step_in_words(self.step, self.plant.period)}")
             self._begin()
+            self._control.stepping.moved()
         elif not self._published:
             if self._started and not self.paused:
                 self._publish()
@@ -225,6 +241,8 @@ class PlantNode(LockstepNode):
         for pack, publish in self._answers:
             publish(pack(signals))
         status = FlightStatus(signals.status)
+        if self._stepping_to:
+            self._control.stepping.moved()
         if self.values["progress"] and (signals.step % 50 == 0 or status is not FlightStatus.RUNNING):
             print(f"step {signals.step} of {self.plant.steps}", flush=True)
         self.diagnose(signals, status=status.name)
@@ -256,6 +274,7 @@ class PlantNode(LockstepNode):
 
     def close(self) -> None:
         """If the run has started, announce its end to the other nodes and, unless the flight diverged, log it."""
+        self._control.stepping.close()
         if not self._started:
             return
         run, where = f"run {short_id(self._run)}", step_in_words(self.step, self.plant.period)

@@ -43,8 +43,14 @@ SIMULATION_CONTROL = {
     "SetSimulationState": "hsv/set_simulation_state",
     "StepSimulation": "hsv/step_simulation",
     "ResetSimulation": "hsv/reset_simulation",
+    "GetEntities": "hsv/get_entities",
+    "GetEntityState": "hsv/get_entity_state",
+    "GetEntitiesStates": "hsv/get_entities_states",
 }
 """Services of the plant by their service types in the ROS 2 package ``simulation_interfaces``."""
+
+SIMULATE_STEPS = "hsv/simulate_steps"
+"""Action of the plant of the type SimulateSteps of ``simulation_interfaces``."""
 
 TOPICS = {
     CLOCK: "rosgraph_msgs/msg/Clock",
