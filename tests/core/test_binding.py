@@ -10,7 +10,7 @@ from flights import components
 from hsv.base.errors import ParameterError
 from hsv.control.nominal_law import level
 from hsv.control.notch_filter import NotchSection, discretise
-from hsv.core import Struct, compare_enumerators, ffi, fly, instruction_set, lanes, loop_memory
+from hsv.core import Struct, compare_enumerators, doubles, dtype, ffi, fly, instruction_set, lanes, lib, loop_memory
 from hsv.core.arithmetic import solve
 from hsv.flight.closed_loop import flight_struct
 from hsv.flight.history import History
@@ -137,3 +137,29 @@ def test_numbers_of_another_length_are_refused():
     ):
         with pytest.raises(ValueError, match=r"array of shape .* expected"):
             call()
+
+
+@pytest.mark.parametrize("number", [0.0, 0.5, -3.0, 1e300, -1e300, np.nan, np.inf])
+def test_numbers_of_a_fault_that_are_no_numbers_of_steps_are_defined(number):
+    """What no path of the library admits: a period below a step, and numbers that do not fit into an integer."""
+    rows = np.zeros(2, dtype("hsv_fault"))
+    rows["stop"], rows["cycle"] = 1e9, [[number, 2.0], [3.0, number]]
+    rows["occurrence"], rows["code"], rows["channel"] = lib.PERIODIC, lib.DELAY, 1
+    rows["parameter"][:, 0] = number
+    memory = np.zeros(2, dtype("hsv_fault_memory"))
+    faults = Struct("hsv_faults", rows=rows, memory=memory, period=0.02)
+    for k in range(200):
+        command = np.array([0.3, 0.1])
+        lib.hsv_apply_command_faults(faults.pointer, k, 1, doubles(command))
+        assert command.tolist() in ([0.3, 0.1], [0.3, 0.0])
+    rows["channel"] = [7, -1]  # no input of the vehicle
+    faults = Struct("hsv_faults", rows=rows, memory=memory, period=0.02)
+    lib.hsv_apply_command_faults(faults.pointer, 201, 1, doubles(command))
+
+
+@pytest.mark.parametrize("number", [-1.0, 0.5, 2.0, 1e300, -1e300, np.nan])
+def test_an_unknown_structure_of_a_vehicle_is_that_of_the_paper(number):
+    vehicle = load_vehicle().coupled()
+    x, u = np.array([26000.0, 2400.0, 0.03, 0.03, 0, 0.5, 0, 0.2, 0]), np.array([0.3, 0.1])
+    expected = derivative(x, u, vehicle)
+    assert np.array_equal(derivative(x, u, vehicle._replace(structure=number)), expected)

@@ -1,5 +1,6 @@
 """C controllers in the loop have the same bits as in Python; their errors end only their own process."""
 
+import platform
 import re
 import shutil
 import subprocess
@@ -116,6 +117,50 @@ def test_what_goes_wrong_is_named_with_its_step_and_the_next_flight_flies(flight
     with pytest.raises(ControllerError, match=message):
         fly(flight(settings))
     assert len(fly(flight()).time) == 201
+
+
+EVERY_DESCRIPTOR = "if (k == 33) for (int i = 3; i < 60; i++) write(i, {words})"
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        (
+            EVERY_DESCRIPTOR.format(words=r'"\0\0\0\5hello, this is no answer", 30'),
+            "wrote to a descriptor that is not its own",
+        ),
+        (
+            EVERY_DESCRIPTOR.format(words=r'"hsv1n\377\0\0\0\0\0\0\0", 13'),
+            "wrote (an answer of its own|a part of an answer)",
+        ),
+        (EVERY_DESCRIPTOR.format(words=r'"hsv1i\10\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0", 21'), "wrote an answer of its own"),
+        (EVERY_DESCRIPTOR.format(words=r'"hsv1d\2\0\0\0\0\0\0\0[]", 15'), "wrote to a descriptor that is not its own"),
+        ("state[1] = k", "wrote behind the end of its state, expected at most 1 numbers there"),
+        ("out[HSV_INPUTS + 1] = k", "wrote behind the end of its outputs, expected 2 numbers"),
+    ],
+)
+def test_a_library_that_writes_to_what_is_not_its_own_is_named(tmp_path, extra, message, monkeypatch):
+    monkeypatch.setattr("hsv.plugins.library_process.NO_PROGRESS", 1.0)
+    build_probe(tmp_path, "-w", f"-DEXTRA={extra}")
+    with pytest.raises(ControllerError, match=rf"probe.so:probe(, step \d+)?: {message}$"):
+        fly(assemble_flight(load_scenario(written(tmp_path))))
+    controller, two = assemble_flight(load_scenario(written(tmp_path))).controller, np.array([0.4, 0.2])
+    given = ControllerInput(33, np.zeros(9), 0.0, np.zeros(9), two, np.zeros(9), two, two)
+    with pytest.raises(ControllerError, match=r"probe.so:probe, step 33: (RunError: )?wrote "):
+        for _ in range(3):  # a message that comes after the answer is found at the next request
+            controller.step(given)
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the register of this processor")
+@pytest.mark.parametrize("mode", ["0xff80", "0x7f80"])  # with subnormal numbers flushed to zero, and without
+def test_a_library_that_changes_the_arithmetic_flies_the_same_bits(tmp_path, mode):
+    folders = {"(void)0": tmp_path / "plain", f"__builtin_ia32_ldmxcsr({mode})": tmp_path / "changing"}
+    flights = []
+    for extra, folder in folders.items():
+        folder.mkdir()
+        build_probe(folder, "-w", f"-DEXTRA={extra}")
+        flights.append(fly(assemble_flight(load_scenario(written(folder, design="baseline")))))
+    assert flights[0].fingerprint == flights[1].fingerprint
 
 
 def test_what_goes_wrong_stepwise_is_named_with_its_step(flight):

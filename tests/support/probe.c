@@ -63,6 +63,9 @@ static int32_t step(int64_t k, const double *in, double *out, double *state, con
     kept = 1e-6;
 #endif
     state[0] += par[1] * (in[HSV_ESTIMATE + HSV_PITCH_ANGLE] - in[HSV_REFERENCE + HSV_PITCH_ANGLE] - par[2] * state[0]);
+#ifdef EXTRA
+    EXTRA;
+#endif
     return 0;
 }
 

@@ -33,6 +33,7 @@ import numpy as np
 
 from hsv.base.errors import ControllerError, ParameterError, RunError
 from hsv.base.parameters import Parameter
+from hsv.core import doubles, ffi, lib
 from hsv.model import signals
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import INPUT_NAMES, N_INPUTS
@@ -297,9 +298,34 @@ def call_step_function(
     ``given`` are the inputs of the controller as :func:`flat_input` arranges them.
 
     Raises:
-        RunError: The function returned a value other than 0.
+        RunError: The function returned a value other than 0, or wrote behind its state or outputs.
     """
-    out = np.full(N_INPUTS, np.nan)  # so that an output that the controller does not set is noticed
-    if code := STEP_FUNCTION(address)(step, *(a.ctypes.data for a in (given, out, state, parameters))):
+    out, own = np.empty(N_INPUTS), guarded(state)
+    call = ffi.new("hsv_call *", [ffi.cast("hsv_step_function", address), doubles(own), doubles(parameters)])
+    code = lib.hsv_call_step(call, step, doubles(given), doubles(out))
+    if wrong := overwritten(code, own):
+        raise RunError(wrong)
+    state[:] = own[: len(state)]
+    if code:
         raise RunError(f"returned {code}")
     return out
+
+
+def guarded(state: np.ndarray) -> np.ndarray:
+    """Return a copy of the ``state`` of a step function with guard words behind it."""
+    room = np.empty(len(state) + lib.GUARDS)
+    room[: len(state)] = state
+    lib.hsv_set_guards(doubles(room[len(state) :]))
+    return room
+
+
+def overwritten(code: int, state: np.ndarray) -> str:
+    """Return what a step function with the result ``code`` wrote to that is not its own; empty if nothing is found.
+
+    ``state`` has guard words, see :func:`guarded`.
+    """
+    if not lib.hsv_intact(doubles(state[-lib.GUARDS :])):
+        return f"wrote behind the end of its state, expected at most {len(state) - lib.GUARDS} numbers there"
+    if code == lib.OVERRUN:
+        return f"wrote behind the end of its outputs, expected {N_INPUTS} numbers"
+    return ""

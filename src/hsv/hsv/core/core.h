@@ -13,6 +13,10 @@ enum { STATES = 9, INPUTS = 2, RIGID = 5, CONDITIONS = 7, MAX_SECTIONS = 4, MAX_
 enum { ACTUATOR_SUBSTEPS = 4 };
 /* Magnitude (SI) above which the receiver of a link regards a number as corrupted. */
 enum { LARGEST = 1000000 };
+/* Limit on the numbers of steps in a fault. */
+enum { MOST_STEPS = 2147483647 };
+/* Guard words behind arrays that foreign code writes to, and the result of a step function that overwrote them. */
+enum { GUARDS = 8, OVERRUN = -2147483647 };
 /* Largest x' P x of a state inside an ellipsoid: 1 with a tolerance, because by design the first deviation lies on the
  * boundary of the outermost ellipsoid. */
 static const double MEMBERSHIP_BOUNDARY = 1.0 + 1e-6;
@@ -275,6 +279,10 @@ typedef struct {
     double worst;            /* output: largest level of the flight */
 } hsv_flight;
 
+/* A call of a step function with two outputs, which returns its result or OVERRUN; guard words behind its state. */
+int32_t hsv_call_step(const hsv_call *call, int64_t k, const double *in, double *out);
+void hsv_set_guards(double *behind);
+int hsv_intact(const double *behind);
 /* Elementary functions and random numbers. */
 void hsv_sine_cosine(double x, double *sine, double *cosine);
 double hsv_tangent(double x);

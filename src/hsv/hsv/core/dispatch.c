@@ -1,5 +1,5 @@
 /* Selection of an instance of the loop by instruction set and number of flights. */
-#include "core.h"
+#include "foreign.h"
 
 typedef int64_t Fly(hsv_flight *const *flights, void *memory, int64_t start, int64_t stop, int halves);
 extern Fly hsv_fly_single;
@@ -38,5 +38,6 @@ int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, voi
     if (instructions >= AVX2) fly = count == 1 ? hsv_fly_avx2_single : count == 4 ? hsv_fly_avx2 : 0;
     if (instructions >= AVX512 && count == 8) fly = hsv_fly_avx512;
 #endif
+    default_arithmetic();
     return fly && instructions >= SSE2 ? fly(flights, memory, start, stop, halves) : start;
 }

@@ -6,6 +6,12 @@
 #pragma once
 #include "noise.h"
 
+/* Return x as an integer from low to high, and low for NaN; a mere cast of what does not fit is undefined in C. */
+static int64_t whole(double x, int64_t low, int64_t high)
+{
+    return x > (double)low ? x < (double)high ? (int64_t)x : high : low;
+}
+
 /* Determine which faults act in step k, in "acting" of their memory; return their number. */
 int64_t hsv_begin_faults(hsv_faults *faults, int64_t k, int64_t seed)
 {
@@ -16,7 +22,8 @@ int64_t hsv_begin_faults(hsv_faults *faults, int64_t k, int64_t seed)
         hsv_fault_memory *memory = &faults->memory[i];
         int acts = fault->start <= step && step < fault->stop;
         if (acts && fault->occurrence == PERIODIC)
-            acts = (k - (int64_t)fault->start) % (int64_t)fault->cycle[0] < (int64_t)fault->cycle[1];
+            acts = (k - whole(fault->start, 0, MOST_STEPS)) % whole(fault->cycle[0], 1, MOST_STEPS) <
+                   whole(fault->cycle[1], 0, MOST_STEPS);
         else if (acts && fault->occurrence == RANDOM) {
             if (step == fault->start)
                 memory->away = 0;
@@ -51,7 +58,7 @@ static double commanded(const hsv_fault *fault, hsv_fault_memory *memory, int64_
     case REVERSAL: /* of the whole command (value 0), or of its change since the onset (value 1) */
         return 2.0 * value * memory->kept - command;
     case DELAY: {
-        const int64_t size = (int64_t)value + 1;
+        const int64_t size = whole(value, 0, MAX_DELAY) + 1;
         if (fresh)
             for (int64_t j = 0; j < size; j++) memory->queue[j] = command;
         memory->queue[k % size] = command;
@@ -74,7 +81,7 @@ void hsv_apply_command_faults(hsv_faults *faults, int64_t k, int64_t seed, doubl
 {
     if (hsv_begin_faults(faults, k, seed) == 0) return;
     for (int64_t i = 0; i < faults->count; i++)
-        if (faults->memory[i].acting) {
+        if (faults->memory[i].acting && (uint64_t)faults->rows[i].channel < INPUTS) {
             double *channel = &actuator[faults->rows[i].channel];
             *channel = commanded(&faults->rows[i], &faults->memory[i], k, faults->period, *channel);
         }

@@ -37,9 +37,10 @@ static int passes(const hsv_link *link, double *payload, int64_t n, int64_t k, i
 void hsv_receive(const hsv_link *link, double *memory, int64_t size, int64_t k, int64_t seed, double *payload,
                  int64_t n)
 {
-    if (link->ideal) return;
+    const int64_t room = n > 0 ? (size - ACCEPTED) / n - 1 : 0; /* slots for which the memory has space */
+    if (link->ideal || room < 1) return;
     if (memory[BEGUN] == 0.0) hsv_fill_link(memory, size, payload, n);
-    const int64_t slots = link->delay + link->jitter + 1;
+    const int64_t due_slots = link->delay + link->jitter + 1, slots = due_slots < 1 || due_slots > room ? 1 : due_slots;
     memcpy(memory + ACCEPTED + n * (1 + k % slots), payload, (size_t)n * sizeof *payload);
     int64_t newest = k - link->delay;
     if (link->jitter > 0)

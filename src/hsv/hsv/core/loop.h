@@ -18,6 +18,7 @@
 #pragma once
 #include "effectiveness.h"
 #include "estimator.h"
+#include "foreign.h"
 #include "metrics.h"
 #include "nominal.h"
 #include "plant.h"
@@ -96,9 +97,8 @@ static inline void begin(hsv_flight *const *flights, Loop *f)
 /* Call the external nominal law, which writes u_n and the index of its gain; return -1 on failure, else 0. */
 static inline int call_nominal_law(hsv_flight *flight, Loop *f, int64_t k)
 {
-    const hsv_call *law = &flight->nominal_law;
     double found[INPUTS + 1];
-    if (law->function(k, f->x_n, found, law->state, law->par)) return -1;
+    if (call_step(&flight->nominal_law, k, f->x_n, found, INPUTS + 1)) return -1;
     f->u_n[0] = found[0], f->u_n[1] = found[1], f->gain_index = found[INPUTS];
     return 0;
 }
@@ -106,7 +106,6 @@ static inline int call_nominal_law(hsv_flight *flight, Loop *f, int64_t k)
 /* Call the external controller; return -1 on failure, else 0. */
 static inline int call_controller(hsv_flight *flight, const Loop *f, int64_t k, double *u_unsaturated)
 {
-    const hsv_call *controller = &flight->controller;
     double in[3 * STATES + 1 + 2 * INPUTS + 2 * MAX_SECTIONS], *next = in; /* the order of hsv_block.h */
     memcpy(next, f->feedback_state, sizeof f->feedback_state), next += STATES;
     *next++ = f->q_f;
@@ -115,8 +114,7 @@ static inline int call_controller(hsv_flight *flight, const Loop *f, int64_t k, 
     memcpy(next, f->x_n, sizeof f->x_n), next += STATES;
     memcpy(next, f->u_n, sizeof f->u_n), next += INPUTS;
     memcpy(next, f->s, 2 * (size_t)flight->notch->sections * sizeof *f->s);
-    u_unsaturated[0] = u_unsaturated[1] = NAN; /* an output that the controller does not set is a failure */
-    flight->returned = controller->function(k, in, u_unsaturated, controller->state, controller->par);
+    flight->returned = call_step(&flight->controller, k, in, u_unsaturated, INPUTS);
     memcpy(flight->answer, u_unsaturated, sizeof flight->answer);
     return flight->returned == 0 && is_finite(u_unsaturated[0]) && is_finite(u_unsaturated[1]) ? 0 : -1;
 }

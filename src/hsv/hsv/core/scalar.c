@@ -92,4 +92,12 @@ void hsv_effectiveness_bounds(const hsv_effectiveness *effectiveness, const doub
     bounds[0] = loss.low, bounds[1] = loss.high, bounds[2] = offset.low, bounds[3] = offset.high;
 }
 
+int32_t hsv_call_step(const hsv_call *call, int64_t k, const double *in, double *out)
+{
+    return call_step(call, k, in, out, INPUTS);
+}
+
+void hsv_set_guards(double *behind) { set_guards(behind); }
+int hsv_intact(const double *behind) { return intact(behind); }
+
 double hsv_level(const double *P, int64_t size, const double *x) { return level(P, size, x); }

@@ -41,7 +41,7 @@ static double sensor_sample(const hsv_sensors *s, hsv_sensor_memory *m, int i, i
     m->lagged = k == 0 ? scaled : scaled + s->lag_decay[i] * (m->lagged - scaled);
     double value = m->lagged + error;
     if (s->latency[i] > 0) {
-        const int64_t size = s->latency[i] + 1;
+        const int64_t size = 1 + (s->latency[i] < MAX_DELAY ? s->latency[i] : MAX_DELAY);
         if (k == 0)
             for (int64_t j = 0; j < size; j++) m->queue[j] = value;
         m->queue[k % size] = value;
@@ -59,7 +59,7 @@ static double sensor_failed(const hsv_fault *fault, hsv_fault_memory *memory, in
 {
     const double first = fault->parameter[0], limit = fault->parameter[1];
     const int fresh = memory->onset == (double)k;
-    const int64_t draw = (int64_t)fault->start;
+    const int64_t draw = whole(fault->start, 0, MOST_STEPS);
     switch (fault->code) {
     case SENSOR_SCALE: return first * value;
     case SENSOR_NOISE: return value + first * first_normal(seed, k, SENSOR_FAULT_NOISE + fault->channel, draw);
@@ -95,7 +95,7 @@ void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faul
     }
     if (failing > 0)
         for (int64_t j = 0; j < faults->count; j++)
-            if (faults->memory[j].acting) {
+            if (faults->memory[j].acting && (uint64_t)faults->rows[j].channel < STATES) {
                 const hsv_fault *fault = &faults->rows[j];
                 double *value = &measurement[fault->channel];
                 *value = sensor_failed(fault, &faults->memory[j], k, seed, faults->period, *value,

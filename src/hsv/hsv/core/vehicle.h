@@ -38,8 +38,12 @@ enum { PARKER, WINGED_CONE };
 #include "parker.h"
 #include "winged_cone.h"
 
-/* Return the structure, which all flights of a group of lanes have in common. */
-static inline int structure(const Vehicle *p) { return (int)lane(p->structure, 0); }
+/* Return the structure, which all flights of a group of lanes have in common; PARKER for an unknown number. */
+static inline int structure(const Vehicle *p)
+{
+    const double number = lane(p->structure, 0);
+    return number > 0.0 && number < 100.0 ? (int)number : PARKER;
+}
 
 /* Return the forces at an altitude (m), a speed (m/s) and an angle of attack (rad) relative to still air, a pitch rate
  * (rad/s) and the inputs. */

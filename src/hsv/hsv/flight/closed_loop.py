@@ -14,7 +14,7 @@ import numpy as np
 
 from hsv import core
 from hsv.base.errors import ControllerError, ProcessError
-from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInput
+from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInput, guarded, overwritten
 from hsv.control.nominal_law import FamilyLaw
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.notch_filter import NotchFilter
@@ -58,7 +58,9 @@ def fly(components: Components) -> Flight:
     rows = components.plant.steps + 1
     if components.controller.library is not None:
         with watched(components.controller, rows) as (history, request):
-            steps = request("call", _fly_in_child, rows, kept=vars(components))
+            steps = request("call", int, _fly_in_child, rows, kept=vars(components))
+            if not 1 <= steps <= rows:
+                raise ProcessError("wrote an answer of its own")
             return flight_of(components, history.copy().cut(steps))
     history = History.empty(rows, estimated=not is_ideal(components))
     steps, law_times = fly_into(history, components)
@@ -121,10 +123,11 @@ def fly_into(history: History, components: Components) -> tuple[int, dict[str, S
         callbacks["nominal_law"] = _law_callback(law)
     if not controller.in_core and controller.kernel is None:
         callbacks["controller"] = _controller_callback(controller, 2 * len(components.notch_filter.data.D))
-    calls = {name: callback.call for name, callback in callbacks.items()}
+    calls, own = {name: callback.call for name, callback in callbacks.items()}, None
     if not controller.in_core and controller.kernel is not None:
         address, state, parameters = controller.kernel
-        calls["controller"] = Struct("hsv_call", function=address, state=state.copy(), par=parameters)
+        own = guarded(state)
+        calls["controller"] = Struct("hsv_call", function=address, state=own, par=parameters)
     flight = flight_struct(components, history, **calls)
     with _ONE_AT_A_TIME if callbacks else nullcontext():
         if callbacks:
@@ -134,6 +137,8 @@ def fly_into(history: History, components: Components) -> tuple[int, dict[str, S
     for callback in callbacks.values():
         if callback.error is not None:
             raise callback.error
+    if own is not None and (wrong := overwritten(flight.pointer.returned, own)):
+        raise ControllerError(f"{controller.name}: {wrong}")
     if rows < 0:
         if code := flight.pointer.returned:
             raise ControllerError(f"{controller.name}, step {-1 - rows}: returned {code}, expected 0")

@@ -32,7 +32,7 @@ from hsv.control.controller import (
 )
 from hsv.control.notch_filter import NotchFilter
 from hsv.model.dynamics import VehicleParameters
-from hsv.model.signals import SignalType
+from hsv.model.signals import N_INPUTS, SignalType
 from hsv.model.vehicle import Vehicle
 from hsv.plugins.library_process import library_user
 
@@ -338,7 +338,10 @@ class LibraryController(ExternalController):
     def _call(self, inputs: ControllerInput) -> Any:
         call = self.symbol, inputs.step, flat_input(inputs), self._state, self.parameters
         try:
-            unsaturated, self._state = self.library.request("step", *call)
+            answer = self.library.request("step", np.ndarray, *call)
+            if answer.shape != (N_INPUTS + len(self._state),):
+                raise ProcessError("wrote an answer of its own")
         except ProcessError as error:
             raise ControllerError(f"{self.name}, step {inputs.step}: {error}") from error
-        return unsaturated
+        self._state = answer[N_INPUTS:]
+        return answer[:N_INPUTS]

@@ -27,6 +27,7 @@ from hsv.base.errors import HsvError, ProcessError, RunError
 from hsv.control.controller import call_step_function
 from hsv.plugins.fmu import LoadedFmu
 from hsv.plugins.library import CBlock, load_block
+from hsv.plugins.library_answers import send_answer
 from hsv.plugins.library_process import SharedMemory, use_in_this_process
 
 
@@ -45,7 +46,9 @@ class LoadedLibrary:
         """Yield the shared memory as an array of ``numbers`` values."""
         yield self._memory.numbers(numbers)
 
-    def request(self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, **_: Any) -> Any:
+    def request(
+        self, name: str, answers: type, *arguments: Any, kept: Mapping[str, Any] | None = None, **_: Any
+    ) -> Any:
         """Return the result of the method ``name`` with ``arguments`` and the keywords ``kept``; ignore others."""
         return getattr(self, name)(*arguments, **(kept or {}))
 
@@ -56,13 +59,11 @@ class LoadedLibrary:
             return self._fmu.block
         return self._load(self._path, symbol)
 
-    def step(
-        self, symbol: str, k: int, inputs: np.ndarray, state: np.ndarray, parameters: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Call the library's step function; return the unsaturated input, shape (2,), and the state after the step."""
+    def step(self, symbol: str, k: int, inputs: np.ndarray, state: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+        """Call the library's step function; return the unsaturated input (2), then the state after the step."""
         with self._reason():
             u_unsaturated = call_step_function(self.describe(symbol).address, k, inputs, state, parameters)
-        return u_unsaturated, state
+        return np.concatenate((u_unsaturated, state))
 
     @contextmanager
     def _reason(self) -> Iterator[None]:
@@ -85,7 +86,7 @@ def main() -> None:
     # The parent handles Ctrl-C and ends its child.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     path, connection, memory = Path(sys.argv[1]), Connection(int(sys.argv[2])), SharedMemory(int(sys.argv[3]))
-    connection.send(None)
+    send_answer(connection.fileno(), None)
     with suppress(ConnectionError):
         while True:
             pid = os.fork()
@@ -93,7 +94,7 @@ def main() -> None:
                 serve(LoadedLibrary(path, memory), connection)
             code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
             end = f"crashed ({signal.Signals(-code).name})" if code < 0 else f"ended its process with exit code {code}"
-            connection.send(ProcessError(end))
+            send_answer(connection.fileno(), ProcessError(end))
 
 
 def serve(library: LoadedLibrary, connection: Connection[Any, Any]) -> NoReturn:
@@ -109,10 +110,10 @@ def serve(library: LoadedLibrary, connection: Connection[Any, Any]) -> NoReturn:
         if news is not None:
             kept |= news
         try:
-            answer = library.request(name, *arguments, kept=None if news is None else kept)
+            answer = library.request(name, object, *arguments, kept=None if news is None else kept)
         except HsvError as error:
             answer = error
-        connection.send(answer)
+        send_answer(connection.fileno(), answer)
 
 
 def _end_with_parent(connection: int) -> None:

@@ -7,6 +7,7 @@ changed, the next request starts a new one. The child runs :mod:`hsv.plugins.lib
 from __future__ import annotations
 
 import atexit
+import fcntl
 import mmap
 import os
 import signal
@@ -19,17 +20,20 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from hsv.base.errors import ProcessError
+from hsv.plugins.library_answers import receive_answer
 
 if TYPE_CHECKING:
     from hsv.plugins.library import CBlock
 
 NO_PROGRESS = 20.0
 """Time (s) without progress after which a child is ended, while it loads the library or steps it."""
+
+Answer = TypeVar("Answer")
 
 _POLL = 0.5
 """Interval (s) at which progress is checked."""
@@ -40,7 +44,11 @@ class SharedMemory:
 
     def __init__(self, descriptor: int | None = None) -> None:
         """Use the memory behind a file ``descriptor``, by default new memory."""
-        self.descriptor = os.memfd_create("hsv_library") if descriptor is None else descriptor
+        if descriptor is None:
+            descriptor = os.memfd_create("hsv_library", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+            # A library that cut the memory off would crash this process.
+            fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK)
+        self.descriptor = descriptor
         self._mapped = np.empty(0)
 
     def numbers(self, count: int) -> np.ndarray:
@@ -73,19 +81,27 @@ class LibraryProcess:
             ParameterError: There is no such block, or it is wrong.
             ProcessError: The child crashed or hangs.
         """
+        from hsv.plugins.library import CBlock
+
         with self._lock:
             self._renew()
             if symbol not in self._blocks:
-                self._blocks[symbol] = self.request("describe", symbol)
+                self._blocks[symbol] = self.request("describe", CBlock, symbol)
             return self._blocks[symbol]
 
     def request(
-        self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, begun: Callable[[], int] = lambda: 1
-    ) -> Any:
+        self,
+        name: str,
+        answers: type[Answer],
+        *arguments: Any,
+        kept: Mapping[str, Any] | None = None,
+        begun: Callable[[], int] = lambda: 1,
+    ) -> Answer:
         """Return the reply of the child to a request, see :class:`hsv.plugins.library_child.LoadedLibrary`.
 
         Args:
             name: Name of the request.
+            answers: Type of the reply.
             arguments: Arguments of the request.
             kept: Keyword arguments that the child stores; an object that it already has is not sent again.
             begun: Returns the number of steps that the child has begun. If it does not change for :data:`NO_PROGRESS`,
@@ -116,6 +132,8 @@ class LibraryProcess:
                 raise
         if isinstance(answer, Exception):
             raise answer
+        if not isinstance(answer, answers):
+            raise ProcessError("wrote an answer of its own")
         return answer
 
     @contextmanager
@@ -158,14 +176,18 @@ class LibraryProcess:
         )
         theirs.close()
         # No time limit: the imports may be slow on a busy machine.
+        self._connection.poll(None)
         self._receive()
 
     def _receive(self) -> Any:
         try:
-            answer = self._connection.recv()
+            answer = receive_answer(self._connection.fileno(), NO_PROGRESS)
         except (EOFError, ConnectionError):
             self.end()
             raise ProcessError("its process has ended") from None
+        except ProcessError:
+            self.end()
+            raise
         if answer is None or isinstance(answer, ProcessError):
             self._kept: dict[str, Any] = {}
         return answer

@@ -210,7 +210,7 @@ def fly_batch(text: str, batch: int) -> bytes:
     runner = sample_runner(text)
     if isinstance(runner.controller, LibraryController):
         with suppress(ControllerError), watched(runner.controller, runner.steps + 1) as (_, request):
-            return bytes(request("call", _fly_batch, text, batch))
+            return bytes(request("call", bytes, _fly_batch, text, batch))
     return _fly_batch(text, batch)
 
 
