@@ -112,7 +112,7 @@ def _block(fields: dict[str, Any]) -> CBlock:
         bounds = float(given["minimum"]), float(given["maximum"])
         parameters.append(Parameter(name, default if len(default) > 1 else default[0], description, unit, *bounds))
     inputs, outputs = (
-        tuple(SignalType(str(name), str(unit), int(size)) for name, unit, size in fields[key])
+        tuple(SignalType(str(s["name"]), str(s["unit"]), int(s["size"])) for s in fields[key])
         for key in ("inputs", "outputs")
     )
     name, source, size = str(fields["name"]), str(fields["source"]), int(fields["state_size"])
