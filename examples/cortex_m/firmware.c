@@ -93,14 +93,17 @@ void reset(void)
     SYSTICK_RELOAD = 0xffffff, SYSTICK_VALUE = 0, SYSTICK_CONTROL = 5; /* enabled, with the processor clock */
     serve();
     semihosting(SYS_EXIT, (const void *)APPLICATION_EXIT);
-    for (;;) {}
+    for (;;) {
+    }
 }
 
 static void fault(void)
 {
     semihosting(SYS_EXIT, (const void *)0x20023); /* ADP_Stopped_RunTimeErrorUnknown */
-    for (;;) {}
+    for (;;) {
+    }
 }
 
 __attribute__((section(".vectors"), used)) static void *const vectors[16] = {
-    stack_end, reset, fault, fault, fault, fault, fault};
+    stack_end, reset, fault, fault, fault, fault, fault,
+};

@@ -51,8 +51,7 @@ static void most_of(const hsv_block &block, const Counted *in, Counted *state, C
     static Counted out[100], par[100];
     for (int64_t k : {0, 1})
         for (double rate : {0.0, 0.1}) {
-            for (int i = 0; i < RIGID; i++)
-                par[i] = 1.0;
+            for (int i = 0; i < RIGID; i++) par[i] = 1.0;
             par[RIGID] = rate;
             count = {};
             block.step(k, in, out, state, par);
@@ -69,8 +68,7 @@ int main()
         Count most = {};
         for (double value : ends) {
             Counted in[100], state[100];
-            for (int i = 0; i < 100; i++)
-                in[i] = value, state[i] = value;
+            for (int i = 0; i < 100; i++) in[i] = value, state[i] = value;
             most_of(*block, in, state, most);
             const hsv_axis &h = nominal_data.polytope.altitude, &v = nominal_data.polytope.velocity;
             in[HSV_ALTITUDE] = h.breakpoints[h.pieces];
@@ -80,8 +78,7 @@ int main()
         // Of the nominal trajectory: x_n in the outermost ellipsoid, along one of its axes in no other.
         for (int axis = 0; axis < RIGID; axis++) {
             Counted in[100], state[100];
-            for (int i = 0; i < 100; i++)
-                in[i] = state[i] = 0.0;
+            for (int i = 0; i < 100; i++) in[i] = state[i] = 0.0;
             in[axis] = 0.999 / std::sqrt(nominal_data.ellipsoids[(RIGID + 1) * axis].value);
             most_of(*block, in, state, most);
         }

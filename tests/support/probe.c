@@ -43,18 +43,12 @@ enum { WEIGHTS = 3, CRASH_AT = WEIGHTS, ABORT_AT, EXIT_AT, HANG_AT, FAIL_AT, SIL
 
 static int32_t step(int64_t k, const double *in, double *out, double *state, const double *par)
 {
-    if (k == (int64_t)par[CRASH_AT] || in[HSV_ESTIMATE + HSV_ALTITUDE] > par[CRASH_ABOVE])
-        raise(SIGSEGV);
-    if (k == (int64_t)par[ABORT_AT])
-        abort();
-    if (k == (int64_t)par[EXIT_AT])
-        exit(3);
-    while (k == (int64_t)par[HANG_AT])
-        pause();
-    if (k == (int64_t)par[FAIL_AT])
-        return 7;
-    if (k == (int64_t)par[SILENT_AT])
-        return 0;
+    if (k == (int64_t)par[CRASH_AT] || in[HSV_ESTIMATE + HSV_ALTITUDE] > par[CRASH_ABOVE]) raise(SIGSEGV);
+    if (k == (int64_t)par[ABORT_AT]) abort();
+    if (k == (int64_t)par[EXIT_AT]) exit(3);
+    while (k == (int64_t)par[HANG_AT]) pause();
+    if (k == (int64_t)par[FAIL_AT]) return 7;
+    if (k == (int64_t)par[SILENT_AT]) return 0;
     out[HSV_FUEL_EQUIVALENCE_RATIO] = in[HSV_REFERENCE_INPUT + HSV_FUEL_EQUIVALENCE_RATIO];
     out[HSV_ELEVATOR_DEFLECTION] = in[HSV_REFERENCE_INPUT + HSV_ELEVATOR_DEFLECTION] + par[0] * state[0];
 #ifdef STATIC
@@ -70,10 +64,7 @@ static int32_t step(int64_t k, const double *in, double *out, double *state, con
 }
 
 #ifdef CRASHES_ON_LOADING
-__attribute__((constructor)) static void load(void)
-{
-    raise(SIGSEGV);
-}
+__attribute__((constructor)) static void load(void) { raise(SIGSEGV); }
 #endif
 
 static const hsv_signal inputs[] = {INPUTS}, outputs[] = {OUTPUTS};
@@ -86,12 +77,13 @@ static const hsv_parameter parameters[] = {
     {"hang_at", "1", "step", 1, &never, 0.0, 0.0},
     {"fail_at", "1", "step", 1, &never, 0.0, 0.0},
     {"silent_at", "1", "step", 1, &never, 0.0, 0.0},
-    {"crash_above", "m", "altitude", 1, &high, 0.0, 0.0}};
+    {"crash_above", "m", "altitude", 1, &high, 0.0, 0.0},
+};
 
-const hsv_block probe = {ABI,         NAME,   SOURCE,  STEP,
-                         STATE_SIZE,  INPUT_COUNT, inputs,  HSV_COUNT(outputs),
-                         outputs,     HSV_COUNT(parameters), parameters};
+const hsv_block probe = {
+    ABI,       NAME, SOURCE, STEP, STATE_SIZE, INPUT_COUNT, inputs, HSV_COUNT(outputs), outputs, HSV_COUNT(parameters),
+    parameters};
 
 /* For the tests of the header itself. */
-const int64_t offsets[] = {HSV_ESTIMATE, HSV_FILTERED_PITCH_RATE, HSV_REFERENCE, HSV_REFERENCE_INPUT, HSV_DEVIATION,
-                           HSV_NOMINAL_INPUT, HSV_FILTER_STATE};
+const int64_t offsets[] = {HSV_ESTIMATE,  HSV_FILTERED_PITCH_RATE, HSV_REFERENCE,   HSV_REFERENCE_INPUT,
+                           HSV_DEVIATION, HSV_NOMINAL_INPUT,       HSV_FILTER_STATE};

@@ -27,12 +27,10 @@ int32_t lqr(int64_t k, const double *in, double *out, double *state, const doubl
     error[6] = state[1];
     for (int i = 0; i < 2; i++) {
         double total = 0.0;
-        for (int j = 0; j < 7; j++)
-            total += gain[7 * i + j] * error[j];
+        for (int j = 0; j < 7; j++) total += gain[7 * i + j] * error[j];
         out[i] = in[HSV_REFERENCE_INPUT + i] - total;
         limited |= out[i] < minimum[i] || out[i] > maximum[i];
     }
-    for (int i = 0; i < 2 && !limited; i++)
-        state[i] += par[0] * error[i];
+    for (int i = 0; i < 2 && !limited; i++) state[i] += par[0] * error[i];
     return 0;
 }

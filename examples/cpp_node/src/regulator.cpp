@@ -16,19 +16,21 @@ constexpr double GAIN[2][5] = {{-5.05e-3, -2.26e-2, 69.9, -99.0, -8.85}, {9.26e-
 constexpr double MINIMUM[2] = {0.0, -0.5235987755982988}, MAXIMUM[2] = {1.5, 0.5235987755982988};
 
 // Publishes the command of a step when both the filtered and the nominal state of the step have arrived.
-class Regulator : public rclcpp::Node {
-public:
+class Regulator : public rclcpp::Node
+{
+  public:
     Regulator() : Node("regulator")
     {
         const rclcpp::QoS deep(256);
         command_ = create_publisher<ControlInput>("hsv/command", deep);
         filtered_subscription_ = create_subscription<FilteredState>(
-            "hsv/filtered_state", deep, [this](FilteredState::ConstSharedPtr message) { filtered_ = message, answer(); });
+            "hsv/filtered_state", deep,
+            [this](FilteredState::ConstSharedPtr message) { filtered_ = message, answer(); });
         nominal_subscription_ = create_subscription<NominalState>(
             "hsv/nominal", deep, [this](NominalState::ConstSharedPtr message) { nominal_ = message, answer(); });
     }
 
-private:
+  private:
     void answer() // either message may come first
     {
         if (!filtered_ || !nominal_ || filtered_->step != nominal_->step) return;

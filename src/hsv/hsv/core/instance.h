@@ -3,8 +3,7 @@
 #define JOINED_(a, b) a##b
 #define JOINED(a, b) JOINED_(a, b)
 
-int64_t JOINED(hsv_fly_, NAME)(hsv_flight *const *flights, void *memory, int64_t start, int64_t stop,
-                                int halves)
+int64_t JOINED(hsv_fly_, NAME)(hsv_flight *const *flights, void *memory, int64_t start, int64_t stop, int halves)
 {
     return fly(flights, memory, start, stop, halves);
 }

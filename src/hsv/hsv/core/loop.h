@@ -34,7 +34,7 @@ typedef struct {
     real x_n[STATES], u_n[INPUTS], gain_index, gain[INPUTS * STATES], u[INPUTS], actuator[INPUTS];
     real x_r[STATES], u_r[INPUTS], d_r[STATES];
     real feedback_state[STATES], s[2 * MAX_SECTIONS], q_f; /* results of the first half of a step for the second half */
-    int64_t row[LANES], active[LANES]; /* index of the loaded reference row and gain of each lane */
+    int64_t row[LANES], active[LANES];                     /* index of the loaded reference row and gain of each lane */
 } Loop;
 
 /* Write the measurement y(k), as it arrives over the link, in every lane. */

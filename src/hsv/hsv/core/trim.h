@@ -119,9 +119,8 @@ void hsv_commands(int64_t count, const double *corners, double period, int climb
         const double *start = corners + CORNER * (passed > 0 ? passed - 1 : 0), *stop = start + CORNER;
         const double begun = in_steps(start[0], period);
         for (int j = 0; j < 2; j++) {
-            const double slope = passed > 0 && passed < count
-                                     ? (stop[1 + j] - start[1 + j]) / (in_steps(stop[0], period) - begun)
-                                     : 0.0;
+            const double slope =
+                passed > 0 && passed < count ? (stop[1 + j] - start[1 + j]) / (in_steps(stop[0], period) - begun) : 0.0;
             command[2 * row + j] = start[1 + j] + slope * (k - begun);
             rate[2 * row + j] = slope;
         }

@@ -50,8 +50,8 @@ static inline int structure(const Vehicle *p)
 static inline Forces forces(real altitude, real velocity, real alpha, real rate, const real *u, const Vehicle *p)
 {
     switch (structure(p)) {
-        case WINGED_CONE: return winged_cone_forces(altitude, velocity, alpha, rate, u, p);
-        default: return parker_forces(altitude, velocity, alpha, u, p);
+    case WINGED_CONE: return winged_cone_forces(altitude, velocity, alpha, rate, u, p);
+    default: return parker_forces(altitude, velocity, alpha, u, p);
     }
 }
 
@@ -128,8 +128,8 @@ static inline void derivative(const real *x, const real *u, const Vehicle *p, co
     (void)conditions;
     const Forces f = forces(x[ALTITUDE], velocity, alpha, x[PITCH_RATE], u, p);
 #else
-    const Forces f = conditions ? forces_in(conditions, x, u, p, &alpha)
-                                : forces(x[ALTITUDE], velocity, alpha, x[PITCH_RATE], u, p);
+    const Forces f =
+        conditions ? forces_in(conditions, x, u, p, &alpha) : forces(x[ALTITUDE], velocity, alpha, x[PITCH_RATE], u, p);
 #endif
     const real alpha2 = alpha * alpha;
     const real force_1 =
@@ -156,8 +156,8 @@ static inline void derivative(const real *x, const real *u, const Vehicle *p, co
     out[ALTITUDE] = velocity * sin_path;
     const real weight = gravity(x[ALTITUDE], velocity, p, &relief);
     out[VELOCITY] = (f.thrust * cos_alpha - f.drag) / p->mass - weight * sin_path;
-    out[ALPHA] =
-        (-f.thrust * sin_alpha - f.lift) / (p->mass * velocity) + x[PITCH_RATE] + (weight - relief) / velocity * cos_path;
+    out[ALPHA] = (-f.thrust * sin_alpha - f.lift) / (p->mass * velocity) + x[PITCH_RATE] +
+                 (weight - relief) / velocity * cos_path;
     out[PITCH] = x[PITCH_RATE];
     out[PITCH_RATE] = angular + c_1 * acceleration_1 + c_2 * acceleration_2;
     out[ETA_1] = x[ETA_1_RATE];

@@ -15,7 +15,8 @@ number fuel_equivalence_ratio_minimum, fuel_equivalence_ratio_maximum;
 number elevator_deflection_minimum, elevator_deflection_maximum, angle_limit;
 /* Constants of the Winged-Cone only */
 number gravitational_parameter, planet_radius, sound_speed_curvature, sound_speed_slope, sound_speed_zero;
-number lift_alpha_mach, lift_elevator_alpha_squared, lift_elevator_alpha, drag_scale, drag_mach_squared, drag_mach, thrust_scale, thrust_mach, thrust_fuel;
+number lift_alpha_mach, lift_elevator_alpha_squared, lift_elevator_alpha, drag_scale, drag_mach_squared, drag_mach,
+    thrust_scale, thrust_mach, thrust_fuel;
 number moment_scale, moment_mach, moment_mach_decay;
 number damping_mach, damping_mach_zero, damping_alpha_squared, damping_alpha, damping_zero;
 /* The number of the structure */

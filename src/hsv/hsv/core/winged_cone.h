@@ -37,9 +37,9 @@ static __attribute__((noinline)) Forces winged_cone_forces(real altitude, real v
     const mask is_rich = real_part(fuel) > 1.0;
     Forces f;
     f.pressure = pressure;
-    f.lift = force * (alpha * (p->lift_alpha + p->lift_alpha_mach / mach) +
-                      (p->lift_elevator_alpha_squared * alpha2 + p->lift_elevator_alpha * alpha + p->lift_elevator) *
-                          elevator);
+    f.lift = force *
+             (alpha * (p->lift_alpha + p->lift_alpha_mach / mach) +
+              (p->lift_elevator_alpha_squared * alpha2 + p->lift_elevator_alpha * alpha + p->lift_elevator) * elevator);
     f.drag = force * (p->drag_scale * (p->drag_alpha_squared * alpha2 + p->drag_alpha * alpha + 1.0) *
                       (p->drag_mach_squared * mach * mach + p->drag_mach * mach + 1.0));
     f.thrust = force * (p->thrust_scale * (1.0 + p->thrust_mach / mach) * select_real(is_rich, rich, lean));

@@ -44,11 +44,16 @@ static int32_t step_vehicle(int64_t k, const double *in, double *out, double *st
     Memory m;
     (void)par;
     memcpy(&m, state, sizeof m);
-    if (k == 0)
-        begin(&m);
-    hsv_plant_memory memory = {.actuators = m.actuators, .command = m.command, .effector = m.effector,
-                               .atmosphere = m.atmosphere, .sensors = m.sensors, .link = m.link,
-                               .conditions = m.conditions, .air = memory_data.air, .payloads = memory_data.payloads};
+    if (k == 0) begin(&m);
+    hsv_plant_memory memory = {.actuators = m.actuators,
+                               .command = m.command,
+                               .effector = m.effector,
+                               .atmosphere = m.atmosphere,
+                               .sensors = m.sensors,
+                               .link = m.link,
+                               .conditions = m.conditions,
+                               .air = memory_data.air,
+                               .payloads = memory_data.payloads};
     hsv_plant_faults faults = faults_data;
     hsv_faults on_command = command_faults;
     faults.effector.memory = m.effector_faults;
@@ -99,10 +104,17 @@ static const hsv_signal vehicle_outputs[] = {
     {"actuator", HSV_INPUT_UNITS, INPUTS}, /* the command after link and faults */
     {"reference", HSV_STATE_UNITS, STATES},
     {"defect", HSV_STATE_UNITS, STATES},
-    {"reference_input", HSV_INPUT_UNITS, INPUTS}};
+    {"reference_input", HSV_INPUT_UNITS, INPUTS},
+};
 
 const hsv_block vehicle = {
-    .abi_version = HSV_BLOCK_ABI_VERSION, .name = "vehicle", .source = "scenario.h",
-    .step = step_vehicle, .state_size = sizeof(Memory) / sizeof(double),
-    .input_count = HSV_COUNT(vehicle_inputs), .inputs = vehicle_inputs,
-    .output_count = HSV_COUNT(vehicle_outputs), .outputs = vehicle_outputs};
+    .abi_version = HSV_BLOCK_ABI_VERSION,
+    .name = "vehicle",
+    .source = "scenario.h",
+    .step = step_vehicle,
+    .state_size = sizeof(Memory) / sizeof(double),
+    .input_count = HSV_COUNT(vehicle_inputs),
+    .inputs = vehicle_inputs,
+    .output_count = HSV_COUNT(vehicle_outputs),
+    .outputs = vehicle_outputs,
+};

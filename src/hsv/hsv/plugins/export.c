@@ -34,10 +34,8 @@ enum { FILTER_STATES = 2 * SECTIONS, PLANNED_STATES = FILTERED ? FILTER_STATES :
 static int32_t step_notch_filter(int64_t k, const double *in, double *out, double *state, const double *par)
 {
     (void)par;
-    if (k == 0)
-        notch_rest(&tube_data.notch, in[0], state);
-    for (int i = 0; i < FILTER_STATES; i++)
-        out[1 + i] = state[i]; /* s before the update */
+    if (k == 0) notch_rest(&tube_data.notch, in[0], state);
+    for (int i = 0; i < FILTER_STATES; i++) out[1 + i] = state[i]; /* s before the update */
     out[0] = notch_step(&tube_data.notch, state, in[0]);
     return 0;
 }
@@ -46,10 +44,16 @@ static const hsv_signal notch_inputs[] = {{"pitch_rate", "rad/s", 1}};
 static const hsv_signal notch_outputs[] = {{"filtered_pitch_rate", "rad/s", 1}, HSV_FILTER_STATE_INPUT(FILTER_STATES)};
 
 const hsv_block notch_filter = {
-    .abi_version = HSV_BLOCK_ABI_VERSION, .name = "notch_filter", .source = "design.h",
-    .step = step_notch_filter, .state_size = FILTER_STATES,
-    .input_count = HSV_COUNT(notch_inputs), .inputs = notch_inputs,
-    .output_count = HSV_COUNT(notch_outputs), .outputs = notch_outputs};
+    .abi_version = HSV_BLOCK_ABI_VERSION,
+    .name = "notch_filter",
+    .source = "design.h",
+    .step = step_notch_filter,
+    .state_size = FILTER_STATES,
+    .input_count = HSV_COUNT(notch_inputs),
+    .inputs = notch_inputs,
+    .output_count = HSV_COUNT(notch_outputs),
+    .outputs = notch_outputs,
+};
 
 /* Nominal trajectory */
 
@@ -61,13 +65,11 @@ static int32_t step_nominal_trajectory(int64_t k, const double *in, double *out,
     double *x_n = out, *u_n = x_n + HSV_STATES, *gain_index = u_n + HSV_INPUTS, *status = gain_index + 1;
     (void)par;
     for (int i = 0; i < HSV_STATES; i++) {
-        if (k == 0)
-            state[i] = x[i] - x_r[i];
+        if (k == 0) state[i] = x[i] - x_r[i];
         x_n[i] = state[i];
     }
     const int in_family = nominal_input(&nominal_data, x_n, u_n, gain_index);
-    const int in_envelope =
-        nominal_advance(&nominal_data.polytope, x[HSV_ALTITUDE], x[HSV_VELOCITY], state, u_n, d_r);
+    const int in_envelope = nominal_advance(&nominal_data.polytope, x[HSV_ALTITUDE], x[HSV_VELOCITY], state, u_n, d_r);
     *status = (in_family ? 0 : OUTSIDE_FAMILY) + (in_envelope ? 0 : OUTSIDE_ENVELOPE);
     return 0;
 }
@@ -75,7 +77,8 @@ static int32_t step_nominal_trajectory(int64_t k, const double *in, double *out,
 static const hsv_signal nominal_inputs[] = {
     {"measurement", HSV_STATE_UNITS, HSV_STATES},
     {"reference", HSV_STATE_UNITS, HSV_STATES},
-    {"defect", HSV_STATE_UNITS, HSV_STATES}};
+    {"defect", HSV_STATE_UNITS, HSV_STATES},
+};
 static const hsv_signal nominal_outputs[] = {
     {"deviation", HSV_STATE_UNITS, HSV_STATES},
     {"nominal_input", HSV_INPUT_UNITS, HSV_INPUTS},
@@ -83,10 +86,16 @@ static const hsv_signal nominal_outputs[] = {
     {"nominal_status", "1", 1}}; /* sum of OUTSIDE_FAMILY (of x_n) and OUTSIDE_ENVELOPE (of altitude and velocity) */
 
 const hsv_block nominal_trajectory = {
-    .abi_version = HSV_BLOCK_ABI_VERSION, .name = "nominal_trajectory", .source = "design.h",
-    .step = step_nominal_trajectory, .state_size = HSV_STATES,
-    .input_count = HSV_COUNT(nominal_inputs), .inputs = nominal_inputs,
-    .output_count = HSV_COUNT(nominal_outputs), .outputs = nominal_outputs};
+    .abi_version = HSV_BLOCK_ABI_VERSION,
+    .name = "nominal_trajectory",
+    .source = "design.h",
+    .step = step_nominal_trajectory,
+    .state_size = HSV_STATES,
+    .input_count = HSV_COUNT(nominal_inputs),
+    .inputs = nominal_inputs,
+    .output_count = HSV_COUNT(nominal_outputs),
+    .outputs = nominal_outputs,
+};
 
 /* Tube law; its state consists of the integrals, then the states of the plan's notch filter */
 
@@ -102,18 +111,13 @@ static int32_t step_tube_law(int64_t k, const double *in, double *out, double *s
             const double F = law.gains[HSV_STATES * i + j];
             gain[HSV_STATES * i + j] = j < RIGID ? F * tau[j] : F;
         }
-    for (int j = 0; j < INTEGRATED; j++)
-        memory.integral[j] = state[j];
-    for (int j = 0; j < PLANNED_STATES; j++)
-        memory.planned[j] = state[INTEGRATED + j];
+    for (int j = 0; j < INTEGRATED; j++) memory.integral[j] = state[j];
+    for (int j = 0; j < PLANNED_STATES; j++) memory.planned[j] = state[INTEGRATED + j];
     tube_step(&law, &memory, gain, 1.0, k, 0, PLANNED_STATES, x, in[HSV_FILTERED_PITCH_RATE], in + HSV_REFERENCE, u_r,
               in + HSV_DEVIATION, in + HSV_NOMINAL_INPUT, in + HSV_FILTER_STATE, feedback, total, limited_input);
-    for (int j = 0; j < INTEGRATED; j++)
-        state[j] = memory.integral[j];
-    for (int j = 0; j < PLANNED_STATES; j++)
-        state[INTEGRATED + j] = memory.planned[j];
-    for (int i = 0; i < HSV_INPUTS; i++)
-        out[i] = is_finite(total[i]) ? total[i] : u_r[i];
+    for (int j = 0; j < INTEGRATED; j++) state[j] = memory.integral[j];
+    for (int j = 0; j < PLANNED_STATES; j++) state[INTEGRATED + j] = memory.planned[j];
+    for (int i = 0; i < HSV_INPUTS; i++) out[i] = is_finite(total[i]) ? total[i] : u_r[i];
     return 0;
 }
 
@@ -122,17 +126,35 @@ static const hsv_signal tube_outputs[] = {HSV_CONTROLLER_OUTPUTS};
 
 static const double no_integral_action = 0.0;
 static const hsv_parameter tube_parameters[] = {
-    {.name = "tau", .unit = "1", .description = "factor of each rigid state's feedback (eq. 54)", .size = RIGID,
-     .value = designed_tau, .minimum = TAU_MINIMUM, .maximum = 1.0},
-    {.name = "integral_rate", .unit = "1/s", .description = "of the integral action; 0: none", .size = 1,
-     .value = &no_integral_action, .minimum = 0.0, .maximum = 1.0}};
+    {.name = "tau",
+     .unit = "1",
+     .description = "factor of each rigid state's feedback (eq. 54)",
+     .size = RIGID,
+     .value = designed_tau,
+     .minimum = TAU_MINIMUM,
+     .maximum = 1.0},
+    {.name = "integral_rate",
+     .unit = "1/s",
+     .description = "of the integral action; 0: none",
+     .size = 1,
+     .value = &no_integral_action,
+     .minimum = 0.0,
+     .maximum = 1.0},
+};
 
 const hsv_block tube_law = {
-    .abi_version = HSV_BLOCK_ABI_VERSION, .name = "tube_law", .source = "design.h",
-    .step = step_tube_law, .state_size = INTEGRATED + PLANNED_STATES,
-    .input_count = HSV_COUNT(tube_inputs) - (FILTERED ? 0 : 1), .inputs = tube_inputs,
-    .output_count = HSV_COUNT(tube_outputs), .outputs = tube_outputs,
-    .parameter_count = HSV_COUNT(tube_parameters), .parameters = tube_parameters};
+    .abi_version = HSV_BLOCK_ABI_VERSION,
+    .name = "tube_law",
+    .source = "design.h",
+    .step = step_tube_law,
+    .state_size = INTEGRATED + PLANNED_STATES,
+    .input_count = HSV_COUNT(tube_inputs) - (FILTERED ? 0 : 1),
+    .inputs = tube_inputs,
+    .output_count = HSV_COUNT(tube_outputs),
+    .outputs = tube_outputs,
+    .parameter_count = HSV_COUNT(tube_parameters),
+    .parameters = tube_parameters,
+};
 
 /* Controller: the three blocks with their states and parameters, and the limits of u */
 
@@ -149,15 +171,11 @@ static int32_t step_controller(int64_t k, const double *in, double *out, double 
         law[HSV_REFERENCE + i] = x_r[i];
     }
     law[HSV_FILTERED_PITCH_RATE] = filtered[0];
-    for (int i = 0; i < HSV_INPUTS; i++)
-        law[HSV_REFERENCE_INPUT + i] = u_r[i];
-    for (int i = 0; i < HSV_STATES + HSV_INPUTS; i++)
-        law[HSV_DEVIATION + i] = plan[i];
-    for (int i = 0; i < FILTER_STATES; i++)
-        law[HSV_FILTER_STATE + i] = filter_state[i];
+    for (int i = 0; i < HSV_INPUTS; i++) law[HSV_REFERENCE_INPUT + i] = u_r[i];
+    for (int i = 0; i < HSV_STATES + HSV_INPUTS; i++) law[HSV_DEVIATION + i] = plan[i];
+    for (int i = 0; i < FILTER_STATES; i++) law[HSV_FILTER_STATE + i] = filter_state[i];
     step_tube_law(k, law, wanted, state + FILTER_STATES + HSV_STATES, par);
-    for (int i = 0; i < HSV_INPUTS; i++)
-        command[i] = limited(wanted[i], tube_data.minimum[i], tube_data.maximum[i]);
+    for (int i = 0; i < HSV_INPUTS; i++) command[i] = limited(wanted[i], tube_data.minimum[i], tube_data.maximum[i]);
     return 0;
 }
 
@@ -165,7 +183,8 @@ static const hsv_signal controller_inputs[] = {
     {"measurement", HSV_STATE_UNITS, HSV_STATES},
     {"reference", HSV_STATE_UNITS, HSV_STATES},
     {"defect", HSV_STATE_UNITS, HSV_STATES},
-    {"reference_input", HSV_INPUT_UNITS, HSV_INPUTS}};
+    {"reference_input", HSV_INPUT_UNITS, HSV_INPUTS},
+};
 static const hsv_signal controller_outputs[] = {
     HSV_CONTROLLER_OUTPUTS,
     {"command", HSV_INPUT_UNITS, HSV_INPUTS},
@@ -174,11 +193,19 @@ static const hsv_signal controller_outputs[] = {
     {"deviation", HSV_STATE_UNITS, HSV_STATES},
     {"nominal_input", HSV_INPUT_UNITS, HSV_INPUTS},
     {"gain_index", "1", 1},
-    {"nominal_status", "1", 1}};
+    {"nominal_status", "1", 1},
+};
 
 const hsv_block controller = {
-    .abi_version = HSV_BLOCK_ABI_VERSION, .name = "controller", .source = "design.h",
-    .step = step_controller, .state_size = FILTER_STATES + HSV_STATES + INTEGRATED + PLANNED_STATES,
-    .input_count = HSV_COUNT(controller_inputs), .inputs = controller_inputs,
-    .output_count = HSV_COUNT(controller_outputs), .outputs = controller_outputs,
-    .parameter_count = HSV_COUNT(tube_parameters), .parameters = tube_parameters};
+    .abi_version = HSV_BLOCK_ABI_VERSION,
+    .name = "controller",
+    .source = "design.h",
+    .step = step_controller,
+    .state_size = FILTER_STATES + HSV_STATES + INTEGRATED + PLANNED_STATES,
+    .input_count = HSV_COUNT(controller_inputs),
+    .inputs = controller_inputs,
+    .output_count = HSV_COUNT(controller_outputs),
+    .outputs = controller_outputs,
+    .parameter_count = HSV_COUNT(tube_parameters),
+    .parameters = tube_parameters,
+};

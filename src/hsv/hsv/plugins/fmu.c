@@ -12,7 +12,12 @@
 #include "fmi3Functions.h"
 #include <string.h>
 
-enum { FMU_INSTANCES = 16, FMU_SAVED = 64, FMU_GIVEN = FMU_INPUTS + FMU_PARAMETERS, FMU_TIME = FMU_GIVEN + FMU_OUTPUTS };
+enum {
+    FMU_INSTANCES = 16,
+    FMU_SAVED = 64,
+    FMU_GIVEN = FMU_INPUTS + FMU_PARAMETERS,
+    FMU_TIME = FMU_GIVEN + FMU_OUTPUTS
+};
 
 typedef struct {
     double start, values[FMU_TIME], state[FMU_STATE];
@@ -198,11 +203,11 @@ static fmi3Instance no_instance(void) { return NULL; }
 
 #pragma GCC diagnostic ignored "-Wattribute-alias"
 #define ALIAS(name, of) extern name##TYPE name __attribute__((alias(#of)));
-ALIAS(fmi3SetDebugLogging, done) ALIAS(fmi3EnterStepMode, done) ALIAS(fmi3Terminate, done)
 #define OTHER(name) ALIAS(fmi3##name, not_supported)
 #define OF_TYPE(type) OTHER(Get##type) OTHER(Set##type)
 
 /* clang-format off */
+ALIAS(fmi3SetDebugLogging, done) ALIAS(fmi3EnterStepMode, done) ALIAS(fmi3Terminate, done)
 OF_TYPE(Float32) OF_TYPE(Int8) OF_TYPE(UInt8) OF_TYPE(Int16) OF_TYPE(UInt16) OF_TYPE(Int32) OF_TYPE(UInt32)
 OF_TYPE(Int64) OF_TYPE(UInt64) OF_TYPE(Boolean) OF_TYPE(String) OF_TYPE(Binary) OF_TYPE(Clock)
 OF_TYPE(IntervalDecimal) OF_TYPE(IntervalFraction) OF_TYPE(ShiftDecimal) OF_TYPE(ShiftFraction)
@@ -213,4 +218,4 @@ OTHER(GetNumberOfEventIndicators) OTHER(GetNumberOfContinuousStates) OTHER(Updat
 OTHER(EvaluateDiscreteStates) OTHER(CompletedIntegratorStep) OTHER(ActivateModelPartition) OTHER(EnterEventMode)
 OTHER(EnterConfigurationMode) OTHER(ExitConfigurationMode) OTHER(EnterContinuousTimeMode)
 ALIAS(fmi3InstantiateModelExchange, no_instance) ALIAS(fmi3InstantiateScheduledExecution, no_instance)
-/* clang-format on */
+    /* clang-format on */

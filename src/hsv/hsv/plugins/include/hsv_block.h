@@ -26,8 +26,8 @@
  * A scenario uses it with controller = "trimmed.so:trimmed", where the path is relative to the folder of the scenario;
  * the table [trimmed] of the scenario then has the key "share".
  *
- * The language is C99, or C++ ("c++ -std=c++17" in place of "cc -std=c99"); units are SI, with angles in radians. With "-ffp-contract=off" a flight has the same bits on
- * every processor.
+ * The language is C99, or C++ ("c++ -std=c++17" in place of "cc -std=c99"); units are SI, with angles in radians. With
+ * "-ffp-contract=off" a flight has the same bits on every processor.
  */
 #ifndef HSV_BLOCK_H
 #define HSV_BLOCK_H
@@ -81,9 +81,15 @@ typedef struct {
 
 /* Export a block: HSV_BLOCK(name) = {...}; where C++ would keep a constant to the file. */
 #ifdef __cplusplus
-#define HSV_BLOCK(name) extern "C" { extern const hsv_block name; } const hsv_block name
+#define HSV_BLOCK(name)                                                                                                \
+    extern "C" {                                                                                                       \
+    extern const hsv_block name;                                                                                       \
+    }                                                                                                                  \
+    const hsv_block name
 #else
-#define HSV_BLOCK(name) extern const hsv_block name; const hsv_block name
+#define HSV_BLOCK(name)                                                                                                \
+    extern const hsv_block name;                                                                                       \
+    const hsv_block name
 #endif
 
 /* One enumeration, because C++ warns of sums of two. */
@@ -118,6 +124,7 @@ enum {
 /* The inputs and outputs of a controller. It may omit inputs at the end. If it reads the state of the notch filter,
  * HSV_FILTER_STATE_INPUT follows; its size must be that of the filter in flight. The output is the unsaturated input of
  * the vehicle, which the bench clips to its limits. */
+/* clang-format off */
 #define HSV_CONTROLLER_INPUTS \
     {"estimate", HSV_STATE_UNITS, HSV_STATES}, \
     {"filtered_pitch_rate", "rad/s", 1}, \
@@ -127,5 +134,6 @@ enum {
     {"nominal_input", HSV_INPUT_UNITS, HSV_INPUTS}
 #define HSV_FILTER_STATE_INPUT(size) {"filter_state", "rad, rad s", (size)}
 #define HSV_CONTROLLER_OUTPUTS {"wanted_input", HSV_INPUT_UNITS, HSV_INPUTS}
+/* clang-format on */
 
 #endif
