@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hsv.base.errors import ControllerError, ParameterError
+from hsv.base.errors import ControllerError, DesignError, ParameterError
 from hsv.control.controller import (
     CONTROLLER_INPUTS,
     STEP_FUNCTION,
@@ -17,7 +17,7 @@ from hsv.control.controller import (
     StepKernel,
     flat_input,
 )
-from hsv.control.design_file import find_design, read_design, read_parameters
+from hsv.control.design_file import find_design, read_design
 from hsv.control.robust_mpc import RobustMpc
 from hsv.control.tube_law import TubeStatusCode
 from hsv.model.vehicle import load_vehicle
@@ -140,7 +140,7 @@ def test_a_node_of_its_own_is_not_stepped_here():
 
 
 PATH = find_design("baseline")
-VALUES, DESIGN = read_parameters(PATH), read_design(PATH)
+DESIGN = read_design(PATH)
 X_R, U_R = np.array([26000.0, 2400.0, 0.03, 0.03, 0.0, 1.0, 0.0, 1.0, 0.0]), np.array([0.27, 0.21])
 X = X_R + np.array([2.0, -1.0, 1e-3, 2e-3, 0.9, 0.0, 0.0, 0.0, 0.0])
 NOTHING = np.empty(0)
@@ -166,10 +166,12 @@ def test_input_is_limited_and_what_is_not_a_number_is_told():
 
 
 def test_parameters_choose_controller_and_gain():
-    law = build_controller({**VALUES, "controller": "robust_mpc", "robust_mpc.gain_index": 6})
+    law = build_controller({"controller": "robust_mpc", "robust_mpc.gain_index": 6}, DESIGN)
     assert isinstance(law, RobustMpc)
     assert np.array_equal(law.kernel.gains[0], DESIGN.nominal_gains[-1])
     with pytest.raises(ParameterError, match=r"robust_mpc.gain_index = 9: expected 0 to 6"):
-        build_controller({**VALUES, "controller": "robust_mpc", "robust_mpc.gain_index": 9})
+        build_controller({"controller": "robust_mpc", "robust_mpc.gain_index": 9}, DESIGN)
+    with pytest.raises(DesignError, match=r"controller = 'tube_mpc': no design, expected one"):
+        build_controller({}, None)
     with pytest.raises(ParameterError, match=r"controller = 'lucky'"):
-        build_controller({**VALUES, "controller": "lucky"})
+        build_controller({"controller": "lucky"}, DESIGN)

@@ -5,21 +5,20 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.base.errors import ParameterError
-from hsv.control.design_file import find_design, read_design, read_parameters
+from hsv.control.design_file import find_design, read_design
 from hsv.control.nominal_law import FamilyLaw, KothareLaw
 from hsv.control.nominal_trajectory import NominalStatus, NominalTrajectory
 from hsv.control.qp_law import QpLaw
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 
-VALUES = read_parameters(find_design("baseline"))
 DESIGN = read_design(find_design("baseline"))
 START = trim(load_vehicle().coupled(), 26060.4, 2407.92)
 TARGET = {"reference.altitudes": [26243.28], "reference.velocities": [2484.12]}
 
 
 def nominal(**changes):
-    return NominalTrajectory.from_parameters({**VALUES, **TARGET, **changes})
+    return NominalTrajectory.from_parameters({**TARGET, **changes}, DESIGN)
 
 
 def test_the_law_is_the_one_that_is_asked_for():

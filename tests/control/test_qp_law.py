@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import solve_discrete_are
 
 from hsv.base.errors import DesignError, ParameterError
-from hsv.control.design_file import find_design, read_design, read_parameters
+from hsv.control.design_file import find_design, read_design
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.qp_law import BLOCK_TIME, BLOCKS, CHECKED_FAR, CHECKED_NEAR, NEAR_BLOCKS, QpLaw
@@ -15,7 +15,7 @@ from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 
 PATH = find_design("baseline")
-VALUES, DESIGN = read_parameters(PATH), read_design(PATH)
+DESIGN = read_design(PATH)
 DATA = nominal_data(DESIGN)
 START, REFERENCE = trim(load_vehicle().coupled(), 26060.4, 2407.92), trim(load_vehicle().coupled(), 26243.28, 2484.12)
 TRAJECTORY = ReferenceTrajectory([0.0], [26243.28], [2484.12], DESIGN.period, load_vehicle().decoupled)
@@ -111,9 +111,7 @@ def test_bounds_are_needed_and_must_hold_the_reference():
     with pytest.raises(DesignError, match="expected inside the plan bounds"):
         moved = dataclasses.replace(BOUNDS, input_minimum=REFERENCE.input + 0.01)
         QpLaw(dataclasses.replace(DESIGN, plan_bounds=moved), DATA, TRAJECTORY)
-    prefixes = ("nominal.input_m", "nominal.region")
-    without = {name: value for name, value in VALUES.items() if not name.startswith(prefixes)}
     with pytest.raises(DesignError, match=r"nominal.input_minimum: empty, expected U minus F Z"):
-        NominalTrajectory.from_parameters({**without, "nominal.law": "qp"})
+        NominalTrajectory.from_parameters({"nominal.law": "qp"}, dataclasses.replace(DESIGN, plan_bounds=None))
     with pytest.raises(ParameterError, match=r"nominal.law = 'lucky'"):
-        NominalTrajectory.from_parameters({**VALUES, "nominal.law": "lucky"})
+        NominalTrajectory.from_parameters({"nominal.law": "lucky"}, DESIGN)

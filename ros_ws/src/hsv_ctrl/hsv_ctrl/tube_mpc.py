@@ -11,7 +11,7 @@ from rclpy.parameter import Parameter
 from hsv.bags.description import ROBUST_MPC, TUBE_MPC, NodeDescription
 from hsv.base.errors import DesignError, ParameterError
 from hsv.certificate.verification import preflight
-from hsv.control.design import TAU
+from hsv.control.design import TAU, ControlDesign
 from hsv.control.design_file import CERTIFICATE_PARAMETERS
 from hsv.control.effectiveness import EFFECTIVENESS_ENABLED, WATCHED_PARAMETERS, EffectivenessMode
 from hsv.control.hardware import uncovered_hardware
@@ -72,8 +72,7 @@ class TubeMpcNode(TubeNode):
     def __init__(self) -> None:
         super().__init__(TUBE_MPC)
         values, design = declare_design(self, (*TUBE_PARAMETERS, *CERTIFICATE_PARAMETERS))
-        if design is None:
-            raise DesignError("parameter design.name = 'none': expected a design with a tube")
+        design = _required(design, "a design with a tube")
         if values[EFFECTIVENESS_ENABLED.name]:
             # Only the estimator needs the parameters of the vehicle.
             declare_vehicle(self)
@@ -106,6 +105,12 @@ class TubeMpcNode(TubeNode):
         return SetParametersResult(successful=True)
 
 
+def _required(design: ControlDesign | None, expected: str) -> ControlDesign:
+    if design is None:
+        raise DesignError(f"parameter design.name = 'none': expected {expected}")
+    return design
+
+
 main = partial(run_node, TubeMpcNode, "tube_mpc")
 
 
@@ -114,7 +119,8 @@ class RobustMpcNode(TubeNode):
 
     def __init__(self) -> None:
         super().__init__(ROBUST_MPC)
-        self.component = RobustMpc.from_parameters(*declare_design(self, ROBUST_MPC_PARAMETERS))
+        values, design = declare_design(self, ROBUST_MPC_PARAMETERS)
+        self.component = RobustMpc.from_parameters(values, _required(design, "one with nominal gains"))
 
 
 robust_main = partial(run_node, RobustMpcNode, "robust_mpc")

@@ -323,12 +323,17 @@ class ControlDesign:
         """The digest of the current parameters, see :func:`digest`."""
         return str(self.to_parameters()["design.hash"])
 
+    @property
+    def loop_parameters(self) -> dict[str, Any]:
+        """The flat parameters of the design that the whole loop uses: control period and notch filter."""
+        columns = {f.name: [float(getattr(s, f.name)) for s in self.notch] for f in fields(NotchSection)}
+        return {"period": self.period, **{f"notch.{name}": column for name, column in columns.items()}}
+
     def to_parameters(self) -> dict[str, Any]:
         """Return the flat ROS 2 parameters by name, with arrays as lists row by row, and the digest."""
         values: dict[str, Any] = {
             "design.name": self.name,
-            "period": self.period,
-            **{f"notch.{f.name}": np.array([getattr(s, f.name) for s in self.notch]) for f in fields(NotchSection)},
+            **self.loop_parameters,
             "model.a": self.polytope.A,
             "model.b": self.polytope.B,
             "scheduling.interpolation": self.interpolation,

@@ -9,7 +9,7 @@ import numpy as np
 
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, validate
-from hsv.control.design import ControlDesign, design_of
+from hsv.control.design import ControlDesign
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, KothareLaw, NominalStatus
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS
 from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTrajectory
@@ -65,15 +65,12 @@ class NominalTrajectory:
         self._input = np.zeros(N_INPUTS)
 
     @classmethod
-    def from_parameters(cls, values: Mapping[str, object], design: ControlDesign | None = None) -> Self:
-        """Build from the design's parameters and :data:`NOMINAL_PARAMETERS`; the model has no perturbed parameters.
+    def from_parameters(cls, values: Mapping[str, object], design: ControlDesign | None) -> Self:
+        """Build from ``design`` and the flat parameters ``values``, see :data:`NOMINAL_PARAMETERS`.
 
-        Args:
-            values: Flat parameters.
-            design: The design in ``values``, if it is already built.
+        The model has no perturbed parameters; without a design, the period is the one in ``values``.
         """
         v = validate(NOMINAL_PARAMETERS, values)
-        design = design or design_of(values)
         if design is None:
             if v["nominal.law"] != LAWS[0]:
                 raise ParameterError(f"parameter nominal.law = {v['nominal.law']!r}: expected a design that it is for")

@@ -39,13 +39,9 @@ class RobustMpc(Controller):
         self._memory = tube_memory()
 
     @classmethod
-    def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign | None = None) -> Self:
-        """Build from the flat parameters ``values``: those of the design and :data:`ROBUST_MPC_PARAMETERS`.
-
-        ``design`` is the design in ``values``, if it is already built.
-        """
-        v = validate(ROBUST_MPC_PARAMETERS, values)
-        return cls(design or ControlDesign.from_parameters(values), v["robust_mpc.gain_index"])
+    def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign) -> Self:
+        """Build from ``design`` and the flat parameters ``values``, see :data:`ROBUST_MPC_PARAMETERS`."""
+        return cls(design, validate(ROBUST_MPC_PARAMETERS, values)["robust_mpc.gain_index"])
 
     def reset(self) -> None:
         """Do nothing: this law has no state."""

@@ -199,13 +199,9 @@ class TubeLaw(Controller):
         self._memory = tube_memory()
 
     @classmethod
-    def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign | None = None) -> Self:
-        """Build from the flat parameters ``values``: those of the design and :data:`TUBE_PARAMETERS`.
-
-        ``design`` is the design in ``values``, if it is already built.
-        """
+    def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign) -> Self:
+        """Build from ``design`` and the flat parameters ``values``, of which :data:`TUBE_PARAMETERS` are used."""
         v = validate(TUBE_PARAMETERS, values)
-        design = design or ControlDesign.from_parameters(values)
         changes = scheduled_changes(values, design.tau_minimum, design.period)
         vehicle = v["vehicle.digest"]
         covered = not uncovered_hardware(values, design)

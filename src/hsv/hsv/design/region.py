@@ -20,7 +20,7 @@ from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import ChannelModel, Extremes
 from hsv.design.inputs import DesignInputs
-from hsv.flight.assembly import assemble
+from hsv.flight.assembly import assemble_with
 from hsv.flight.closed_loop import fly
 from hsv.flight.corners import Corner, corners, fraction, region_parameters, screening_corners
 from hsv.flight.flight import Flight
@@ -48,7 +48,7 @@ class Region:
         self, design: ControlDesign, inputs: DesignInputs, share: float, equipment: Mapping[str, Any] | None = None
     ) -> None:
         declared = region_parameters(inputs.model_dump(), inputs.flown_vehicle, share)
-        self._parts = assemble({**design.to_parameters(), **declared, **(equipment or {})})
+        self._parts = assemble_with(design, {**declared, **(equipment or {})})
         self.share = share
         self._bounds = inputs.flown_vehicle.uncertainty
 

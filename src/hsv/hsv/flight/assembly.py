@@ -69,13 +69,15 @@ def flight_parameters(scenario: Scenario) -> dict[str, Any]:
     return {**design_parameters(scenario), **scenario_parameters(scenario)}
 
 
-def assemble(values: Mapping[str, Any], design: ControlDesign | None = None) -> Components:
-    """Return the five components of the loop for the flat parameters ``values``.
+def assemble(values: Mapping[str, Any]) -> Components:
+    """Return the five components of the loop for flat parameters as files have them, those of a design included."""
+    return assemble_with(design_of(values), values)
 
-    ``design`` is the design in ``values``, if the caller has parsed it already; otherwise it is parsed here.
-    """
-    design = design or design_of(values)
-    return Components(**{block.name: block.build(values, design) for block in LOOP})
+
+def assemble_with(design: ControlDesign | None, values: Mapping[str, Any]) -> Components:
+    """Return the five components of the loop for a ``design`` and the flat parameters ``values`` of the flight."""
+    complete = {**(design.loop_parameters if design else {}), **values}
+    return Components(**{block.name: block.build(complete, design) for block in LOOP})
 
 
 def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> Components:
@@ -90,7 +92,7 @@ def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> 
         own = scenario_parameters(scenario)
         if design and TAU.name in own:
             design = design.with_tau(own[TAU.name])
-        components = assemble({**(design.to_parameters() if design else {}), **own}, design)
+        components = assemble_with(design, own)
         plant = components.plant
         given = f"duration = {scenario.duration:g} s"
         if plant.steps < 1:
@@ -127,7 +129,7 @@ def uncovered_of(
     if certificate is None and scenario.design:
         path = certificate_path(find_design(scenario.design))
         certificate = read_certificate(path) if path.is_file() else None
-    values = {**(design.to_parameters() if design else {}), **scenario.parameters()}
+    values = {**(design.loop_parameters if design else {}), **scenario.parameters()}
     return uncovered(values, design, certificate, [(f.channel, f.type, f.parameters) for f in scenario.fault])
 
 

@@ -63,11 +63,8 @@ class Block:
     designed: bool = False
     """Whether the component is built from a control design."""
 
-    def build(self, values: Mapping[str, Any], design: ControlDesign | None = None) -> Any:
-        """Return the component for the flat parameters ``values``.
-
-        ``design`` is the design in ``values``, if the caller has parsed it already.
-        """
+    def build(self, values: Mapping[str, Any], design: ControlDesign | None) -> Any:
+        """Return the component for the flat parameters ``values`` of a flight and its ``design``, if it has one."""
         module, _, path = self.built_by.partition(":")
         build = attrgetter(path)(import_module(module))
         return build(values, design) if self.designed else build(values)

@@ -14,7 +14,7 @@ from hsv.certificate.loops import Feedback, Hardware
 from hsv.certificate.margins import Place, VehicleLoops, classical_margins
 from hsv.control.design import ControlDesign
 from hsv.control.tube_law import TubeLaw
-from hsv.flight.assembly import assemble, assemble_flight
+from hsv.flight.assembly import assemble_flight, assemble_with
 from hsv.flight.closed_loop import Components, fly
 from hsv.flight.scenario import Scenario
 from hsv.model.actuators import SUBSTEPS, ActuatorSet
@@ -209,7 +209,7 @@ def _grown(values: Mapping[str, Any], design: ControlDesign, duration: float) ->
         "reference.velocities": [values["initial.velocity"]],
     }
     kept = {name: value for name, value in values.items() if not name.startswith(_OMITTED)}
-    parts = assemble({**kept, **constant, **design.to_parameters()}, design)
+    parts = assemble_with(design, {**kept, **constant, **design.loop_parameters})
     calm = fly(parts).history
     state = parts.plant.initial.state.copy()
     state[STATE_NAMES.index("pitch_angle")] += DEVIATION

@@ -28,7 +28,7 @@ from hsv.certificate.verification import (
 )
 from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import discretise
-from hsv.flight.assembly import assemble, assemble_flight
+from hsv.flight.assembly import assemble_flight, assemble_with
 from hsv.flight.closed_loop import Components, fly
 from hsv.flight.corners import Corner, corners, fraction, region_parameters
 from hsv.flight.flight import Flight
@@ -49,7 +49,7 @@ _FLIGHTS, _SEED = 48, 7
 def region(subject: Subject, design: ControlDesign, share: float) -> Components:
     """Return the components for the flight that the design declares, with ``share`` of its fault (eq. 47)."""
     declared = region_parameters(subject.certificate["inputs"], subject.vehicle, share)
-    return assemble({**design.to_parameters(), **declared})
+    return assemble_with(design, declared)
 
 
 class Disturbances(NamedTuple):

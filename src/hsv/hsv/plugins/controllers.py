@@ -16,9 +16,9 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from hsv.base.errors import HsvError, ParameterError, one_of
+from hsv.base.errors import DesignError, HsvError, ParameterError, one_of
 from hsv.base.parameters import Parameter, validate
 from hsv.control.controller import (
     CONTROLLER_PARAMETERS,
@@ -32,12 +32,11 @@ from hsv.control.controller import (
     StepKernel,
     failure_words,
 )
+from hsv.control.design import DESIGN_PARAMETERS, ControlDesign
+from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS
 from hsv.model.vehicle import Vehicle
 from hsv.plugins.fmu import FmuClass
 from hsv.plugins.library import LibraryClass, library_digest, library_place
-
-if TYPE_CHECKING:
-    from hsv.control.design import ControlDesign
 
 GROUP = "hsv.controllers"
 """Group of the entry points that register controllers."""
@@ -46,7 +45,8 @@ HIDDEN_PARAMETERS = (
     *("vehicle.perturbation.", "fault.", "seed"),
     *("actuator.", "wind.", "turbulence.", "gust.", "density.", "sensors.", "link."),
 )
-"""Prefixes of parameters that custom controllers do not receive: perturbations, faults and equipment."""
+"""Prefixes of parameters that custom controllers do not receive: perturbations, faults and equipment. The numbers of a
+design, too, are not among their parameters: they receive the design itself."""
 
 
 def controller_names() -> list[str]:
@@ -152,26 +152,32 @@ def class_place(name: str) -> str:
     raise ParameterError(f"controller = {name!r}: expected {choices}")
 
 
-def build_controller(values: Mapping[str, Any], design: ControlDesign | None = None) -> Controller:
+def build_controller(values: Mapping[str, Any], design: ControlDesign | None) -> Controller:
     """Return the controller that the flat parameters ``values`` describe; a placeholder if it is a node.
 
     Args:
         values: Flat parameters of the flight, of which the controller uses its own.
-        design: The design in ``values``, if it is already built.
+        design: Design of the flight, if it has one.
 
     Raises:
         ParameterError: There is no such controller, or it cannot be built.
+        DesignError: There is no design, but the controller flies with its gains.
         HsvError: The class of the controller raised it, for example a DesignError.
     """
     name = str(validate(CONTROLLER_PARAMETERS, values)["controller"])
     if name.startswith(NODE):
         return NodeController(name)
+    if design is None and name in SHIPPED_CONTROLLERS:
+        raise DesignError(f"controller = {name!r}: no design, expected one with whose gains it flies")
     kind = controller_class(name)
     try:
         own = values
         if name not in SHIPPED_CONTROLLERS:
+            hidden = {p.name for p in DESIGN_PARAMETERS} - {p.name for p in DESIGN_NOTCH_PARAMETERS}
             own = {
-                parameter: value for parameter, value in values.items() if not parameter.startswith(HIDDEN_PARAMETERS)
+                parameter: value
+                for parameter, value in values.items()
+                if parameter not in hidden and not parameter.startswith(HIDDEN_PARAMETERS)
             }
         built = kind.from_parameters(own, design)
     except HsvError:

@@ -17,6 +17,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import broken_off, complete_steps, estimated
 from hsv.base.errors import RecordingError
 from hsv.base.processes import Progress
+from hsv.control.design import design_of
 from hsv.flight.blocks import LOOP, VEHICLE, Signals
 
 PROGRESS_INTERVAL = 200
@@ -101,7 +102,8 @@ class _Replica:
     def __init__(self, process: Process, values: ParameterSections, types: Typestore) -> None:
         assert process.node.block is not None
         self.process, block = process, process.node.block
-        self.component = block.build(values.of(process.node.name))
+        own = values.of(process.node.name)
+        self.component = block.build(own, design_of(own) if block.designed else None)
         self._step = block.step
         self._inputs = {topic: StepMessages(topic, types) for topic in process.inputs}
         self._outputs = {topic: StepMessages(topic, types) for topic in process.node.publishes}
