@@ -26,6 +26,7 @@ UNPROVED = (
     "measured in flights: bounds of W, its channels in every flight, range of the nominal plan, feedback of the lag",
     "recomputed within a tolerance: vertices (eq. 12), their weights, gains K (eq. 31 to 35), set monitored in flight",
     "taken at their binary values: notch filter and actuators in discrete time, columns of the accelerations in W",
+    "recomputed in floating point: bounds of the feedback at limited rates, from which tightened bounds follow",
     "not modelled: rounding in flight",
 )
 """What the exact statements rest on: it is measured, or computed with rounding."""
@@ -171,6 +172,8 @@ def _bound_proofs(subject: Subject, tube: Tube, acting: Sequence[int]) -> Checks
         yield _proof(f"{field}: half-widths as monitored in flight", map(bounded, range(len(flown)), flown))
         if design.plan_bounds is not None:
             ranges.append([design.plan_bounds.input_minimum, design.plan_bounds.input_maximum])
+    if tube.rated is not None:
+        feedback = np.minimum(feedback, tube.rated[N_RIGID:])
     middle, half = tube.system.F @ tube.c + F_d @ tube.middle, feedback + np.abs(F_d) @ tube.half
     least = rational(design.input_minimum) - middle + half - rational(lag[0])
     most = rational(design.input_maximum) - middle - half - rational(lag[1])

@@ -63,7 +63,7 @@ PARAMETERS = {
     name: kind
     for kind, names in {
         "copied": "period notch.zero_frequency notch.zero_damping notch.pole_frequency notch.pole_damping "
-        "scheduling.altitude.breakpoints scheduling.velocity.breakpoints feedback.tau feedback.tau_minimum "
+        "scheduling.altitude.breakpoints scheduling.velocity.breakpoints feedback.tau feedback.tau_minimum tube.rates "
         "nominal.state_scale nominal.input_scale input.minimum input.maximum",
         "model.a": "model.a",
         "model.b": "model.b",

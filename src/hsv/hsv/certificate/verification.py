@@ -38,6 +38,7 @@ from hsv.certificate.checks import (
     required,
     same,
 )
+from hsv.certificate.convolution import LONGEST, rated_bounds
 from hsv.certificate.tolerances import ROUNDING
 from hsv.control.design import PLAN_SHIFT, ControlDesign
 from hsv.control.design_file import find_certificate, read_certificate
@@ -506,6 +507,7 @@ class Tube:
         if "star_norms" in stated:
             self.star = StarNorms(*(number(stated["star_norms"][name]) for name in ("Q", "contraction")))
         self.rows = np.vstack((number(np.eye(N_RIGID, len(self.c))), self.system.F))
+        self.rated = number(stated["rated"]["half_range"]) if "rated" in stated else None
 
     @property
     def columns(self) -> np.ndarray:
@@ -564,11 +566,13 @@ class Tube:
     def tightened(self, lag: Sequence[Sequence[float]] = ((0.0, 0.0), (0.0, 0.0))) -> np.ndarray:
         """Return the lower and upper bounds (2 each) of u_n + u_r: U minus the range of the feedback (eq. 30).
 
-        The feedback is that at the smallest tau. Eq. 53 prints a plus instead. ``lag`` is the minimum and maximum (2
-        each) of the feedback that arises because the actuators lag behind the plan.
+        The feedback is that at the smallest tau, and at limited rates if the certificate states them. Eq. 53 prints a
+        plus instead. ``lag`` is the minimum and maximum (2 each) of the feedback that arises because the actuators lag
+        behind the plan.
         """
         middle = self.system.F @ self.c + self.system.F_d @ self.middle
-        half = self.feedback + np.abs(self.system.F_d) @ self.half
+        feedback = self.feedback if self.rated is None else np.minimum(self.feedback, self.rated[N_RIGID:])
+        half = feedback + np.abs(self.system.F_d) @ self.half
         lower, upper = self.design.input_minimum - middle + half, self.design.input_maximum - middle - half
         return np.stack((lower - lag[0], upper - lag[1]))
 
@@ -628,6 +632,12 @@ def set_checks(subject: Subject) -> Checks:
         yield required(
             parameter(subject, "tube.half_width", design.tube.half_width, half_width, "tube.half_width from Q")
         )
+    rates = declared_rates(subject)
+    fields = tuple(f"inputs.invariant_set.rates.{axis}" for axis in ("altitude", "velocity")) if rates else ()
+    flown: Any = [] if design.tube is None else design.tube.rates
+    yield required(parameter(subject, "tube.rates", flown, rates, fields=fields))
+    stated = tube.rated is not None
+    yield required(Check("bounds at limited rates", str(stated), str(bool(rates)), stated == bool(rates)))
     yield from _tube_checks(subject, tube)
     declared, carried = subject.stated("inputs.invariant_set.method") == "star_norms", tube.star is not None
     fields = ("inputs.invariant_set.method",)
@@ -716,6 +726,30 @@ def _star_checks(subject: Subject, tube: Tube) -> Checks:
     yield required(at_most("level of e = 0 in the star norms", start, 1.0))
     yield recomputed(subject, f"{inside}.certificate.star_norms.smallest_eigenvalue", least, "eigenvalues")
     yield recomputed(subject, f"{inside}.certificate.star_norms.level_of_zero_error", start, "eigenvalues")
+
+
+def rated_checks(subject: Subject) -> Checks:
+    """Recompute the bounds for flights at limited rates of altitude and velocity, where a design has them."""
+    tube, inside = Tube(subject, subject.design, "tube"), "tube.invariant_set"
+    if tube.rated is None:
+        return
+    rates, field = declared_rates(subject), f"{inside}.rated.horizon"
+    yield recomputed(subject, f"{inside}.rated.rates", rates, "copied")
+    horizons = [subject.count(f"{field}.{k}", LONGEST) for k in range(len(tube.rows))]
+    stacks = [[tube.Q[None]] for _ in tube.rows]
+    if tube.star:
+        acting = tube.columns.any(axis=(0, 1))
+        stacks = [[*stack, Q[acting]] for stack, Q in zip(stacks, tube.star.Q, strict=True)]
+    loops, changes = np.concatenate((tube.A, tube.columns), axis=2), np.array(rates) * subject.design.period
+    bounds, _ = rated_bounds(subject.design.polytope, loops, tube.c, tube.rows, stacks, changes, horizons)
+    check = recomputed(subject, f"{inside}.rated.half_range", bounds, "half-widths")
+    yield required(replace(check, fields=(*check.fields, field)))
+
+
+def declared_rates(subject: Subject) -> list[float]:
+    """Return the largest rates of altitude (m/s) and velocity (m/s^2) in the inputs of a design; empty: any rates."""
+    rates = subject.certificate["inputs"]["invariant_set"].get("rates")
+    return [] if rates is None else [rates["altitude"], rates["velocity"]]
 
 
 def counter_example_checks(subject: Subject) -> Checks:
@@ -865,6 +899,7 @@ RECOMPUTED: dict[str, Part] = {
     "polytopic model": model_checks,
     "adjustable design": adjustable_checks,
     "counter-examples": counter_example_checks,
+    "limited rates": rated_checks,
 }
 """Checks by part that take a few seconds."""
 

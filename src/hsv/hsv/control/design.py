@@ -115,12 +115,14 @@ class TubeSet:
     """The invariant set (e - c)' P (e - c) <= 1 for errors e (n) of the rigid states and the notch filter, SI.
 
     ``centre`` is c (n), ``shape`` P (n, n). ``half_width`` (n) is the certified bound of |e - c| by entry; for the
-    rigid states it may be narrower than the set, see :class:`hsv.certificate.verification.StarNorms`.
+    rigid states it may be narrower than the set, see :class:`hsv.certificate.verification.StarNorms`. ``rates`` (2) are
+    the largest rates of altitude (m/s) and velocity (m/s^2) for which the tightened bounds hold; empty: any rates.
     """
 
     centre: np.ndarray
     shape: np.ndarray
     half_width: np.ndarray
+    rates: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     def farthest(self, error: np.ndarray) -> str:
         """Return the name of the component of e - c that is largest relative to its half-width, for an error e (n)."""
@@ -190,6 +192,7 @@ DESIGN_PARAMETERS = (
     Parameter("tube.centre", [], "centre c of the invariant set: five rigid states, then the notch filter's (SI)"),
     Parameter("tube.shape", [], "P of (e - c)' P (e - c) <= 1, row by row (SI); empty: the design has no set"),
     Parameter("tube.half_width", [], "half-widths z of the invariant set about its centre (SI)"),
+    Parameter("tube.rates", [], "largest certified rates of altitude (m/s) and velocity (m/s^2); empty: any"),
     Parameter("nominal.state_scale", [], "rigid deviations (5) that weigh equally in the nominal cost (SI)"),
     Parameter("nominal.input_scale", [], "fuel equivalence ratio (-) and elevator deflection (rad) that weigh as much"),
     Parameter("nominal.input_bound", [], "largest |u_n| of the nominal gains: fuel (-), elevator (rad)"),
@@ -354,7 +357,8 @@ class ControlDesign:
         if self.vehicle:
             values["design.vehicle"] = self.vehicle
         if self.tube:
-            values |= {"design.coupling": self.coupling} | {f"tube.{name}": v for name, v in vars(self.tube).items()}
+            carried = {f"tube.{name}": value for name, value in vars(self.tube).items() if len(value)}
+            values |= {"design.coupling": self.coupling} | carried
         if self.plan_bounds:
             values |= {f"nominal.{name}": value for name, value in vars(self.plan_bounds).items()}
         flat = {
@@ -453,7 +457,8 @@ def _tube(values: Mapping[str, Any], n: int) -> TubeSet | None:
     shape = shaped(values, "tube.shape", (n, n))
     if not (np.allclose(shape, shape.T, rtol=1e-9, atol=0.0) and np.linalg.eigvalsh(shape)[0] > 0.0):
         raise DesignError("parameter tube.shape: expected a symmetric positive definite matrix")
-    return TubeSet(shaped(values, "tube.centre", (n,)), shape, positive(values, "tube.half_width", (n,)))
+    rates = positive(values, "tube.rates", (2,)) if values["tube.rates"] else np.empty(0)
+    return TubeSet(shaped(values, "tube.centre", (n,)), shape, positive(values, "tube.half_width", (n,)), rates)
 
 
 def _actuators(text: str) -> tuple[str, ...]:

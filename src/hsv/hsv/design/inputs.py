@@ -225,6 +225,13 @@ class DisturbanceInputs(_Table):
     """Ramp of the commands from the nominal start to the target; None: a step at t = 0."""
 
 
+class RateInputs(_Sizes):
+    """Largest rates of altitude and velocity for which the tightened bounds are certified; slower flights keep them."""
+
+    altitude: Speed = Positive
+    velocity: Acceleration = Positive
+
+
 class InvariantSetInputs(_Table):
     """Inputs of the invariant set (paper eq. 25 to eq. 28); the scales weigh its half-widths and its feedback."""
 
@@ -234,6 +241,8 @@ class InvariantSetInputs(_Table):
     """Values of the multiplier lam of the S-procedure to try for the ellipsoid."""
     state_scale: RigidScale
     input_scale: InputSize
+    rates: RateInputs | None = None
+    """If stated, the feedback is bounded for these rates; else for vertices that jump from step to step."""
 
 
 class TighteningInputs(_Table):

@@ -63,7 +63,7 @@ def left_by(
     """Return U minus F Z without checking that it is not empty; the arguments are those of :func:`tighten`."""
     system, disturbance = found.problem.system, found.problem.disturbance
     middle = system.F @ found.centre + system.F_d @ disturbance.centre
-    half = OUTWARD * (found.feedback + np.abs(system.F_d) @ disturbance.half_width)
+    half = OUTWARD * (found.input_range + np.abs(system.F_d) @ disturbance.half_width)
     bounds = TightenedInputs(minimum - middle + half, maximum - middle - half)
     return bounds if lag is None else TightenedInputs(bounds.lower - lag[0], bounds.upper - lag[1])
 

@@ -97,6 +97,8 @@ def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, pr
     measured = measure(region, model, seen, lambda done: progress("disturbances", done, len(seen)))
     disturbance = measured.channels.structured(inputs.disturbance.inflation).scaled(inputs.disturbance.share)
     found = invariant_set(tube_problem(design, vehicle, disturbance), inputs.invariant_set, progress)
+    if inputs.invariant_set.rates:
+        found = found.limited(design, inputs.invariant_set.rates.array())
     certified = found.certify()
     lag = None
     if design.actuators:

@@ -13,14 +13,15 @@ see ``hsv_paper.claims.numbers.box``.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.linalg import cholesky, solve_discrete_lyapunov, solve_triangular
 
 from hsv.base.errors import DesignError
-from hsv.control.design import TubeSet
+from hsv.certificate.convolution import LONGEST, rated_bounds
+from hsv.control.design import ControlDesign, TubeSet
 from hsv.design.sets.star_norms import StarNorms
 from hsv.design.tube_problem import TubeProblem
 from hsv.lmi.semidefinite import (
@@ -43,11 +44,29 @@ OUTWARD = 1.0 + 1e-12
 
 
 @dataclass(frozen=True)
+class Rated:
+    """Bounds for flights whose altitude and velocity change at most at ``rates`` (2), m/s and m/s^2.
+
+    ``half_range`` (7): half-ranges of the output rows of :meth:`TubeProblem.output_rows`, SI; ``horizon`` (7): largest
+    number of steps that each uses. See :mod:`hsv.certificate.convolution`.
+    """
+
+    rates: np.ndarray
+    half_range: np.ndarray
+    horizon: list[int]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the bounds for JSON."""
+        return {"rates": self.rates.tolist(), "half_range": self.half_range.tolist(), "horizon": self.horizon}
+
+
+@dataclass(frozen=True)
 class InvariantSet:
     """A set centre + Z that the error does not leave while the disturbances stay in W, with its evidence; SI.
 
     ``centre`` c (n), ``Q`` (n, n), ``contraction`` lam, ``multipliers`` l (r, d + 1). With ``star_norms`` the set is
     the ellipsoid's intersection with theirs; rigid states and feedback then have the smaller of the two half-widths.
+    With ``rated``, the tightened bounds hold for flights at limited rates only; the set holds for any.
     """
 
     problem: TubeProblem
@@ -57,6 +76,25 @@ class InvariantSet:
     multipliers: np.ndarray
     solver: SolverReport
     star_norms: StarNorms | None = None
+    rated: Rated | None = None
+
+    def limited(self, design: ControlDesign, rates: np.ndarray) -> InvariantSet:
+        """Return the set with bounds for flights of ``design`` at limited ``rates`` (2): m/s, m/s^2.
+
+        Raises:
+            DesignError: The design is adjustable, and its loops change with tau, too.
+        """
+        A, columns, rows = self.problem.system.A, self.problem.columns(self.centre), self.problem.output_rows()
+        if len(A) != len(design.polytope.A):
+            raise DesignError("invariant_set.rates: expected a design that is not adjustable")
+        stacks = [[self.Q[None]] for _ in rows]
+        if self.star_norms:
+            acting = columns.any(axis=(0, 1))
+            stacks = [[*stack, Q[acting]] for stack, Q in zip(stacks, self.star_norms.Q, strict=True)]
+        loops, changes = np.concatenate((A, columns), axis=2), rates * design.period
+        tried = [LONGEST] * len(rows)
+        half_range, horizon = rated_bounds(design.polytope, loops, self.centre, rows, stacks, changes, tried)
+        return replace(self, rated=Rated(rates, OUTWARD * half_range, horizon))
 
     @property
     def half_width(self) -> np.ndarray:
@@ -69,6 +107,11 @@ class InvariantSet:
         F = self.problem.system.F
         return OUTWARD * self._bounds(np.sqrt(np.einsum("ij,jk,ik->i", F, self.Q, F)), slice(N_RIGID, None))
 
+    @property
+    def input_range(self) -> np.ndarray:
+        """Half-range of the feedback F e, for each input, that the tightened bounds leave free."""
+        return np.minimum(self.feedback, self.rated.half_range[N_RIGID:]) if self.rated else self.feedback
+
     def _bounds(self, bounds: np.ndarray, rows: slice) -> np.ndarray:
         if self.star_norms:
             narrower = self.star_norms.bounds(self.problem)[rows]
@@ -78,7 +121,8 @@ class InvariantSet:
     def seen(self) -> TubeSet:
         """Return the set's projection on the states that the controller knows: rigid states and notch filter."""
         n = self.problem.system.seen
-        return TubeSet(self.centre[:n], inverse(self.Q[:n, :n]), self.half_width[:n])
+        rates = self.rated.rates if self.rated else np.empty(0)
+        return TubeSet(self.centre[:n], inverse(self.Q[:n, :n]), self.half_width[:n], rates)
 
     def level(self, error: np.ndarray) -> np.ndarray:
         """Return the level (e - c)' Q^-1 (e - c) of each error (..., n): at most 1 inside the ellipsoid."""
@@ -116,7 +160,9 @@ class InvariantSet:
 
     def report(self) -> dict[str, Any]:
         """Return the set as a part of a certificate, for JSON."""
-        star = {"star_norms": self.star_norms.as_dict()} if self.star_norms else {}
+        star: dict[str, Any] = {"star_norms": self.star_norms.as_dict()} if self.star_norms else {}
+        if self.rated:
+            star["rated"] = self.rated.as_dict()
         return {
             "kind": "ellipsoid",
             "states": list(self.problem.system.names),
@@ -141,8 +187,12 @@ class InvariantSet:
             raise DesignError(f"invariant set of kind {report['kind']!r}: expected an ellipsoid")
         centre, Q, multipliers = (np.array(report[name]) for name in ("centre", "Q", "multipliers"))
         star = StarNorms.from_report(report["star_norms"], problem) if "star_norms" in report else None
+        rated = None
+        if "rated" in report:
+            rates, half_range, horizon = (report["rated"][name] for name in ("rates", "half_range", "horizon"))
+            rated = Rated(np.array(rates), np.array(half_range), horizon)
         solver = SolverReport(**report["solver"])
-        return cls(problem, centre, Q, report["contraction"], multipliers, solver, star)
+        return cls(problem, centre, Q, report["contraction"], multipliers, solver, star, rated)
 
 
 def ellipsoid(
