@@ -1,4 +1,7 @@
+import os
+import resource
 import struct
+import time
 import tracemalloc
 from pathlib import Path
 
@@ -12,6 +15,8 @@ from mcap.writer import MCAP0_MAGIC
 from hsv.bags.files import MAX_UNPACKED, find_files
 from hsv.bags.reader import Bag
 from hsv.base.errors import RecordingError
+
+REFERENCE = Path(__file__).parents[2] / "bags" / "reference" / "case1"
 
 
 def files_of(folder, *names):
@@ -73,3 +78,14 @@ def test_what_unpacks_to_far_more_than_it_is_is_refused(tmp_path, name, packed, 
         Bag(tmp_path)
     assert tracemalloc.get_traced_memory()[1] < 3 * MAX_UNPACKED
     tracemalloc.stop()
+
+
+def test_a_hole_behind_the_records_is_refused_in_bounded_memory_and_work(tmp_path):
+    recorded = (REFERENCE / "case1_0.mcap").read_bytes()
+    (tmp_path / "case1_0.mcap").write_bytes(recorded[:100_000])
+    os.truncate(tmp_path / "case1_0.mcap", 3 * 2**30)
+    begun, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(RecordingError, match=r"case1_0.mcap: no record in the 67108864 bytes from byte \d+ on$"):
+        Bag(tmp_path)
+    assert time.process_time() - begun < 5.0
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000

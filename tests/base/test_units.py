@@ -120,3 +120,8 @@ def test_known_units_are_those_of_the_units_library(unit):
 )
 def test_spaces_and_long_names_make_no_difference(text, unit):
     assert parse_quantity(text, unit, "field") == 0.9144
+
+
+def test_a_unit_that_begins_with_a_division_is_that_of_an_error_message():
+    assert in_unit_of([0.0, 1.0], "1/s", "2 / s") == ([0.0, 1.0], " / s")
+    assert in_unit_of([60.0], "1/s", "2 /min")[0] == [3600.0]

@@ -1,5 +1,6 @@
 import json
 import math
+import os
 import re
 import shlex
 import subprocess
@@ -256,3 +257,23 @@ def test_as_a_process_it_fails_on_one_line(tmp_path):
     assert (ran.returncode, ran.stdout, ran.stderr.count("\n")) == (2, "", 1)
     assert ran.stderr.startswith("hsv: error: scenario 'absent.toml'")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", ["simulate case1", "list scenarios", "list faults", "trim", "-h"])
+def test_no_columns_in_the_environment_are_no_reason_to_print_nothing(words):
+    environment = {**os.environ, "COLUMNS": "0"}
+    ran = subprocess.run(["hsv", *words.split()], env=environment, capture_output=True, text=True)
+    assert ran.returncode == 0 and len(ran.stdout) > 200
+
+
+def test_a_target_that_is_no_regular_file_is_refused_at_once(hsv, tmp_path):
+    os.mkfifo(tmp_path / "f.mat")
+    os.mkfifo(tmp_path / "f.html")
+    assert hsv("linearise", "--out", "f.mat").error == "out = 'f.mat': cannot be written (not a regular file)"
+    assert hsv("report", str(REFERENCE), "--out", "f.html").code == 2
+
+
+def test_an_error_has_at_most_2000_characters(hsv, tmp_path):
+    (tmp_path / "long.toml").write_text(f'extends = "case1"\ncontroller = "{"x" * 9000}"\n')
+    ran = hsv("simulate", "long.toml")
+    assert ran.code == 2 and len(ran.err) <= 2000 and " [...] " in ran.error and ran.err.count("\n") == 1

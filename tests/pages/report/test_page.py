@@ -2,9 +2,11 @@ import base64
 import gzip
 import html
 import re
+import subprocess
 
 import numpy as np
 import pytest
+from changed_bags import changed_bag
 
 from hsv.bags.reader import Bag
 from hsv.bags.writer import BagWriter
@@ -12,7 +14,7 @@ from hsv.base.errors import RecordingError
 from hsv.flight.metrics import METRICS
 from hsv.pages.engine import Numbers
 from hsv.pages.flights import reported_runs
-from hsv.pages.report import report_page, sentence
+from hsv.pages.report import report_page, sentence, write_report
 
 EMBEDDED = re.compile(r'<script type="application/[^>]*>.*?</script>', re.DOTALL)
 
@@ -140,3 +142,23 @@ def test_a_bag_without_a_flight_is_refused(quiet, tmp_path):
     BagWriter(tmp_path / "partial", [t for t in topics if t.name != "/hsv/nominal"]).close()
     with pytest.raises(RecordingError, match="no topic /hsv/nominal"):
         reported_runs([Bag(tmp_path / "partial")])
+
+
+def test_what_a_bag_names_is_one_word_of_a_shell_and_shown_as_escapes(quiet, tmp_path):
+    custom = {
+        "title": "\x1b[31m\x07\u202e",
+        "commit": "main; touch PWNED #\ntouch PWNED2",
+        "scenario": "case1; touch PWNED3",
+    }
+    bag = changed_bag(quiet.path, tmp_path / "a bag; $(touch PWNED4)", custom_data=custom)
+    write_report([Bag(bag)], tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text()
+    assert not {"\x1b", "\x07", "\u202e"} & {*page}
+    assert r"\x1b[31m\x07\u202e" in page
+    [block] = re.findall(r'<section id="repeat">.*?<code>(.*?)</code>', page, re.DOTALL)
+    (tmp_path / "block.sh").write_text("hsv() { :; }; make() { :; }; source() { :; }\n" + html.unescape(block))
+    subprocess.run(["bash", "block.sh"], cwd=tmp_path, check=False)
+    assert not [*tmp_path.glob("PWNED*")] and "git checkout" not in block
+    known = changed_bag(quiet.path, tmp_path / "known", custom_data={"commit": "0123abc-dirty"})
+    write_report([Bag(known)], tmp_path / "report.html")
+    assert "git checkout 0123abc\n" in (tmp_path / "report.html").read_text()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import fcntl
+import mmap
+import os
 import re
 from pathlib import Path
 from typing import IO
@@ -11,8 +13,8 @@ import lz4.frame
 import zstandard
 
 from hsv.bags.metadata import file_names, read_metadata
-from hsv.base.errors import DocumentError, RecordingError
-from hsv.base.files import read_bytes
+from hsv.base.errors import DocumentError, RecordingError, reason
+from hsv.base.files import open_regular
 
 COMPRESSIONS = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
 """Names of compressions by the first bytes of compressed data; MCAP files and messages in CDR begin differently."""
@@ -109,16 +111,21 @@ class Unpacker:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self.path = path
         try:
-            data = read_bytes(path)
+            with open_regular(path) as stream:
+                # Mapped, because a file may be larger than the memory, and mostly a hole.
+                size = os.fstat(stream.fileno()).st_size
+                data = mmap.mmap(stream.fileno(), size, access=mmap.ACCESS_READ) if size else b""
         except DocumentError as error:
             raise RecordingError(f"{path}: {error}") from None
-        self._limit = self._left = max(MAX_UNPACKED, MAX_RATIO * len(data))
+        except OSError as error:
+            raise RecordingError(f"{path}: cannot be read ({reason(error)})") from None
+        self._packed = self._unpacked = 0
         self.data = self.unpacked(data)[0]
         """Contents of the file, as far as it can be unpacked."""
 
-    def unpacked(self, data: bytes, compression: str | None = None) -> tuple[bytes, bool]:
+    def unpacked(self, data: bytes | mmap.mmap, compression: str | None = None) -> tuple[bytes | mmap.mmap, bool]:
         """Return ``data``, decompressed up to the first damage, and whether they were decompressed completely.
 
         ``compression`` is ``zstd``, ``lz4``, or empty (not compressed); None: identified by the first bytes.
@@ -137,10 +144,11 @@ class Unpacker:
             except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError):
                 whole = False
                 break
-            self._left -= len(parts[-1])
-            if self._left < 0:
+            self._packed += len(data[start : start + _PART])
+            self._unpacked += len(parts[-1])
+            if self._unpacked > (limit := max(MAX_UNPACKED, MAX_RATIO * self._packed)):
                 raise RecordingError(
-                    f"{self._path}: unpacks to more than {self._limit} bytes, expected at most {MAX_UNPACKED} or "
+                    f"{self.path}: unpacks to more than {limit} bytes, expected at most {MAX_UNPACKED} or "
                     f"{MAX_RATIO} times its size"
                 )
         return b"".join(parts), whole and bool(stream.eof)
@@ -148,4 +156,4 @@ class Unpacker:
     def message(self, data: bytes) -> bytes | None:
         """Return a message, decompressed if rosbag2 compressed it; None if it is damaged."""
         content, whole = self.unpacked(data)
-        return content if whole else None
+        return bytes(content) if whole else None

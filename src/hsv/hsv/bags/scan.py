@@ -15,6 +15,7 @@ from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from hsv.bags.files import COMPRESSIONS, Unpacker
+from hsv.base.errors import RecordingError
 
 _FRAME = struct.Struct("<BQ")
 """Opcode and length at the start of a record."""
@@ -22,6 +23,10 @@ _CANDIDATE = re.compile(rb"(?=[\x06\x09\x0f].{5}\x00{3})", re.DOTALL)
 """Possible start of a chunk, of an attachment, or of the end of the data."""
 # Exceptions of the mcap package for wrong lengths and texts.
 _DAMAGE = (EndOfFile, struct.error, UnicodeDecodeError, OverflowError, MemoryError)
+MAX_RECORD = 2**28
+"""Maximum length (bytes) of a record; our recorder writes chunks of some kilobytes and attachments of some megabytes"""
+MAX_GAP = 2**26
+"""Maximum length (bytes) of damage between two records; what follows more is no part of the bag"""
 _KINDS = {opcode: getattr(kinds, opcode.name.title().replace("_", "")) for opcode in Opcode}
 
 
@@ -84,8 +89,12 @@ class Scan:
 
     def _next(self, position: int) -> int:
         """Return the offset, from ``position`` on, of the next intact chunk, attachment or data end, or file size."""
-        candidates = (match.start() for match in _CANDIDATE.finditer(self._data, position))
-        return next((at for at in candidates if _record(self._data, at)[1]), len(self._data))
+        end = min(len(self._data), position + MAX_GAP)
+        candidates = (match.start() for match in _CANDIDATE.finditer(self._data, position, end))
+        found = next((at for at in candidates if _record(self._data, at)[1]), end)
+        if found == end < len(self._data):
+            raise RecordingError(f"{self._file.path}: no record in the {MAX_GAP} bytes from byte {position} on")
+        return found
 
     def _unpacked(self, chunk: kinds.Chunk) -> tuple[list[kinds.McapRecord], str]:
         """Return the records of a chunk, and a description of its damage, empty if it is intact.
@@ -109,7 +118,7 @@ def _record(data: memoryview, position: int) -> tuple[kinds.McapRecord | None, i
     start = position + _FRAME.size
     opcode, length = _FRAME.unpack_from(data, position) if start <= len(data) else (0, 0)
     end = start + length
-    if end > len(data) or opcode not in _KINDS:
+    if end > len(data) or length > MAX_RECORD or opcode not in _KINDS:
         return None, end if opcode >= 0x80 and end <= len(data) else 0  # opcodes from 0x80 on are private
     stream = ReadDataStream(BytesIO(data[start:end]))
     try:

@@ -14,9 +14,7 @@ from hsv.bags.files import being_recorded
 from hsv.bags.reader import Bag, Loss
 from hsv.bags.recover import RECOVERED
 from hsv.base.errors import RecordingError
-
-MAX_STEPS, MAX_PERIOD = 5_000_000, 1.0
-"""Largest number of steps, 100 000 s at the usual period of 0.02 s, and longest period, s, that a bag may announce."""
+from hsv.model.plant import MAX_PERIOD, MAX_STEPS
 
 
 def cut_off(bag: Bag) -> bool:
@@ -62,7 +60,19 @@ def expected_stamps(bag: Bag) -> NDArray[np.int64]:
             f"{bag.path}: tells of {last} steps of {period:g} s, expected at most {MAX_STEPS} of at most "
             f"{MAX_PERIOD:g} s"
         )
-    return np.union1d(np.round(np.arange(last + 1) * period * 1e9).astype(np.int64), found)
+    steps = np.round(np.arange(last + 1) * period * 1e9).astype(np.int64)
+    return steps if not len(others := _without(found, steps)) else np.union1d(steps, others)
+
+
+def _without(stamps: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the ``stamps`` that are not among the ``others``; both ascend, and nothing is sorted, as numpy would."""
+    if len(others) > len(stamps):
+        at = np.minimum(np.searchsorted(others, stamps), len(others) - 1)
+        return stamps[others[at] != stamps]
+    at = np.searchsorted(stamps, others)
+    inside = at < len(stamps)
+    at, others = at[inside], others[inside]
+    return np.delete(stamps, at[stamps[at] == others])
 
 
 def _announced(bag: Bag) -> tuple[float, int] | None:
@@ -98,7 +108,7 @@ def lost_seconds(bag: Bag) -> float:
     stamps = expected_stamps(bag)
     if len(stamps) < 2:
         return 0.0
-    missing = len(np.setdiff1d(stamps, complete_stamps(bag)))
+    missing = len(_without(stamps, complete_stamps(bag)))
     return missing * float(np.median(np.diff(stamps))) * 1e-9
 
 
@@ -119,7 +129,7 @@ def irregularities(bag: Bag) -> list[str]:
     if cut_off(bag):
         reached = min(int(stamp.max(initial=-1)) for stamp in stamps.values())
         every, found = every[every <= reached], found[found <= reached]
-    nowhere = np.setdiff1d(every, found)
+    nowhere = _without(every, found)
     if len(nowhere):
         first = f"the first at t = {nowhere[0] * 1e-9:.2f} s"
         words.append(f"lacks {len(nowhere)} of {len(every)} steps on all topics, {first}")

@@ -3,6 +3,7 @@
 import difflib
 import os
 from collections.abc import Iterable
+from unicodedata import category
 
 
 class HsvError(Exception):
@@ -75,6 +76,14 @@ class ParameterError(HsvError, ValueError):
 def one_of(known: Iterable[str], name: str, also: str = "") -> str:
     """Return "one of ", the ``known`` names, the text ``also``, and a hint if a known name resembles ``name``."""
     return f"one of {', '.join(known := [*known])}{also}{did_you_mean(name, known)}"
+
+
+def visible(text: str) -> str:
+    """Return ``text`` with escapes for control and format (e.g. bidirectional) characters except newline and tab."""
+    if text.isprintable():
+        return text
+    hidden = [c for c in {*text} if c not in "\n\t" and category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp")]
+    return text.translate({ord(c): repr(c)[1:-1] for c in hidden}) if hidden else text
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

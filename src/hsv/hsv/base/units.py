@@ -199,7 +199,8 @@ def in_unit_of(values: Sequence[float], unit: str, text: object) -> tuple[list[f
     own = (found["unit"] or "") if found else ""
     if not own:
         return list(values), "" if unit == "1" else f" {unit}"
-    scale = factor(unit, own.replace("%", "percent"))
+    written_out = re.sub(r"\s*([*/])\s*", r"\1", f"1{own}" if own.startswith("/") else own)  # "/ s" is 1/s
+    scale = factor(unit, written_out.replace("%", "percent"))
     return [value * scale for value in values], f" {own}"
 
 

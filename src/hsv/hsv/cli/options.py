@@ -37,6 +37,8 @@ def check_target(path: Path, field: str, *suffixes: str) -> None:
     if suffixes and path.suffix not in suffixes:
         ends = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
         raise ParameterError(f"{field} = {str(path)!r}: expected a file that ends in {ends}")
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise ParameterError(f"{field} = {str(path)!r}: cannot be written (not a regular file)")
     usable = os.access(path, os.W_OK) and not path.is_dir() if path.exists() else _takes_files(path.parent)
     if not usable:
         raise ParameterError(f"{field} = {str(path)!r}: cannot be written, expected a file in an existing folder")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 import time
@@ -10,13 +11,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Any
-from unicodedata import category
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
+from hsv.base.errors import visible
 from hsv.base.files import json_text
 from hsv.base.units import UnitSystem, duration_in_words, in_system, significant, unit_in
 
@@ -28,16 +29,16 @@ if TYPE_CHECKING:
 Quantity = tuple[float, str]
 """A number and its SI unit."""
 
+MAX_ERROR = 1_900
+"""Maximum length (characters) of an error message, so that a line with it has at most 2,000"""
+
 _COLUMN = 12
 """Width (characters) of a column of a matrix, including the gap."""
 
 
-def _visible(text: str) -> str:
-    """Return ``text`` with escapes for control and format (e.g. bidirectional) characters except newline and tab."""
-    if text.isprintable():
-        return text
-    hidden = (character not in "\n\t" and category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp") for character in text)
-    return "".join(repr(character)[1:-1] if hide else character for character, hide in zip(text, hidden, strict=True))
+# A shell without a terminal may say that it has no columns; rich would print nothing, or fail.
+if not os.environ.get("COLUMNS", "0").strip("0"):
+    os.environ.pop("COLUMNS", None)
 
 
 class _Terminal(Console):
@@ -46,7 +47,7 @@ class _Terminal(Console):
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """Yield the segments of the base class, with escapes for hidden characters."""
         for segment in super().render(renderable, options):
-            yield Segment(segment.text if segment.control else _visible(segment.text), segment.style, segment.control)
+            yield Segment(segment.text if segment.control else visible(segment.text), segment.style, segment.control)
 
 
 console = _Terminal(highlight=False, markup=False, emoji=False)
@@ -123,8 +124,11 @@ def print_estimate(seconds: float, as_json: bool, remark: str = "") -> None:
 
 
 def report_error(problem: object) -> None:
-    """Print an error on standard error, on one line if ``problem`` is one line."""
-    report_line("hsv: error", problem, "bold red")
+    """Print an error on standard error, on one line if ``problem`` is one line; the middle of a long one is left out."""
+    text = str(problem)
+    if len(text) > MAX_ERROR:
+        text = f"{text[: MAX_ERROR // 2]} [...] {text[-(MAX_ERROR // 2 - 20) :]}"
+    report_line("hsv: error", text, "bold red")
 
 
 def report_line(source: str, text: object, style: str = "dim") -> None:

@@ -9,6 +9,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, validate
 from hsv.core import Struct, doubles, lib, vector
 from hsv.core.arithmetic import SEED_PARAMETER
@@ -39,8 +40,11 @@ class FlightStatus(IntEnum):
     DIVERGED = 2
 
 
+MAX_STEPS, MAX_PERIOD = 5_000_000, 1.0
+"""Largest number of steps of a flight, 100 000 s at the usual period of 0.02 s, and longest period (s)"""
+
 PLANT_PARAMETERS = (
-    Parameter("period", 0.02, "control period T", "s", 1e-4, 1.0),
+    Parameter("period", 0.02, "control period T", "s", 1e-4, MAX_PERIOD),
     Parameter("substeps", 2, "Runge-Kutta steps per control period", "", 1, 100),
     Parameter("duration", 200.0, "simulated time to fly", "s", 0.0, 1e5),
     *INITIAL_PARAMETERS,
@@ -154,8 +158,10 @@ class Plant:
         v = validate(PLANT_PARAMETERS, values)
         nominal, initial = initial_trim(values)
         vehicle = nominal.perturbed({n: v[f"vehicle.perturbation.{n}"] for n in COEFFICIENT_UNITS})
+        if (steps := round(v["duration"] / v["period"])) > MAX_STEPS:
+            raise ParameterError(f"duration = {v['duration']:g} s: {steps} periods, expected at most {MAX_STEPS}")
         equipment = {p.name: values[p.name] for p in (*EQUIPMENT_PARAMETERS, SEED_PARAMETER) if p.name in values}
-        return cls(vehicle, initial, v["period"], round(v["duration"] / v["period"]), v["substeps"], equipment)
+        return cls(vehicle, initial, v["period"], steps, v["substeps"], equipment)
 
     def perturbed(self, perturbation: Mapping[str, float]) -> Plant:
         """Return a plant whose vehicle has relative changes by parameter name; it starts in the same trim."""

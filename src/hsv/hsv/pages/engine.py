@@ -17,7 +17,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from hsv.base.errors import HsvError, reason
+from hsv.base.errors import HsvError, reason, visible
 from hsv.flight.metrics import in_words
 from hsv.pages import text
 from hsv.pages.text import units_of
@@ -107,7 +107,7 @@ def render(template: str, *, plots: Sequence[Plot] = (), numbers: Numbers | None
         lstrip_blocks=True,
     )
     environment.policies["json.dumps_kwargs"] = {}  # do not sort the keys
-    environment.filters |= {"number": text.number, "words": in_words}
+    environment.filters |= {"number": text.number, "words": in_words, "shell": text.shell, "commit_id": text.commit_id}
     environment.globals |= {
         "asset": _asset,
         "library": lambda: compressed(LIBRARY.read_bytes()),
@@ -120,7 +120,8 @@ def render(template: str, *, plots: Sequence[Plot] = (), numbers: Numbers | None
     if numbers is not None:
         described["lengths"] = numbers.lengths
         packed = numbers.packed()
-    return environment.get_template(template).render(plots=plots, described=described, numbers=packed, **values)
+    page = environment.get_template(template).render(plots=plots, described=described, numbers=packed, **values)
+    return visible(page)
 
 
 def _asset(name: str) -> Markup:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from collections.abc import Mapping
 
 from markupsafe import Markup, escape
 
+from hsv.base.errors import visible
 from hsv.base.units import UnitSystem, in_system
 
 SYSTEMS = {UnitSystem.metric: "SI, degrees", UnitSystem.si: "strict SI", UnitSystem.paper: "paper (ft, deg)"}
@@ -49,6 +52,17 @@ def unit_html(unit: str) -> str:
 def number(value: float, digits: int = 5) -> str:
     """Return ``value`` with ``digits`` significant digits and a typographic minus sign."""
     return f"{value:.{digits}g}".replace("-", "−")
+
+
+def shell(text: object) -> str:
+    """Return a text of a file as one word of a shell, to be copied without running what it contains."""
+    return shlex.quote(visible(str(text)))
+
+
+def commit_id(text: str) -> str:
+    """Return ``text`` if it is the id of a commit, without the mark of uncommitted changes; otherwise an empty text."""
+    found = re.fullmatch("([0-9a-f]{7,64})(-dirty)?", text)
+    return found[1] if found else ""
 
 
 def capitalised(text: str) -> str:
