@@ -124,7 +124,7 @@ def print_estimate(seconds: float, as_json: bool, remark: str = "") -> None:
 
 
 def report_error(problem: object) -> None:
-    """Print an error on standard error, on one line if ``problem`` is one line; the middle of a long one is left out."""
+    """Print an error on standard error, on one line if ``problem`` is one; the middle of a long one is left out."""
     text = str(problem)
     if len(text) > MAX_ERROR:
         text = f"{text[: MAX_ERROR // 2]} [...] {text[-(MAX_ERROR // 2 - 20) :]}"
