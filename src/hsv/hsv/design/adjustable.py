@@ -16,6 +16,7 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.base.processes import Progress
+from hsv.certificate.margin_checks import margins_report
 from hsv.control.design import ControlDesign
 from hsv.design.baseline import (
     DesignResult,
@@ -103,6 +104,7 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
             "single_gain": single.report(),
             "room_at_one": room.tolist(),
         },
+        "margins": margins_report(flown, vehicle, gains.report["inputs"], tell),
         "parameters_sha256": flown.to_parameters()["design.hash"],
     }
     return DesignResult(flown, gains.model, report)

@@ -11,6 +11,9 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.base.processes import Progress
+from hsv.certificate.loops import vertex_loops
+from hsv.certificate.margin_checks import margins_report
+from hsv.certificate.margins import disk_margin
 from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import NotchSection
 from hsv.design.feedback import FeedbackGain, feedback_gain
@@ -65,9 +68,25 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
         **gains.report,
         "versions": versions(),
         "tube": tube.report,
+        "margins": margins_report(design, inputs.flown_vehicle, gains.report["inputs"], tell),
         "parameters_sha256": design.to_parameters()["design.hash"],
     }
     return DesignResult(design, gains.model, report)
+
+
+def require_margins(inputs: DesignInputs, design: ControlDesign) -> None:
+    """Refuse a design whose disk margin is below the required one at a vertex.
+
+    Raises:
+        DesignError: The message names the loop and the vertex.
+    """
+    for name, required in inputs.margins.model_dump(exclude_none=True).items():
+        found = [disk_margin(loop.broken(name)).margin for loop in vertex_loops(design)]
+        if (least := min(found)) < required:
+            raise DesignError(
+                f"margins.{name} = {required:g}: the loop has a disk margin of {least:.3f} at vertex "
+                f"{found.index(least)}, expected at least {required:g}"
+            )
 
 
 def versions() -> dict[str, str]:
@@ -125,6 +144,7 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
         vehicle=vehicle.digest,
         interpolated=bool(inputs.nominal.interpolated),
     )
+    require_margins(inputs, design)
     return DesignResult(design, model, _report(inputs, design, model, feedback, nominal))
 
 

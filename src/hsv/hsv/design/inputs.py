@@ -252,6 +252,14 @@ class TighteningInputs(_Table):
     """"literal": the bounds in (35) follow from (30). "design_bounds": they are inputs, and (30) checks the plan."""
 
 
+class MarginInputs(_Table):
+    """Required disk margins of the loops at every vertex; None: none required."""
+
+    fuel: Number | None = Field(default=None, gt=0.0, lt=2.0)
+    elevator: Number | None = Field(default=None, gt=0.0, lt=2.0)
+    both: Number | None = Field(default=None, gt=0.0, lt=2.0)
+
+
 class AdjustableInputs(_Table):
     """The tube factor tau (paper section 4.3): one value, or one for each of the five rigid states."""
 
@@ -325,6 +333,8 @@ class DesignInputs(_Table):
     invariant_set: InvariantSetInputs
     tightening: TighteningInputs
     adjustable: AdjustableInputs | None = None
+    margins: MarginInputs = Field(default=MarginInputs(), exclude=True)
+    """They decide whether a design is written; the certificate states the margins that the design has."""
 
     @model_validator(mode="after")
     def _coupled(self) -> Self:
