@@ -9,7 +9,7 @@ singular value mu of two channels.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from math import atan, inf, nan, pi
 from typing import Any
@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import eigvals
 from scipy.optimize import brentq, minimize_scalar
 
-from hsv.certificate.loops import BrokenLoop, Feedback, Hardware, SampledLoop
+from hsv.certificate.loops import INPUTS, MEASUREMENTS, BrokenLoop, Feedback, Hardware, SampledLoop
 from hsv.control.design import ControlDesign
 from hsv.model.actuators import ACTUATOR_SETS
 from hsv.model.dynamics import VehicleParameters
@@ -274,6 +274,41 @@ def _roots(function: Callable[[float], float], at: np.ndarray, values: np.ndarra
 
 
 @dataclass(frozen=True)
+class LoopMargins:
+    """The margins of the loop ``name`` over several vertices or places: the smallest of each kind.
+
+    ``each`` has the disk margin by vertex or place, ``where`` is that of the smallest. ``classical`` is None for two
+    inputs at once, and if a loop is unstable.
+    """
+
+    name: str
+    disk: DiskMargin
+    where: str
+    each: dict[str, float]
+    classical: ClassicalMargins | None
+
+
+def margins_of(loops: Mapping[str, SampledLoop]) -> list[LoopMargins]:
+    """Return the margins over ``loops``, by name of vertex or place, of all inputs, then of all measurements."""
+    found = []
+    for name in (*INPUTS, *MEASUREMENTS):
+        broken = {where: loop.broken(name) for where, loop in loops.items()}
+        disks = {where: disk_margin(loop) for where, loop in broken.items()}
+        where = min(disks, key=lambda at: disks[at].margin)
+        single = name != "both" and disks[where].margin > 0.0
+        classical = _smallest([classical_margins(loop) for loop in broken.values()]) if single else None
+        found.append(LoopMargins(name, disks[where], where, {at: d.margin for at, d in disks.items()}, classical))
+    return found
+
+
+def _smallest(found: Sequence[ClassicalMargins]) -> ClassicalMargins:
+    by_gain, by_phase = min(found, key=lambda each: each.gain_up), min(found, key=lambda each: each.phase)
+    down, delay = max(each.gain_down for each in found), min(each.delay for each in found)
+    crossovers = by_phase.gain_crossover, by_gain.phase_crossover
+    return ClassicalMargins(by_gain.gain_up, down, by_phase.phase, delay, *crossovers)
+
+
+@dataclass(frozen=True)
 class Place:
     """A trim point, altitude (m) and velocity (m/s), and the effectiveness of the elevator there."""
 
@@ -313,6 +348,10 @@ class VehicleLoops:
     def corners(self) -> list[str]:
         """Return the nominal vehicle (an empty text), then all corners of the bounds as signs of the parameters."""
         return ["", *map("".join, product("-+", repeat=len(self.bounds)))]
+
+    def at(self, names: Sequence[str]) -> VehicleLoops:
+        """Return the loops at those places that have one of the ``names``."""
+        return replace(self, places={name: place for name, place in self.places.items() if name in names})
 
     def changes(self, corner: str) -> dict[str, float]:
         """Return the relative changes of the vehicle's parameters at a ``corner``, by name."""

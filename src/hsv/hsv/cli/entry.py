@@ -18,6 +18,7 @@ TREE = (
     ("Bags", "hsv.cli.bags", "replay diff export recover play"),
     ("Design", "hsv.cli.models", "trim linearise"),
     ("Design", "hsv.cli.design", "design verify certify govern"),
+    ("Design", "hsv.cli.margins", "margins"),
     ("Design", "hsv.cli.code", "export-controller export-vehicle"),
     ("Know", "hsv.cli.know", "list check bench"),
     ("", "hsv.cli.fly", "prepare conclude"),

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from hsv.base.errors import ScenarioError
-from hsv.certificate.loops import Feedback, Hardware
-from hsv.certificate.margins import Place, VehicleLoops, classical_margins
+from hsv.certificate.loops import Feedback, Hardware, vertex_loops
+from hsv.certificate.margins import LoopMargins, Place, VehicleLoops, WorstCorner, classical_margins, margins_of
 from hsv.control.design import ControlDesign
 from hsv.control.tube_law import TubeLaw
 from hsv.flight.assembly import assemble_flight, assemble_with
 from hsv.flight.closed_loop import Components, fly
-from hsv.flight.scenario import Scenario
+from hsv.flight.scenario import Scenario, scenario_table, scenario_text
 from hsv.model.actuators import SUBSTEPS, ActuatorSet
 from hsv.model.signals import INPUT_NAMES, STATE_NAMES
 from hsv.model.trim import initial_trim
@@ -38,6 +39,76 @@ _LINEAR = 0.1
 
 _OMITTED = ("fault.", "tau_change.", "feedback.", "reference.", "sensors.", "wind.", "turbulence.", "gust.", "density.")
 """Parameters of a flight that a flight at constant trim in still air, with ideal sensors, does not have."""
+
+
+@dataclass
+class MarginResults:
+    """The margins of a design or a scenario: ``loops`` by title of section, worst corners by case, flown borders."""
+
+    name: str
+    design: ControlDesign
+    loops: dict[str, list[LoopMargins]]
+    vehicles: dict[str, VehicleLoops]
+    corners: dict[str, WorstCorner] = field(default_factory=dict)
+    borders: list[Border] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, name: str, design: ControlDesign, vehicles: dict[str, VehicleLoops]) -> MarginResults:
+        """Return the margins at the vertices of ``design``, and at all places of the ``vehicles`` by case."""
+        loops = {VERTICES: margins_of({f"vertex {i}": loop for i, loop in enumerate(vertex_loops(design))})}
+        for case, around in vehicles.items():
+            loops[case] = margins_of({place: around.loop("", place) for place in around.places})
+        return cls(name, design, loops, vehicles)
+
+    def disk_rows(self, title: str) -> list[dict[str, str]]:
+        """Return the disk margins of a section as rows of texts by heading; both inputs: with the attained margin."""
+        return [
+            {
+                "loop at": each.name.replace("_", " "),
+                "disk margin": f"{each.disk.margin:.3f}" if each.disk.margin else "unstable",
+                "gain dB": f"{20.0 * np.log10(each.disk.gain):.2f}",
+                "phase deg": f"{np.degrees(each.disk.phase):.1f}",
+                "at rad/s": f"{each.disk.frequency:.4g}",
+                "worst at": each.where + (f", reached: {each.disk.attained:.3f}" if each.name == "both" else ""),
+            }
+            for each in self.loops[title]
+        ]
+
+    def classical_rows(self, title: str) -> list[dict[str, str]]:
+        """Return the classical margins of a section's single loops as rows of texts by heading."""
+        rows = []
+        for each in self.loops[title]:
+            if (c := each.classical) is None:
+                continue
+            decibels = [f"{20.0 * np.log10(g):.1f}" if 0.0 < g < np.inf else "none" for g in (c.gain_up, c.gain_down)]
+            delays = (1e3 * c.delay, c.delay / self.design.period)
+            delay = [f"{value:.3g}" if np.isfinite(value) else "none" for value in delays]
+            rows.append(
+                {
+                    "loop at": each.name.replace("_", " "),
+                    "gain up dB": decibels[0],
+                    "down dB": decibels[1],
+                    "phase deg": f"{np.degrees(c.phase):.1f}" if c.phase < np.inf else "none",
+                    "crossover rad/s": f"{c.gain_crossover:.4g}",
+                    "delay ms": delay[0],
+                    "periods": delay[1],
+                }
+            )
+        return rows
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all numbers for JSON: SI, factors of the gain, no margin as null."""
+        return {
+            "name": self.name,
+            "design": self.design.name,
+            "loops": {title: [asdict(each) for each in found] for title, found in self.loops.items()},
+            "corners": {case: asdict(worst) for case, worst in self.corners.items()},
+            "flown": [asdict(border) | {"agrees": border.agrees} for border in self.borders],
+        }
+
+
+VERTICES = "vertices"
+"""Title of the section on the vertices: the rigid vehicle with the actuators of the design and its notch filter."""
 
 
 def hardware_of(parts: Components) -> Hardware:
@@ -120,6 +191,15 @@ def scenario_loops(scenario: Scenario) -> VehicleLoops:
         places["fault"] = Place(points[-1], float(np.prod(lost)))
     own = dict(scenario.vehicle.perturbation)
     return VehicleLoops(feedback, initial_trim(values)[0], scenario.vehicle.described.uncertainty, places, own)
+
+
+def corner_file(scenario: Scenario, around: VehicleLoops, corner: str) -> str:
+    """Return the scenario with the vehicle of a ``corner`` as the text of a TOML file."""
+    table = scenario_table(scenario_text(scenario.name), scenario.name)
+    changes = {name: f"{100.0 * value:.12g} %" for name, value in around.changes(corner).items()}
+    table["vehicle"] = {**table.get("vehicle", {}), "perturbation": changes}
+    table["title"] = f"{scenario.title}; the corner with the smallest disk margin"
+    return tomli_w.dumps(table)
 
 
 def _design(parts: Components) -> ControlDesign:
