@@ -88,7 +88,10 @@ def figure_of(results: MarginResults) -> Figure:
         for values, style, name in ((L, "-", "L"), (S, "--", "S")):
             label = f"{name}, {title}"
             gain.semilogx(frequencies, 20.0 * np.log10(np.abs(values)), style, color=colour, linewidth=1.1, label=label)
-        phase.semilogx(frequencies, np.degrees(np.unwrap(np.angle(L))), color=colour, linewidth=1.1)
+        degrees = np.degrees(np.unwrap(np.angle(L)))
+        # The turn in which the phase at unit gain is next to -180 deg.
+        degrees -= 360.0 * np.round((degrees[np.argmin(np.abs(np.log(np.abs(L))))] + 180.0) / 360.0)
+        phase.semilogx(frequencies, degrees, color=colour, linewidth=1.1)
     least = min(each.disk.margin for found in results.loops.values() for each in found if each.name == "elevator")
     if least > 0.0:
         low, high = -(2.0 + least) / (2.0 - least), -(2.0 - least) / (2.0 + least)
