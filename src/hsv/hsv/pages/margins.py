@@ -1,4 +1,4 @@
-"""The page on stability margins: Nyquist plot with the forbidden disk, Bode plot of L and S, margins of the vertices."""
+"""The page on stability margins: Nyquist plot with the forbidden disk, Bode plot of L and S, margins by vertex."""
 
 from __future__ import annotations
 
