@@ -1,7 +1,7 @@
 """Give all packages the version of a release: python3 tools/release.py 1.1.0.
 
-The version is written to every package.xml, from which setup.py reads it, and to CITATION.cff. In the changelogs, the
-section "Forthcoming" or "Unreleased" gets the version and today's date as its heading. All files change, or none.
+The version is written to every package.xml, from which setup.py reads it, and to CITATION.cff. In CHANGELOG.md, the
+section "Unreleased" gets the version and today's date as its heading. All files change, or none.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ def released(root: Path, version: str, date: str) -> dict[Path, str]:
     """
     if not re.fullmatch(r"\d+\.\d+\.\d+", version):
         raise ValueError(f"version = {version!r}: expected three numbers, as 1.2.0")
-    heading = f"{version} ({date})"
     citation = f'version: {version}\ndate-released: "{date}"'
     changes = {
         root / "CHANGELOG.md": (r"^## Unreleased\n(?=\n*###)", f"## Unreleased\n\n## {version} - {date}\n"),
@@ -30,10 +29,6 @@ def released(root: Path, version: str, date: str) -> dict[Path, str]:
     }
     for manifest in sorted([*root.glob("src/*/package.xml"), *root.glob("ros_ws/src/hsv_*/package.xml")]):
         changes[manifest] = (r"(?<=<version>)\d+\.\d+\.\d+(?=</version>)", version)
-        changes[manifest.with_name("CHANGELOG.rst")] = (
-            r"^Forthcoming\n-+\n(?=\* )",
-            f"{heading}\n{'-' * len(heading)}\n",
-        )
     texts = {}
     for path, (pattern, new) in changes.items():
         text = path.read_text(encoding="utf-8")

@@ -1,13 +1,17 @@
 """The names that ``hsv list`` prints can be used as printed."""
 
+from pathlib import Path
+
 import pytest
 
+from hsv.control.design_file import design_names
 from hsv.flight.scenario import parse_scenario, scenario_names, scenario_text
 from hsv.model.faults.injector import FaultInjector
 from hsv.model.faults.table import FAULT_KINDS, read_fault
 from hsv.model.vehicle import vehicle_names
 from hsv.plugins.controllers import controller_names
 
+ROOT = Path(__file__).parents[2]
 SETS = ["elevator_50", "elevator_150", "elevator_20", "elevator_first_order_20", "fuel_10"]
 SETS += ["ideal", "fine", "ghv", "inertial"]
 
@@ -17,6 +21,7 @@ KINDS = {
     "faults": list(FAULT_KINDS),
     "equipment": SETS,
     "controllers": controller_names(),
+    "designs": design_names(),
 }
 
 
@@ -27,6 +32,12 @@ def test_everything_of_a_kind_is_listed_with_a_title(hsv, kind):
     assert all(listed.values())
     out = hsv("list", kind).out
     assert all(name in out for name in KINDS[kind])
+
+
+def test_the_page_of_results_has_what_the_certificates_state(hsv):
+    page = (ROOT / "offline_design" / "results.md").read_text(encoding="utf-8")
+    printed = [line.rstrip() for line in hsv("list", "designs", "--units", "paper").out.splitlines()]
+    assert [line.rstrip() for line in page.partition("```text\n")[2].partition("\n```")[0].splitlines()] == printed
 
 
 def test_a_vehicle_that_is_printed_can_be_flown(hsv, tmp_path):

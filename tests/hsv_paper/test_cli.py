@@ -10,7 +10,9 @@ def test_a_figure_is_drawn(hsv_paper, tmp_path):
     assert sorted(path.name for path in (tmp_path / "drawn").iterdir()) == ["figure_04.pdf", "figure_04.png"]
 
 
-@pytest.mark.parametrize(("words", "time"), [("figures --only 4", "4 s"), ("claims", "2 min"), ("limits", "12 min")])
+@pytest.mark.parametrize(
+    ("words", "time"), [("figures --only 4", "4 s"), ("claims", "2 min"), ("sensitivity coupling", "5 min")]
+)
 def test_the_time_is_estimated_before_anything_is_computed(hsv_paper, monkeypatch, words, time):
     monkeypatch.setattr("hsv_paper.cli.stages", Mock(side_effect=KeyboardInterrupt))
     ran = hsv_paper(*words.split())
@@ -21,7 +23,7 @@ def test_the_time_is_estimated_before_anything_is_computed(hsv_paper, monkeypatc
     ("words", "message"),
     [
         ("figures --only 7", "only = 7: expected one of 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17"),
-        ("sensitivity weather", "sensitivity = 'weather': expected one of coupling, sampling, notch, parameters"),
+        ("sensitivity weather", "sensitivity = 'weather': expected one of coupling, notch, parameters, fault"),
         ("sensitivity coupling --coarseness 0.1", "coarseness = 0.1: expected 1 to 100"),
     ],
 )
@@ -30,7 +32,7 @@ def test_a_figure_or_study_that_does_not_exist_or_is_too_fine_is_named(hsv_paper
     assert ran.code == 2 and ran.error.startswith(message)
 
 
-@pytest.mark.parametrize("words", ["figures --only 4 --out", "sensitivity coupling --out", "limits --out"])
+@pytest.mark.parametrize("words", ["figures --only 4 --out", "sensitivity coupling --out"])
 @pytest.mark.parametrize("folder", ["file", "/proc/absent"])
 def test_a_folder_that_could_not_be_made_is_refused_before_anything_is_flown(hsv_paper, tmp_path, words, folder):
     (tmp_path / "file").touch()

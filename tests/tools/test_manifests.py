@@ -1,4 +1,4 @@
-"""The manifests declare what the packages import, and agree with changelogs and versions."""
+"""The manifests declare what the packages import, and agree with the changelog and versions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import parse_package
 from packaging.specifiers import SpecifierSet
 
@@ -75,15 +74,6 @@ def test_a_package_names_its_authors_its_site_and_its_license(manifest):
     assert (manifest.parent / "LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()
 
 
-@pytest.mark.parametrize("manifest", MANIFESTS, ids=lambda path: path.parent.name)
-def test_a_package_has_a_changelog_of_its_name(manifest):
-    text = (manifest.parent / "CHANGELOG.rst").read_text(encoding="utf-8")
-    assert f"Changelog for package {parse_package(str(manifest)).name}\n" in text
-    changelog = get_changelog_from_path(str(manifest.parent / "CHANGELOG.rst"))
-    versions = [version for version, _, _ in changelog.foreach_version()]
-    assert versions and all(changelog.get_content_of_version(version) for version in versions)
-
-
 @pytest.mark.parametrize(("module", "version"), DISTRIBUTION.items())
 def test_a_key_stands_for_a_version_that_suffices(module, version):
     bounds = re.findall(rf'"({module.replace("yaml", "pyyaml")})([<>=][^"]*)"', (ROOT / "src/hsv/setup.py").read_text())
@@ -113,16 +103,11 @@ def test_all_packages_have_one_version_which_the_library_and_the_citation_say():
 
 @pytest.fixture
 def checkout(tmp_path):
-    """Return a copy of the files that a release changes, with an entry to release in every changelog."""
+    """Return a copy of the files that a release changes, with an entry to release."""
     for manifest in manifests(ROOT):
         folder = tmp_path / manifest.parent.relative_to(ROOT)
         folder.mkdir(parents=True)
         shutil.copy(manifest, folder)
-        text = (manifest.parent / "CHANGELOG.rst").read_text(encoding="utf-8")
-        head, newest, rest = re.split(r"^(?=\S.*\n-+\n)", text, maxsplit=2, flags=re.MULTILINE)
-        if not newest.startswith("Forthcoming"):
-            rest, newest = newest + rest, "Forthcoming\n-----------\n* Something\n\n"
-        (folder / "CHANGELOG.rst").write_text(head + newest + rest, encoding="utf-8")
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     changes = re.sub(r"^## Unreleased\n\n(?=## )", "## Unreleased\n\n### Added\n- Something\n\n", changes, flags=re.M)
     (tmp_path / "CHANGELOG.md").write_text(changes, encoding="utf-8")
@@ -135,9 +120,6 @@ def test_every_file_has_the_version_afterwards(checkout):
         path.write_text(text, encoding="utf-8")
     for manifest in manifests(checkout):
         assert parse_package(str(manifest)).version == "90.1.2"
-        changelog = get_changelog_from_path(str(manifest.with_name("CHANGELOG.rst")))
-        assert f"{changelog.get_date_of_version('90.1.2'):%Y-%m-%d}" == "2030-04-05"
-        assert changelog.get_content_of_version("90.1.2")
     assert "## Unreleased\n\n## 90.1.2 - 2030-04-05\n\n### " in (checkout / "CHANGELOG.md").read_text(encoding="utf-8")
     citation = yaml.safe_load((checkout / "CITATION.cff").read_text(encoding="utf-8"))
     assert (citation["version"], citation["date-released"]) == ("90.1.2", "2030-04-05")
@@ -149,7 +131,7 @@ def test_a_version_that_is_none_or_not_above_is_refused(checkout, version):
         released(checkout, version, "2030-04-05")
 
 
-@pytest.mark.parametrize("name", ["CHANGELOG.md", "src/hsv/CHANGELOG.rst", "CITATION.cff"])
+@pytest.mark.parametrize("name", ["CHANGELOG.md", "CITATION.cff"])
 def test_a_file_with_nothing_to_release_is_named(checkout, name):
     (checkout / name).write_text("empty\n", encoding="utf-8")
     with pytest.raises(ValueError, match=re.escape(str(checkout / name))):

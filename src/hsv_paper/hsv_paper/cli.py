@@ -1,9 +1,9 @@
-"""The hsv-paper command: figures and claims of the paper, sensitivity of its choices, and physical limits."""
+"""The hsv-paper command: figures and claims of the paper, and sensitivity of its choices."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -13,14 +13,8 @@ from hsv.cli.main import run
 from hsv.cli.options import check_folder, check_target
 from hsv.cli.output import console, print_estimate, print_written, stages
 
-if TYPE_CHECKING:
-    from hsv_paper.study import Study
-
-COMMANDS = {name: Command(__name__) for name in ("figures", "claims", "sensitivity", "limits")}
+COMMANDS = {name: Command(__name__) for name in ("figures", "claims", "sensitivity")}
 """The commands and the module that holds them."""
-
-CoarsenessOption = Annotated[float, typer.Option(help="1: as in the docs; 4: a quarter of the points.")]
-StudyOption = Annotated[Path, typer.Option("--out", help="Folder for a PDF, a PNG and a page on the study.")]
 
 _FIGURE, _CLAIMS = 4.0, 120.0
 """Time (s) on one processor: of a figure, and of all claims, for which 1025 vehicles fly ten scenarios."""
@@ -92,38 +86,23 @@ def claims(
 
 
 def sensitivity(
-    name: Annotated[str, typer.Argument(help="coupling, sampling, notch, parameters, fault, weights, ramp or factor.")],
-    out: StudyOption = Path("study"),
-    coarseness: CoarsenessOption = 1.0,
+    name: Annotated[str, typer.Argument(help="coupling, notch, parameters, fault or factor.")],
+    out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page on the study.")] = Path("study"),
+    coarseness: Annotated[float, typer.Option(help="1: as in the docs; 4: a quarter of the points.")] = 1.0,
 ) -> None:
     """Vary one thing that the paper leaves open until each controller is lost; plot the results and state the limits.
 
     Example: hsv-paper sensitivity fault --out study
     """
-    from hsv_paper.sensitivity import STUDIES
-
-    if name not in STUDIES:
-        raise QuantityError(f"sensitivity = {name!r}: expected {one_of(STUDIES, name)}")
-    _make(STUDIES[name], out, coarseness)
-
-
-def limits(out: StudyOption = Path("study"), coarseness: CoarsenessOption = 1.0) -> None:
-    """Find by optimal control the fastest transfer and the deepest fault from which any controller could recover.
-
-    Example: hsv-paper limits --out study
-    """
-    from hsv_paper.limits.study import STUDY
-
-    _make(STUDY, out, coarseness)
-
-
-def _make(study: Study, out: Path, coarseness: float) -> None:
-    """Run a study, write its figure and its page, and print its tables."""
     import matplotlib
 
     from hsv_paper.plots import RC, save
+    from hsv_paper.sensitivity import STUDIES
     from hsv_paper.study import Scope, markdown
 
+    if name not in STUDIES:
+        raise QuantityError(f"sensitivity = {name!r}: expected {one_of(STUDIES, name)}")
+    study = STUDIES[name]
     if not 1.0 <= coarseness <= 100.0:
         raise QuantityError(f"coarseness = {coarseness}: expected 1 to 100")
     check_folder(out, "out")
@@ -131,8 +110,8 @@ def _make(study: Study, out: Path, coarseness: float) -> None:
     out.mkdir(parents=True, exist_ok=True)
     with stages() as progress, matplotlib.rc_context(RC):
         outcome = study.run(Scope(coarseness, progress))
-        written = save(outcome.figure, out / study.name)
-    page = out / f"{study.name}.md"
+        written = save(outcome.figure, out / name)
+    page = out / f"{name}.md"
     page.write_text(study.page(outcome), encoding="utf-8")
     for table in outcome.tables:
         console.print(markdown(table), soft_wrap=True, highlight=False)

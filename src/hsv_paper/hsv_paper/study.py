@@ -1,4 +1,4 @@
-"""The common parts of all studies, of sensitivity and physical limits: a study makes a figure, text and tables."""
+"""The common parts of all sensitivity studies: a study makes a figure, text and tables."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from hsv.model.vehicle import load_vehicle
 Rows = Sequence[Mapping[str, Any]]
 """The rows of a table. A row maps each column to a cell: text, a rounded number, or None."""
 
-_PAGE = """# {kind}: {title}
-Made by `hsv-paper {command} --out docs/study`, including all numbers.
+_PAGE = """# Sensitivity: {title}
+Made by `hsv-paper sensitivity {name} --out docs/study`, including all numbers.
 
 ![{title}]({name}.png)
 
@@ -84,15 +84,11 @@ class Study:
     title: str
     run: Callable[[Scope], Outcome]
     minutes: float
-    kind: str = "Sensitivity"
 
     def page(self, outcome: Outcome) -> str:
         """Return the study's page in Markdown."""
-        limits = self.name == "limits"
-        command = self.name if limits else f"sensitivity {self.name}"
         parts = [part if isinstance(part, str) else markdown(part) for part in outcome.parts]
-        text = "\n\n".join(parts if limits else [*parts, _TERMS])
-        return _PAGE.format(kind=self.kind, title=self.title, command=command, name=self.name, parts=text)
+        return _PAGE.format(title=self.title, name=self.name, parts="\n\n".join([*parts, _TERMS]))
 
 
 def markdown(rows: Rows, right: Sequence[str] | None = None) -> str:

@@ -43,7 +43,7 @@ MOVED = {
     "equipment": "is called hsv list equipment now",
     "figures": "is called hsv-paper figures now",
     "claims": "is called hsv-paper claims now",
-    "study": "is called hsv-paper sensitivity now, and its limits hsv-paper limits",
+    "study": "is called hsv-paper sensitivity now",
     "cluster": "is gone: start Dask workers on other hosts and use --scheduler, see docs/montecarlo.md",
 }
 """Messages about commands that were renamed or removed, by old name."""

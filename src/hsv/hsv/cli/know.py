@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from hsv.cli.bench import Figure
 
 
+_FLOWN = {"room, fuel": "1", "room, elevator": "rad", "largest level": "1"}
+"""Least distance of the nominal inputs from the bounds of U minus F Z, and largest tube level of a design's flights."""
+
+
 class Kind(StrEnum):
     """Kinds of things that can be listed."""
 
@@ -29,6 +33,7 @@ class Kind(StrEnum):
     faults = "faults"
     equipment = "equipment"
     controllers = "controllers"
+    designs = "designs"
 
 
 def list_(
@@ -37,10 +42,11 @@ def list_(
     units: UnitsOption = UnitSystem.metric,
     json: ListJsonOption = False,
 ) -> None:
-    """List scenarios, vehicles, types of faults, published actuators and sensors, or controllers; or print one.
+    """List scenarios, vehicles, types of faults, published actuators and sensors, controllers, designs; or print one.
 
     A scenario or vehicle is printed with everything that it inherits from the one it extends, a fault with the units,
-    ranges and defaults of its parameters, equipment with its numbers and source.
+    ranges and defaults of its parameters, equipment with its numbers and source. Designs are listed with what their
+    certificates state.
 
     Example: hsv list scenarios case2_derived
     """
@@ -53,6 +59,8 @@ def list_(
         _list_faults(name, system, json)
     elif kind is Kind.equipment:
         _list_equipment(name, system, json)
+    elif kind is Kind.designs:
+        _list_designs(name, system, json)
     else:
         _list_controllers(name, json)
 
@@ -84,6 +92,31 @@ def _list_vehicles(name: str, json: bool) -> None:
         output.print_json(vehicle_tables(name))
     else:
         print(vehicle_text(name), end="")
+
+
+def _list_designs(name: str, units: UnitSystem, json: bool) -> None:
+    from hsv.cli.design import HALF_WIDTHS
+    from hsv.control.design_file import certificate_path, design_names, find_design, read_certificate
+
+    names = design_names()
+    _known(Kind.designs, name, dict.fromkeys(names))
+    sets, flown = [], []
+    for known in [name] if name else names:
+        tube = read_certificate(certificate_path(find_design(known)))["tube"]
+        plan = tube["tightening"]["plan"]
+        sets.append((known, [*tube["invariant_set"]["half_width"][:5], *tube["invariant_set"]["feedback_half_range"]]))
+        room = map(min, plan["margin_to_lower"], plan["margin_to_upper"])
+        flown.append((known, [*room, tube["flights"]["worst_level"]]))
+    if json:
+        units_of = {key.replace(", ", "_").replace(" ", "_"): unit for key, unit in (HALF_WIDTHS | _FLOWN).items()}
+        stated = {}
+        for (known, row), (_, others) in zip(sets, flown, strict=True):
+            pairs = zip(units_of.items(), row + others, strict=True)
+            stated[known] = output.to_json({key: (value, unit) for (key, unit), value in pairs}, units)
+        output.print_json(stated)
+        return
+    output.console.print(output.quantity_table("Half-widths of the invariant sets", HALF_WIDTHS, sets, units))
+    output.console.print(output.quantity_table("Room of the plan, and flights", _FLOWN, flown, units))
 
 
 def _list_controllers(name: str, json: bool) -> None:

@@ -111,11 +111,8 @@ def find_design(name: str) -> Path:
 
 def find_file(name: str, suffix: str) -> Path:
     """Return the path of a design's file with this ``suffix``; look-up and error are those of :func:`find_design`."""
-    if "/" in name or name.endswith(suffix):
-        candidates = [Path(name)]
-    else:
-        folders = [Path(folder) for folder in os.environ.get("HSV_DESIGN_PATH", "").split(os.pathsep) if folder]
-        candidates = [folder / f"{name}{suffix}" for folder in (*folders, _SHIPPED.resolve())]
+    named = "/" in name or name.endswith(suffix)
+    candidates = [Path(name)] if named else [folder / f"{name}{suffix}" for folder in _folders()]
     for candidate in candidates:
         if candidate.is_file():
             return candidate
@@ -124,6 +121,16 @@ def find_file(name: str, suffix: str) -> Path:
         f"design = {name!r}: no such file, expected the path of a {suffix} file, a name in HSV_DESIGN_PATH or of a "
         f"shipped one{did_you_mean(Path(name).stem, names)}"
     )
+
+
+def design_names() -> list[str]:
+    """Return the names of the designs with a certificate in ``HSV_DESIGN_PATH`` and among the shipped ones."""
+    return sorted({path.stem for folder in _folders() for path in folder.glob("*.yaml") if find_certificate(str(path))})
+
+
+def _folders() -> list[Path]:
+    own = os.environ.get("HSV_DESIGN_PATH", "").split(os.pathsep)
+    return [*(Path(folder) for folder in own if folder), _SHIPPED.resolve()]
 
 
 def _flattened(branch: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:

@@ -51,23 +51,3 @@ void hsv_jacobian(const double *x, const double *u, const hsv_vehicle *p, double
         __imag__ z[j] = 0.0;
     }
 }
-
-/* Write the states (count, 9) one period (count; s) after x (count, 9) with the inputs u (count, 2) held, and their
- * derivatives (count, 9, 12) by state, input and period, multiplied by STEP; the caller divides by STEP. */
-void hsv_transitions(int64_t count, const double *x, const double *u, const double *period, const int64_t *substeps,
-                     const hsv_vehicle *p, double *end, double *changes)
-{
-    enum { VARIABLES = STATES + INPUTS + 1 };
-    for (int64_t k = 0; k < count; k++)
-        for (int j = 0; j < VARIABLES; j++) {
-            real z[VARIABLES];
-            for (int i = 0; i < VARIABLES; i++)
-                z[i] = i < STATES ? x[STATES * k + i] : i < STATES + INPUTS ? u[INPUTS * k + i - STATES] : period[k];
-            __imag__ z[j] = STEP;
-            advance(z, z + STATES, (const Vehicle *)p, NULL, z[VARIABLES - 1], substeps[k]);
-            for (int i = 0; i < STATES; i++) {
-                changes[VARIABLES * (STATES * k + i) + j] = __imag__ z[i];
-                end[STATES * k + i] = __real__ z[i];
-            }
-        }
-}

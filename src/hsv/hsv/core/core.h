@@ -302,8 +302,6 @@ void hsv_advance(double *x, const double *u, const hsv_vehicle *p, const double 
 int hsv_in_model_range(const double *x, double angle_limit);
 double hsv_speed_of_sound(double altitude, const hsv_vehicle *p);
 void hsv_jacobian(const double *x, const double *u, const hsv_vehicle *p, double *A, double *B);
-void hsv_transitions(int64_t count, const double *x, const double *u, const double *period, const int64_t *substeps,
-                     const hsv_vehicle *p, double *end, double *changes);
 /* Equilibria and small linear systems. */
 void hsv_solve(int64_t n, int64_t m, double *A, double *b);
 double hsv_balance(const hsv_vehicle *rigid, double path_angle, double acceleration, double pitch_rate, double *unknown,

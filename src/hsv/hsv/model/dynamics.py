@@ -21,10 +21,6 @@ MODELS = ("CM", "DM")
 """Coupled model (paper eq. 1) and decoupled model (paper eq. 4)."""
 
 
-_COMPLEX_STEP = 1e-40
-"""The complex step by which hsv_transitions multiplies its derivatives."""
-
-
 class VehicleParameters(NamedTuple):
     """All constants of the equations of motion and the limits of inputs and angles, SI (kg, m, s, N, rad).
 
@@ -303,26 +299,6 @@ def advance(
         substeps,
     )
     return new
-
-
-def transitions(
-    state: np.ndarray, inputs: np.ndarray, period: np.ndarray, substeps: np.ndarray, p: VehicleParameters
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the final states, shape (N, 9), of N independent transitions, and their derivatives, shape (N, 9, 12).
-
-    Transition i starts from ``state[i]``, shape (9,), and holds ``inputs[i]``, shape (2,), for ``period[i]`` (s) in
-    ``substeps[i]`` classical Runge-Kutta steps. The derivatives are with respect to the 9 initial states, the 2 inputs
-    and the period (last axis); by the complex step they are exact to rounding.
-    """
-    end, changes = np.empty((len(period), N_STATES)), np.empty((len(period), N_STATES, N_STATES + N_INPUTS + 1))
-    lib.hsv_transitions(
-        len(period),
-        *(doubles(vector(each)) for each in (state, inputs, period)),
-        ffi.from_buffer("int64_t[]", np.ascontiguousarray(substeps, np.int64)),
-        vehicle_struct(p).pointer,
-        *map(doubles, (end, changes)),
-    )
-    return end, changes / _COMPLEX_STEP
 
 
 def _conditions(conditions: np.ndarray | None) -> Any:

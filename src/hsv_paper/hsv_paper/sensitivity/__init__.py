@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from hsv_paper.sensitivity import factor, flown, notch, weights
+from hsv_paper.sensitivity import factor, flown, notch
 from hsv_paper.study import Study
 
 STUDIES = {
     study.name: study
     for study in (
         Study("coupling", "Inertial coupling", flown.coupling, 5),
-        Study("sampling", "Sampling period", flown.sampling, 3),
         Study("notch", "Centre and depth of the notch filter", notch.run, 10),
         Study("parameters", "Size of the parameter uncertainty", flown.parameters, 5),
         Study("fault", "Depth of the fault", flown.fault, 5),
-        Study("weights", "Weights of F and K, input bounds of K", weights.run, 5),
-        Study("ramp", "Length of the ramp", flown.ramp, 2),
         Study("factor", "Adjustable factor τ", factor.run, 20),
     )
 }
