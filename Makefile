@@ -28,7 +28,7 @@ test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
 	@if [ -n '$(ARGS)' ]; then $(PYTEST) $(ARGS); else $(TESTS); fi
 
 test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damaged" chooses)
-	@$(INSTALL) --requirement requirements-docs.txt
+	@$(INSTALL) --requirement requirements-docs.txt --requirement requirements-web.txt
 	@$(PYTEST) -n auto --dist loadfile -m long $(ARGS)
 
 fuzz: setup ## set up, then give 10 000 mutated files to every reader (ARGS="--fuzz-inputs 1000" for fewer)
@@ -45,7 +45,7 @@ test-viewers: setup ## set up, install a browser, node and npm packages, then ru
 		command -v "$${each%:*}" > /dev/null || missing="$$missing $${each#*:}"; \
 	done; \
 	[ -z "$$missing" ] || $$([ "$$(id -u)" = 0 ] || echo sudo) apt-get install -y --no-install-recommends $$missing
-	@$(INSTALL) --requirement requirements-viewers.txt
+	@$(INSTALL) --requirement requirements-viewers.txt --requirement requirements-web.txt
 	@for lock in $$(git ls-files 'tests/*/package-lock.json'); do npm ci --no-audit --no-fund --prefix "$${lock%/*}" || exit; done
 	@$(PYTEST) -m viewer $(ARGS)
 
@@ -81,7 +81,7 @@ bench: setup ## set up, then measure this machine (ARGS="--scale 0.5")
 	@source ./env.sh && exec hsv bench $(ARGS)
 
 docs: setup ## set up, then build the documentation into docs/_build (open docs/_build/index.html)
-	@$(INSTALL) --requirement requirements-docs.txt
+	@$(INSTALL) --requirement requirements-docs.txt --requirement requirements-web.txt
 	@source ./env.sh && exec python3 -m sphinx -q -W --keep-going -b html docs docs/_build
 
 clean: ## remove what set-up and tools made; recorded runs stay

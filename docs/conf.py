@@ -10,6 +10,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
 import site_pages  # noqa: E402
 from docutils import nodes  # noqa: E402
 from docutils.utils.math.latex2mathml import tex2mathml  # noqa: E402
+from hsv.pages.fly import fly_page  # noqa: E402
 from pygments.lexers.special import TextLexer  # noqa: E402
 
 project = "HSV bench"
@@ -77,7 +78,13 @@ def setup(app):
             parts = re.split(r"(``.*?``)", line)
             lines[i] = "".join(p if p.startswith("``") else p.replace("|", r"\|") for p in parts)
 
+    def fly(app, failed):
+        # The page that flies in the browser takes the place of the one that describes it in the repository.
+        if not failed and app.builder.format == "html":
+            Path(app.outdir, "fly.html").write_text(fly_page(), encoding="utf-8")
+
     app.add_lexer("mermaid", TextLexer)  # drawn by the hosts of repositories
     app.connect("source-read", read)
     app.connect("env-get-outdated", outdated)
     app.connect("autodoc-process-docstring", plain)
+    app.connect("build-finished", fly)

@@ -48,6 +48,7 @@ setup(
             "flight/*.c",
             "plugins/include/*.h",
             "core/*.[ch]",
+            "core/web/*.c",
             "designs/*",
             "pages/template/*",
             "pages/plotly/*",

@@ -75,6 +75,12 @@ def published_in_words(found: str | None, same: bool | None) -> str:
     return {True: "as published", False: "not the published flight of this scenario", None: "none is published"}[same]
 
 
+def published_fingerprint(name: str) -> str | None:
+    """Return the published fingerprint of the shipped scenario ``name``, None if there is none."""
+    entry = _table().get(name)
+    return entry["fingerprint"] if entry else None
+
+
 @cache
 def _table() -> dict[str, Any]:
     return tomllib.loads(files("hsv.flight").joinpath(TABLE).read_text(encoding="utf-8"))
