@@ -65,12 +65,13 @@ def test_what_the_commands_of_the_readme_write_is_ignored_by_git():
 
 @pytest.mark.long
 def test_the_documentation_builds_without_a_warning(tmp_path):
-    for tool in ("sphinx", "myst_parser", "furo"):
+    for tool in ("sphinx", "myst_parser", "furo", "ziglang"):
         pytest.importorskip(tool, reason=f"{tool} is not installed: make docs installs it")
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", str(ROOT / "docs")]
     built = subprocess.run([*command, str(tmp_path / "site")], capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stderr
     assert (tmp_path / "site" / "claims.html").is_file()
+    assert "wasm-unsafe-eval" in (tmp_path / "site" / "fly.html").read_text(encoding="utf-8")
 
 
 SOURCES = Path(hsv.__file__).parent
