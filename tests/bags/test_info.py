@@ -65,5 +65,6 @@ def test_description(described):
         "excursions": [{"start_s": 0.7, "end_s": 0.75}],
         "uncertified_steps": 0,
         "uncertified_hardware_steps": 0,
+        "uncertified_rate_steps": 0,
     }
     assert described["not_covered"] is None  # without parameters there is nothing to compare

@@ -1,6 +1,11 @@
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
 import pytest
 
 from hsv.base.errors import DesignError
+from hsv.certificate.coverage import uncovered_rates
 from hsv.control.design_file import find_design, read_design
 from hsv.control.hardware import uncovered_hardware
 from hsv.control.tube_law import TubeStatusCode
@@ -76,6 +81,31 @@ def test_a_design_covers_the_actuators_that_it_knows_and_no_others():
     assert [text.partition(";")[0] for text in of({}, REALISTIC)] == [
         f"actuator.{name}.set: ideal" for name in INPUT_NAMES
     ]
+
+
+def test_rates_of_a_flight_are_compared_with_those_of_the_design():
+    """The altitude of step k is that of k periods at 120 ft/s, the velocity that of 30 ft/s^2, exactly its limit."""
+    period, foot = BASELINE.period, 0.3048
+    states = np.zeros((5, 9))
+    states[:, :2] = np.arange(5.0)[:, None] * period * np.array([120.0, 30.0]) * foot
+    for limits, named in (
+        ((130.0, 30.0), []),
+        ((100.0, 30.0), ["altitude: 120 ft/s"]),
+        ((130.0, 29.0), ["velocity: 30"]),
+    ):
+        design = replace(BASELINE, tube=replace(BASELINE.tube, rates=np.array(limits) * foot))
+        found = uncovered_rates(design, states)
+        assert [text.startswith(f"rate of {name}") for text, name in zip(found, named, strict=True)] == [True] * len(
+            named
+        )
+    assert uncovered_rates(BASELINE, states) == []
+
+
+def test_the_status_tells_of_rates():
+    """The first step with a change that is not zero is faster than no rate at all."""
+    slow = replace(BASELINE, tube=replace(BASELINE.tube, rates=np.full(2, 1e-9)))
+    flown = [step.diagnostics.status for step in islice(steps(assemble_flight(load_scenario("case1"), slow)), 3)]
+    assert flown[0] is TubeStatusCode.OK and flown[2] is TubeStatusCode.UNCERTIFIED_RATE
 
 
 def test_where_no_tube_is_certified_nothing_is_covered():

@@ -223,6 +223,7 @@ def _tube(bag: Bag) -> dict[str, Any]:
         "excursions": intervals(columns["header.stamp"], outside),
         "uncertified_steps": int((columns["status"] == constants.get("UNCERTIFIED_VEHICLE", -1)).sum()),
         "uncertified_hardware_steps": int((columns["status"] == constants.get("UNCERTIFIED_HARDWARE", -1)).sum()),
+        "uncertified_rate_steps": int((columns["status"] == constants.get("UNCERTIFIED_RATE", -1)).sum()),
     }
 
 

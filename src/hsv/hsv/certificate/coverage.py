@@ -10,15 +10,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import numpy as np
+
 from hsv.base.errors import DesignError
 from hsv.base.parameters import validate
-from hsv.base.units import UnitSystem
+from hsv.base.units import UnitSystem, in_words
 from hsv.control.controller import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
 from hsv.control.hardware import uncovered_hardware
 from hsv.control.notch_filter import flown_sections
 from hsv.model.faults.table import fault_parameters
-from hsv.model.signals import INPUT_NAMES
+from hsv.model.signals import INPUT_NAMES, STATE_NAMES
 from hsv.model.vehicle import Vehicle
 
 _LAW = "tube_mpc"
@@ -116,3 +118,21 @@ def _effectiveness(certificate: Mapping[str, Any]) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
         raise DesignError(f"certificate: {field} = {value!r}: expected a number from 0 to 1")
     return float(value)
+
+
+def uncovered_rates(design: ControlDesign | None, states: np.ndarray) -> list[str]:
+    """Return a message for altitude and velocity if they change faster than ``design`` is certified for, if limited.
+
+    ``states`` (k, 9) are those of a flight, one row per step.
+    """
+    if design is None or design.tube is None or not len(design.tube.rates):
+        return []
+    moved = np.abs(np.diff(states[:, :2], axis=0)).max(axis=0, initial=0.0)
+    too_fast = design.tube.too_fast(moved, design.period)
+    found = zip(STATE_NAMES, ("m/s", "m/s^2"), moved / design.period, design.tube.rates, too_fast, strict=False)
+    return [
+        f"rate of {name}: {in_words(rate, unit, UnitSystem.paper)}; "
+        f"the bounds of the inputs are certified for {in_words(limit, unit, UnitSystem.paper)} at most"
+        for name, unit, rate, limit, fast in found
+        if fast
+    ]

@@ -151,6 +151,7 @@ def simulate(
     """
     import numpy as np
 
+    from hsv.certificate.coverage import uncovered_rates
     from hsv.cli.summary import FlightSummary, report_flight
     from hsv.control.design import digest
     from hsv.control.design_file import find_design, read_design
@@ -181,7 +182,7 @@ def simulate(
         ending="diverged" if flight.status is FlightStatus.DIVERGED else "finished",
         simulated_time=float(flight.time[-1]),
         wall_time=wall_time,
-        not_covered=uncovered_of(loaded, design),
+        not_covered=[*uncovered_of(loaded, design), *uncovered_rates(design, flight.history.state)],
         step_times={
             "period_ms": 1e3 * flight.period,
             "nodes": {name: step_statistics(times) for name, times in flight.law_times.items()},

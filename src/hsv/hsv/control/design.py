@@ -124,6 +124,13 @@ class TubeSet:
     half_width: np.ndarray
     rates: np.ndarray = field(default_factory=lambda: np.empty(0))
 
+    def too_fast(self, change: np.ndarray, period: float) -> np.ndarray:
+        """Return whether the ``change`` (2) of altitude (m) and velocity (m/s) in a ``period`` (s) exceeds the rates.
+
+        The result is empty for a set that holds for any rates.
+        """
+        return np.abs(change[: len(self.rates)]) > self.rates * period * (1.0 + 1e-9)
+
     def farthest(self, error: np.ndarray) -> str:
         """Return the name of the component of e - c that is largest relative to its half-width, for an error e (n)."""
         with np.errstate(over="ignore"):

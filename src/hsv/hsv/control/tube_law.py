@@ -46,6 +46,7 @@ class TubeStatusCode(IntEnum):
     INVALID_INPUT = 3
     UNCERTIFIED_VEHICLE = 4
     UNCERTIFIED_HARDWARE = 5
+    UNCERTIFIED_RATE = 6
 
 
 TUBE_PARAMETERS = (
@@ -219,7 +220,7 @@ class TubeLaw(Controller):
 
         Until the first of them, tau is that of the last :meth:`change_tau`, or of the design if there was none.
         """
-        self._next = 0
+        self._next, self._before = 0, np.full(2, np.nan)
         self._arrange([(0, self._tau), *self._scheduled])
 
     def change_tau(self, values: Sequence[float]) -> int:
@@ -282,8 +283,12 @@ class TubeLaw(Controller):
             status = TubeStatusCode.OUTSIDE
         elif not self._certified:
             status = TubeStatusCode.UNCERTIFIED_VEHICLE
+        elif not self._hardware_covered:
+            status = TubeStatusCode.UNCERTIFIED_HARDWARE
         else:
-            status = TubeStatusCode.OK if self._hardware_covered else TubeStatusCode.UNCERTIFIED_HARDWARE
+            fast = tube.too_fast(inputs.estimate[:2] - self._before, self.design.period)
+            status = TubeStatusCode.UNCERTIFIED_RATE if any(fast) else TubeStatusCode.OK
+        self._before = inputs.estimate[:2].copy()
         return TubeResult(
             input=u,
             u_unsaturated=total,

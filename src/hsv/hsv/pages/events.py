@@ -50,10 +50,14 @@ def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
     tube = description["tube"] or {"excursions": ()}
     outside = [Event(e["start_s"], e["end_s"], "tube", "error outside the invariant set") for e in tube["excursions"]]
     events = [*_faults(description), *_joined(outside), *_saturation(bag)]
-    # These hold for vehicle and hardware during the whole flight: one event at the start.
+    # The first two hold for vehicle and hardware during the whole flight: one event at the start.
     for steps, text in (
         ("uncertified_steps", "vehicle outside the set that the tube is certified for"),
         ("uncertified_hardware_steps", "hardware or air that the tube is not certified for"),
+        (
+            "uncertified_rate_steps",
+            "in some steps, altitude or velocity change faster than the bounds are certified for",
+        ),
     ):
         if tube.get(steps):
             events.append(_instant(description["start_s"], "warning", text, "tube_mpc"))
