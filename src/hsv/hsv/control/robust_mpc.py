@@ -12,7 +12,7 @@ from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, validate
 from hsv.control.controller import Controller, ControllerInput
 from hsv.control.design import ControlDesign
-from hsv.control.tube_law import TubeResult, TubeStatusCode, tube_data, tube_memory, tube_step
+from hsv.control.tube_law import TubeResult, TubeStatusCode, TubeStep, tube_data
 from hsv.core import Struct
 from hsv.model.signals import N_RIGID
 
@@ -36,7 +36,7 @@ class RobustMpc(Controller):
         if not 0 <= gain_index < len(gains):
             raise ParameterError(f"parameter robust_mpc.gain_index = {gain_index}: expected 0 to {len(gains) - 1}")
         self.kernel = tube_data(gains[gain_index][None], design.input_minimum, design.input_maximum, design.period)
-        self._memory = tube_memory()
+        self._step = TubeStep(monitored=False)
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign) -> Self:
@@ -48,7 +48,7 @@ class RobustMpc(Controller):
 
     def step(self, inputs: ControllerInput) -> TubeResult:
         """Return the result of this step; its error is x - x_r of the rigid states, and it has no invariant set."""
-        feedback, total, u, _ = tube_step(self.kernel, self._memory, inputs, monitored=False)
+        feedback, total, u, _ = self._step(self.kernel, inputs)
         finite = math.isfinite(total[0]) and math.isfinite(total[1])
         return TubeResult(
             input=u,

@@ -13,6 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -31,7 +32,7 @@ from hsv.control.effectiveness import (
 from hsv.control.hardware import HARDWARE_PARAMETERS, uncovered_hardware
 from hsv.control.nominal_law import level
 from hsv.control.notch_filter import FLOWN_NOTCH_PARAMETERS, NotchSection, discretise, flown_sections
-from hsv.core import Struct, doubles, dtype, lib, records, vector
+from hsv.core import Struct, doubles, dtype, lib, records
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES
 from hsv.model.vehicle import COUPLING_PARAMETER
@@ -97,33 +98,42 @@ def tube_memory() -> np.ndarray:
     return np.zeros((), dtype("hsv_tube_memory"))
 
 
-def tube_step(
-    data: Struct, memory: np.ndarray, inputs: ControllerInput, *, monitored: bool = True
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Return feedback, unsaturated and limited input (2 each) of a step, and the index of its gain (eq. 21, eq. 36).
+class TubeStep:
+    """The step of the law in the core, with its memory and the arrays to which the core has pointers.
 
-    Args:
-        data: Data of the law, see :func:`tube_data`.
-        memory: States of the law, see :func:`tube_memory`; updated.
-        inputs: Inputs of the controller.
-        monitored: Whether to step the notch filter of the plan even if the law itself does not need it.
+    The pointers are made once, because making them takes longer than the step.
     """
-    k, feedback_state, q_f, *others = inputs
-    sizes = (N_STATES, N_INPUTS, N_STATES, N_INPUTS, len(inputs.filter_state))
-    given = [doubles(vector(each), size) for each, size in zip(others, sizes, strict=True)]
-    feedback, unsaturated, limited = (np.empty(N_INPUTS) for _ in range(3))
-    active = lib.hsv_tube_step(
-        data.pointer,
-        records("hsv_tube_memory", memory),
-        k,
-        monitored,
-        len(inputs.filter_state),
-        doubles(vector(feedback_state), N_STATES),
-        q_f,
-        *given,
-        *map(doubles, (feedback, unsaturated, limited)),
-    )
-    return feedback, unsaturated, limited, int(active)
+
+    def __init__(self, memory: np.ndarray | None = None, *, monitored: bool = True) -> None:
+        """Prepare the step.
+
+        Args:
+            memory: States of the law, see :func:`tube_memory`; None: those before step 0.
+            monitored: Whether to step the notch filter of the plan even if the law itself does not need it.
+        """
+        self.memory, self.monitored = tube_memory() if memory is None else memory, monitored
+        sizes = (N_STATES, N_STATES, N_INPUTS, N_STATES, N_INPUTS, 2 * lib.MAX_SECTIONS)
+        self._given = [np.zeros(size) for size in sizes]
+        self._answer = np.zeros((3, N_INPUTS))
+        self._pointers = [*map(doubles, (*self._given, *self._answer))]
+        self._state = records("hsv_tube_memory", self.memory)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(TubeStep, monitored=self.monitored), (self.memory,)
+
+    def __call__(self, data: Struct, inputs: ControllerInput) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+        """Return feedback, unsaturated and limited input (2 each) of a step (eq. 21, 36), and the index of its gain.
+
+        ``data`` is that of :func:`tube_data`.
+        """
+        k, feedback_state, q_f, *others, filter_state = inputs
+        for array, value in zip(self._given, (feedback_state, *others), strict=False):
+            array[:] = value
+        self._given[-1][: len(filter_state)] = filter_state
+        x, *pointers = self._pointers
+        active = lib.hsv_tube_step(data.pointer, self._state, k, self.monitored, len(filter_state), x, q_f, *pointers)
+        feedback, unsaturated, limited = self._answer.copy()
+        return feedback, unsaturated, limited, int(active)
 
 
 def active_gain(data: Struct, step: int) -> int:
@@ -197,7 +207,7 @@ class TubeLaw(Controller):
         self._effectiveness = effectiveness
         self._tau, self._scheduled = design.tau, list(changes)
         self.reset()
-        self._memory = tube_memory()
+        self._step = TubeStep()
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign) -> Self:
@@ -266,8 +276,8 @@ class TubeLaw(Controller):
                 "filter_state", f"filter_state: {size} numbers, expected {due} of the notch filter flown, or none"
             )
         in_loop = size == due
-        planned = filter_state if k == 0 else self._memory["planned"][:size].copy()
-        feedback, total, u, active = tube_step(self.kernel, self._memory, inputs)
+        planned = filter_state if k == 0 else self._step.memory["planned"][:size].copy()
+        feedback, total, u, active = self._step(self.kernel, inputs)
         self._next = k + 1
         error, tube = (inputs.estimate - inputs.reference - inputs.deviation)[:N_RIGID], None
         if in_loop:
@@ -302,5 +312,5 @@ class TubeLaw(Controller):
             u_nominal=inputs.nominal_input,
             tau=self._compact[active],
             status=status,
-            effectiveness=effectiveness_in(self._memory) if self._effectiveness else None,
+            effectiveness=effectiveness_in(self._step.memory) if self._effectiveness else None,
         )
