@@ -2,16 +2,18 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import hsv
-from hsv.base.errors import CampaignError, ScenarioError, TrimError
+from hsv.base.errors import CampaignError, ParameterError, ScenarioError, TrimError
 from hsv.base.units import UnitSystem
 from hsv.control.design import digest
 from hsv.flight.assembly import design_parameters
 from hsv.flight.fingerprint import as_published
+from hsv.gym import TrackEnv, TrackVectorEnv
 
 SHORT = {"duration": "6 s", "fault[0].start": "3 s"}
 
@@ -121,3 +123,27 @@ def test_the_package_itself_imports_nothing_heavy():
     assert done.stdout == "[]\n"
     with pytest.raises(AttributeError, match="no attribute 'flies'"):
         _ = hsv.flies
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: hsv.fly(5), "scenario = 5: expected a scenario of hsv.load, its name, or its path as text"),
+        (lambda: hsv.load(Path("case1")), "scenario = PosixPath('case1'): expected a name, or a path as text"),
+        (lambda: hsv.load("case1", "seed"), "changes = 'seed': expected values by field, such as "),
+        (lambda: hsv.plot({}), "flights = {}: expected at least one flight"),
+        (lambda: hsv.plot(None), "flights = None: expected flights by label"),
+        (lambda: hsv.compare({"a": 1}), "flights['a'] = 1: expected a flight of hsv.fly"),
+        (lambda: hsv.montecarlo("case1", 4, workers=2.5), "workers = 2.5: expected an integer from 0 to 4096"),
+        (lambda: hsv.montecarlo("case1", "many"), "samples = 'many': expected an integer"),
+        (lambda: hsv.montecarlo("case1", 4, seed=1.5), "seed = 1.5: expected an integer"),
+        (lambda: hsv.montecarlo("case1", 4, factors=[1]), "factors = [1]: expected least and largest values by field"),
+        (lambda: TrackEnv(5), "scenario = 5: expected a name, or a path as text"),
+        (lambda: TrackVectorEnv(2.5), "num_envs = 2.5: expected an integer above zero"),
+        (lambda: TrackVectorEnv(0), "num_envs = 0: expected an integer above zero"),
+    ],
+)
+def test_an_argument_of_a_wrong_type_is_named_in_one_line(call, message):
+    with pytest.raises(ParameterError) as refused:
+        call()
+    assert str(refused.value).startswith(message) and "\n" not in str(refused.value)

@@ -1,15 +1,18 @@
 """Exported tables have the values of the bag, with units in the header."""
 
 import csv
+import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from changed_bags import changed_bag
 from pyarrow import parquet
 from scipy.io import loadmat
 
-from hsv.bags.export import Format, export
+from hsv.bags.export import Format, _matlab_names, export
 from hsv.bags.reader import Bag
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import RecordingError
@@ -93,3 +96,17 @@ def test_refuses(bag, tmp_path):
     (tmp_path / "there").mkdir()
     with pytest.raises(RecordingError, match="exists already"):
         export(bag, [STATE], Format.csv, tmp_path / "there")
+
+
+def test_names_of_structures_are_those_that_matlab_reads():
+    names = ["_veh_hsv_state", "7_state", "hsv_state", "hsv_state", "hsv state", "x" * 80, "x" * 90, "incomplete"]
+    found = _matlab_names(names)
+    assert found[:5] == ["x_veh_hsv_state", "x7_state", "hsv_state", "hsv_state_2", "hsv_state_3"]
+    assert len({*found, "incomplete"}) == len(names) + 1
+    assert all(re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name) for name in found)
+
+
+def test_a_bag_in_a_namespace_with_an_underscore_is_exported_for_matlab(bag, tmp_path):
+    moved = changed_bag(bag.path, tmp_path / "moved", lambda topic: replace(topic, name=f"/_veh{topic.name}"))
+    [file] = export(Bag(moved), [f"/_veh{STATE}"], Format.mat, tmp_path / "bag.mat")
+    assert len(loadmat(file, simplify_cells=True)["x_veh_hsv_state"]["time"]) == len(bag.times(STATE))

@@ -277,3 +277,8 @@ def test_an_error_has_at_most_2000_characters(hsv, tmp_path):
     (tmp_path / "long.toml").write_text(f'extends = "case1"\ncontroller = "{"x" * 9000}"\n')
     ran = hsv("simulate", "long.toml")
     assert ran.code == 2 and len(ran.err) <= 2000 and " [...] " in ran.error and ran.err.count("\n") == 1
+
+
+def test_the_head_of_a_help_is_no_failure():
+    ran = subprocess.run("set -o pipefail; hsv -h | head -1", shell=True, executable="/bin/bash", capture_output=True)
+    assert ran.returncode == 0 and not ran.stderr

@@ -101,3 +101,10 @@ def test_a_wrong_vehicle_of_a_design_is_named(folder, own, message):
     with pytest.raises(DesignError) as caught:
         read_inputs(path)
     assert message in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_nominal_scales_that_do_not_decrease_are_refused_with_the_inputs(folder):
+    path = folder / "inputs" / "late.toml"
+    path.write_text('extends = "baseline"\n[nominal]\nscales = [0.1, 1.0]\n')
+    with pytest.raises(DesignError, match=r"nominal.scales = \[0.1, 1.0\]: expected decreasing factors above zero"):
+        read_inputs(path)

@@ -18,6 +18,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from hsv import __all__ as __all__
+from hsv.base.errors import ParameterError, require
 from hsv.base.units import UnitSystem, unit_system
 from hsv.control.linear_model import LinearModel as LinearModel
 from hsv.control.linear_model import linearise as linearise
@@ -42,6 +43,7 @@ def fly(scenario: Scenario | str) -> Flight:
         ScenarioError: A field or the design is wrong; the message names it.
         RunError: A custom controller failed; the message names it, and the step if known.
     """
+    require("scenario", scenario, (str, Scenario), "a scenario of hsv.load, its name, or its path as text")
     return fly_components(assemble_flight(load(scenario) if isinstance(scenario, str) else scenario))
 
 
@@ -68,6 +70,7 @@ def compare(flights: Mapping[str, Flight]) -> dict[str, dict[str, float]]:
 
     A metric that is undefined in a flight, for example because there is no fault, is missing for this flight.
     """
+    _require_flights(flights)
     measured = {label: flight.metrics for label, flight in flights.items()}
     rows = {name: {label: m[name] for label, m in measured.items() if name in m} for name in METRICS}
     return {name: row for name, row in rows.items() if row}
@@ -172,4 +175,15 @@ def plot(
     from hsv.pages.plots import Layout, flight_figure
 
     shown = {"flight": flights} if isinstance(flights, Flight) else flights
+    _require_flights(shown)
     return flight_figure(shown, unit_system(units), layout=Layout.of(panels, start, end, size))
+
+
+def _require_flights(flights: object) -> None:
+    """Raise a ParameterError unless ``flights`` is a mapping with at least one flight, and with nothing else."""
+    require("flights", flights, Mapping, "flights by label")
+    assert isinstance(flights, Mapping)
+    if not flights:
+        raise ParameterError("flights = {}: expected at least one flight")
+    for label, flight in flights.items():
+        require(f"flights[{label!r}]", flight, Flight, "a flight of hsv.fly")

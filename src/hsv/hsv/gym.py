@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from numbers import Integral
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -32,7 +33,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from hsv import core
-from hsv.base.errors import ControllerError, RunError, ScenarioError
+from hsv.base.errors import ControllerError, ParameterError, RunError, ScenarioError, require
 from hsv.control.tube_law import no_tube
 from hsv.core import Struct, lanes, lib
 from hsv.flight.assembly import assemble_flight, without_code
@@ -65,8 +66,9 @@ class _Draws:
     """The set of flights from which every episode is drawn; the arguments are those of :class:`TrackEnv`."""
 
     def __init__(self, scenario: str, scale: float, factors: Factors | None) -> None:
+        text = scenario_text(scenario)
         name = Path(scenario).stem
-        _, distributions = scenario_at_means(scenario_table(scenario_text(scenario), name), name)
+        _, distributions = scenario_at_means(scenario_table(text, name), name)
         drawn = scale or factors or distributions
         self._campaign = None
         if drawn:
@@ -326,6 +328,9 @@ class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         self, num_envs: int = 1, scenario: str = "case1", scale: float = 0.0, factors: Factors | None = None
     ) -> None:
         """Read a scenario for ``num_envs`` environments; other arguments and errors as for :class:`TrackEnv`."""
+        require("num_envs", num_envs, Integral, "an integer above zero")
+        if num_envs < 1:
+            raise ParameterError(f"num_envs = {num_envs}: expected an integer above zero")
         self.num_envs = num_envs
         self.single_observation_space, self.single_action_space = _OBSERVATION, _ACTION
         self.observation_space, self.action_space = (batch_space(space, num_envs) for space in (_OBSERVATION, _ACTION))

@@ -48,6 +48,11 @@ def test_parameters_are_changed(fields, node, name, value):
         ({**LOSS, "parameters": "0.5", "duration": "1e300 s"}, "duration = '1e300 s': expected from 0 to 100000 s"),
         ({"command": "pause", "paused": "perhaps"}, "parameter paused = 'perhaps': expected bool"),
         ({"command": "pace", "real_time_factor": "-1"}, "parameter real_time_factor = -1.0: expected double from 0"),
+        (
+            {"command": "clear", "chanel": ELEVATOR},
+            "chanel: unknown field, expected one of channel, type (did you mean",
+        ),
+        ({"command": "pause", "paused": "true", "tau": "1"}, "tau: unknown field, expected one of paused"),
         ({"command": "tau", "tau": "2"}, "parameter feedback.tau[0] = 2.0: expected"),
     ],
 )

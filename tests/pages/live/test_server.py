@@ -1,5 +1,6 @@
 """The servers for the page and for Foxglove: ports, access, data, commands, and clients that do not read."""
 
+import asyncio
 import json
 import socket
 import urllib.error
@@ -16,7 +17,7 @@ from hsv.bags.description import TOPICS, resolved
 from hsv.base.errors import ParameterError
 from hsv.pages.live.commands import Clear
 from hsv.pages.live.foxglove_server import FoxgloveServer
-from hsv.pages.live.server import PageServer
+from hsv.pages.live.server import LONGEST_REQUEST, MAX_WAITING, PageServer
 from hsv.pages.panels import LIVE_CURVES
 
 A_STEP = 9
@@ -190,3 +191,13 @@ def test_a_latched_topic_is_sent_to_a_client_that_comes_late_and_to_no_other(fox
     for client in clients:
         wait_until(lambda client=client: client.messages["/hsv/actuator"][-1][0] == 4)
         assert client.messages["/hsv/actuator"] == [*sent, (4, b"three")]
+
+
+def test_what_waits_for_a_client_that_never_reads_is_bounded(server):
+    client = PageClient(server.url)
+    words = "x" * (LONGEST_REQUEST - 100)
+    for _ in range(3 * MAX_WAITING):
+        client._socket.send(json.dumps({"token": client.token, "command": words}))
+    other = PageClient(server.url)
+    assert other.ask("land")["accepted"] is False  # by then most requests of the first client are read
+    assert len(asyncio.all_tasks(server._loop)) < MAX_WAITING + 30

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,9 @@ from hsv.base.errors import RecordingError, reason
 
 INCOMPLETE = "incomplete"
 """Name of the file or array with the warnings about an incomplete bag."""
+
+_MATLAB_LETTERS = 63
+"""Maximum length of a name in MATLAB"""
 
 
 class Format(StrEnum):
@@ -101,13 +105,26 @@ def _arrays(bag: Bag, topics: Iterable[str]) -> dict[str, Any]:
 
 def _structures(bag: Bag, topics: Iterable[str]) -> dict[str, Any]:
     structures: dict[str, Any] = {}
-    for topic in topics:
+    topics = [*topics]
+    names = _matlab_names([_file_stem(topic) for topic in topics])
+    for topic, name in zip(topics, names, strict=True):
         fields = {name.replace(".", "_"): field for name, field in _fields(bag, topic).items()}
         values = {
             name: array.astype(object) if array.dtype.kind == "U" else array for name, (array, _) in fields.items()
         }
-        structures[_file_stem(topic)] = values | {"units": {name: unit for name, (_, unit) in fields.items()}}
+        structures[name] = values | {"units": {field: unit for field, (_, unit) in fields.items()}}
     return structures
+
+
+def _matlab_names(names: Sequence[str]) -> list[str]:
+    """Return ``names`` as MATLAB reads them: a letter first, at most 63 letters, digits and underscores, and unique."""
+    found = [INCOMPLETE]
+    for name in names:
+        usable = re.sub(r"\W", "_", name, flags=re.ASCII)
+        usable = usable if re.match("[A-Za-z]", usable) else f"x{usable}"
+        ends = ("", *(f"_{number}" for number in range(2, len(names) + 2)))
+        found.append(next(n for n in (usable[: _MATLAB_LETTERS - len(end)] + end for end in ends) if n not in found))
+    return found[1:]
 
 
 def _file_stem(topic: str) -> str:

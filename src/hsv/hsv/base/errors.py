@@ -73,6 +73,12 @@ class ParameterError(HsvError, ValueError):
     """A parameter of a node or component with a wrong name, type, size or value."""
 
 
+def require(argument: str, value: object, kinds: type | tuple[type, ...], expected: str) -> None:
+    """Raise a ParameterError that names an ``argument`` of a function whose value is of none of the ``kinds``."""
+    if not isinstance(value, kinds) or isinstance(value, bool):
+        raise ParameterError(f"{argument} = {' '.join(repr(value).split())[:80]}: expected {expected}")
+
+
 def one_of(known: Iterable[str], name: str, also: str = "") -> str:
     """Return "one of ", the ``known`` names, the text ``also``, and a hint if a known name resembles ``name``."""
     return f"one of {', '.join(known := [*known])}{also}{did_you_mean(name, known)}"

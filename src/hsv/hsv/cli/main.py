@@ -184,7 +184,8 @@ def run(prog: str, commands: Mapping[str, Command], description: str, moved: Map
             raise
         _fail(f"needs hsv[{extra}]: pip install './src/hsv[{extra}]'", 2)
     except BrokenPipeError:
-        _end(1)  # The reader of the pipe is gone; end silently, as click and rich do.
+        # The reader of the pipe is gone; end silently, as click and rich do. Who reads the head of a help has it.
+        _end(0 if {*_HELP} & {*words} else 1)
     except OSError as error:
         # The system names a file that it fails to open, but not an output that it fails to write.
         place = f"{error.filename}: cannot be opened" if error.filename else "output: cannot be written"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
@@ -171,6 +172,13 @@ class NominalInputs(_Table):
     state_scale: RigidScale
     input_scale: InputSize
     input_bound: InputSize
+
+    @field_validator("scales")
+    @classmethod
+    def _decreasing(cls, scales: list[float]) -> list[float]:
+        if any(a <= b for a, b in pairwise(scales)):
+            raise ValueError(f"scales = {scales}: expected decreasing factors above zero")
+        return scales
 
 
 class NotchInputs(_Table):

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, StrictInt, ValidationError
 
-from hsv.base.errors import DocumentError, HsvError, ParameterError, ScenarioError, one_of
+from hsv.base.errors import DocumentError, HsvError, ParameterError, ScenarioError, one_of, require
 from hsv.base.files import follow_extends, is_path, parse_toml, read_text
 from hsv.base.parameters import Parameter, table_values
 from hsv.control.controller import SHIPPED_CONTROLLERS
@@ -164,6 +164,7 @@ def scenario_text(name: str) -> str:
     Raises:
         ScenarioError: A scenario or vehicle cannot be found or read, or a library lies outside the scenario's folder.
     """
+    require("scenario", name, str, "a name, or a path as text")
     text = _own_text(name)
     own = scenario_table(text, name)
     whole = follow_extends(
@@ -253,6 +254,7 @@ def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Sce
     """
     text = scenario_text(name)
     if changes:
+        require("changes", changes, Mapping, 'values by field, such as {"fault[0].start": "90 s"}')
         table = scenario_table(text, name)
         for field, value in changes.items():
             set_field(table, field, value, name)

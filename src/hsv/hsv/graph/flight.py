@@ -40,6 +40,9 @@ def fly_graph(
             close_bag(prepared.bag)
             _remove_without_steps(prepared.bag)
         raise
+    finally:
+        if prepared.folder:
+            prepared.folder.cleanup()
     close_bag(prepared.bag, failures)
 
 

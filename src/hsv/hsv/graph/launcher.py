@@ -241,16 +241,17 @@ class Launcher:
 
     def _read(self, process: _Process) -> None:
         assert process.popen.stdout is not None
-        for line in process.popen.stdout:
-            text = line.rstrip()
-            self._flying |= text.startswith("step ")
-            if process.description in _FLYING and text.startswith("step "):
-                self._on_step(int(text.split()[1]))
-            elif text:
-                # A crashed interpreter lists its extension modules, which explain nothing.
-                if not text.startswith("Extension modules:"):
-                    process.words.append(text)
-                self._on_line(process.description.label, text)
+        with process.popen.stdout as lines:
+            for line in lines:
+                text = line.rstrip()
+                self._flying |= text.startswith("step ")
+                if process.description in _FLYING and text.startswith("step "):
+                    self._on_step(int(text.split()[1]))
+                elif text:
+                    # A crashed interpreter lists its extension modules, which explain nothing.
+                    if not text.startswith("Extension modules:"):
+                        process.words.append(text)
+                    self._on_line(process.description.label, text)
 
 
 def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.socket:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import datetime
+import fcntl
+import os
+import shutil
 import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +17,8 @@ from typing import Any
 from hsv.bags.description import COMPOSED, CONTROLLER, LIVE, NodeDescription, controller_node, graph
 from hsv.bags.infrastructure_parameters import STEP_TIMEOUT
 from hsv.bags.parameter_sections import ParameterSections
-from hsv.base.errors import ParameterError, QuantityError, RecordingError, RunError
+from hsv.base.errors import DocumentError, ParameterError, QuantityError, RecordingError, RunError
+from hsv.base.files import open_regular
 from hsv.control.controller import NODE
 from hsv.control.design import DESIGN_PARAMETERS, NO_DESIGN, digest
 from hsv.control.design_file import attached_certificate, design_files, find_certificate, find_design, read_design
@@ -23,6 +28,34 @@ from hsv.graph.exclusive import ports
 from hsv.graph.launcher import executable
 from hsv.plugins.controllers import library_record
 from hsv.plugins.library import library_digest
+
+
+class RunFolder(tempfile.TemporaryDirectory[str]):
+    """A temporary folder for the files of a run; a new one removes those of runs that were killed.
+
+    A run holds the lock of the file ``lock`` in its folder, which the system releases when the run has ended.
+    """
+
+    def __init__(self) -> None:
+        for lock in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*/lock"):
+            with suppress(OSError, DocumentError):
+                if lock.parent.lstat().st_uid == os.getuid():
+                    with open_regular(lock) as stream:
+                        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                        shutil.rmtree(lock.parent)
+        super().__init__(prefix=_PREFIX)
+        new = Path(self.name, "new")
+        self._held = new.open("wb")
+        fcntl.flock(self._held, fcntl.LOCK_EX)
+        new.rename(Path(self.name, "lock"))  # locked before it has its name, so that no other run removes it
+
+    def cleanup(self) -> None:
+        """Remove the folder."""
+        self._held.close()
+        super().cleanup()
+
+
+_PREFIX = "hsv_run_"
 
 
 @dataclass(frozen=True)
@@ -37,8 +70,8 @@ class PreparedRun:
     """Number of the last step if the flight does not diverge."""
     step_timeout: float
     """Wall time (s) after which a silent node ends the run."""
-    folder: tempfile.TemporaryDirectory[str] | None
-    """Temporary folder of the parameter files, removed with this object; ``None`` if the caller gave a folder."""
+    folder: RunFolder | None
+    """Temporary folder of the parameter files, removed after the flight; ``None`` if the caller gave a folder."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +144,7 @@ def prepare(
     steps = assemble_flight(scenario, design).plant.steps
     temporary = None
     if folder is None:
-        temporary = tempfile.TemporaryDirectory(prefix="hsv_run_")
+        temporary = RunFolder()
         folder = Path(temporary.name)
     folder = folder.absolute()
     folder.mkdir(parents=True, exist_ok=True)

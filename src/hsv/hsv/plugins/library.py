@@ -196,7 +196,7 @@ def _text(value: bytes | None, field: str) -> str:
 
 def library_place(controller: str) -> tuple[Path, str] | None:
     """Return path and symbol of a controller in a shared library, or path and "" of one in an FMU; None for others."""
-    if controller.endswith(".fmu"):
+    if controller.lower().endswith(".fmu"):
         return Path(controller), ""
     path, _, symbol = controller.rpartition(":")
     return (Path(path), symbol) if "/" in path or path.endswith(".so") else None

@@ -7,13 +7,14 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 import tomli_w
 
-from hsv.base.errors import CampaignError, one_of
+from hsv.base.errors import CampaignError, one_of, require
 from hsv.base.files import parse_json
 from hsv.base.units import percent, rounded, written
 from hsv.control.design import design_of
@@ -244,6 +245,9 @@ def plan(
     Raises:
         CampaignError, ScenarioError, DesignError: A setting is wrong; the message names it.
     """
+    for argument, value, kind in (("samples", samples, Integral), ("seed", seed, Integral), ("scale", scale, Real)):
+        require(argument, value, kind, "an integer" if kind is Integral else "a number")
+    require("factors", {} if factors is None else factors, Mapping, "least and largest values by field")
     text = scenario_text(scenario_name)
     name = Path(scenario_name).stem
     table = scenario_table(text, name)

@@ -18,11 +18,12 @@ from hashlib import sha256
 from importlib.metadata import version
 from itertools import islice
 from multiprocessing.process import BaseProcess
+from numbers import Integral
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from hsv.base.errors import CampaignError, RunError, reason
+from hsv.base.errors import CampaignError, RunError, reason, require
 from hsv.base.processes import ctrl_c_held_back, end_with_parent
 from hsv.flight.fingerprint import DIGITS, code_digest
 
@@ -276,6 +277,7 @@ def make_executor(workers: int, scheduler: str = "", notice: Notice = lambda wor
             workers, or one of them does not answer, lacks the library or has another version of it.
         RunError: A worker process cannot be started.
     """
+    require("workers", workers, Integral, "an integer from 0 to 4096")
     if not 0 <= workers <= 4096:
         raise CampaignError(f"workers = {workers}: expected 0 to 4096")
     if scheduler:

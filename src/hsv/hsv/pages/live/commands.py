@@ -53,7 +53,11 @@ def read_command(fields: Mapping[str, Any]) -> Command:
     name = _text(fields, "command")
     if name not in _COMMANDS:
         raise ParameterError(f"command = {name!r}: expected {one_of(_COMMANDS, name)}")
-    return _COMMANDS[name](fields)
+    reads, allowed = _COMMANDS[name]
+    for field in fields:
+        if field not in (*allowed, *_OF_EVERY_REQUEST):
+            raise ParameterError(f"{field}: unknown field, expected {one_of(allowed, field)}")
+    return reads(fields)
 
 
 def _inject(fields: Mapping[str, Any]) -> Command:
@@ -74,13 +78,16 @@ def _change(name: str, field: str) -> Callable[[Mapping[str, Any]], Command]:
     return lambda fields: Change(node, parameter, parse(_text(fields, field), parameter))
 
 
-_COMMANDS: dict[str, Callable[[Mapping[str, Any]], Command]] = {
-    "pause": _change("paused", "paused"),
-    "pace": _change("real_time_factor", "real_time_factor"),
-    "tau": _change("feedback.tau", "tau"),
-    "inject": _inject,
-    "clear": _clear,
+_COMMANDS: dict[str, tuple[Callable[[Mapping[str, Any]], Command], tuple[str, ...]]] = {
+    "pause": (_change("paused", "paused"), ("paused",)),
+    "pace": (_change("real_time_factor", "real_time_factor"), ("real_time_factor",)),
+    "tau": (_change("feedback.tau", "tau"), ("tau",)),
+    "inject": (_inject, ("channel", "type", "parameters", "duration")),
+    "clear": (_clear, ("channel", "type")),
 }
+"""The reader of each command, and its fields"""
+
+_OF_EVERY_REQUEST = ("command", "id", "token")
 
 
 def _text(fields: Mapping[str, Any], name: str, default: str | None = None) -> str:

@@ -33,6 +33,9 @@ LAYOUT = "/foxglove.json"
 LONGEST_REQUEST = 10_000
 """Maximum length (bytes) of a request."""
 
+MAX_WAITING = 100
+"""Maximum number of answers that wait until a client reads them; further ones are dropped."""
+
 GOING_AWAY = 1001
 """WebSocket close code of a server that stops."""
 
@@ -143,11 +146,11 @@ class PageServer:
         return response
 
     async def _serve(self, connection: ServerConnection) -> None:
-        sender = asyncio.create_task(self._send(connection))
+        sender, waiting = asyncio.create_task(self._send(connection)), set[asyncio.Task[None]]()
         self._senders.add(sender)
         try:
             async for text in connection:
-                self._receive(connection, text)
+                self._receive(connection, text, waiting)
         except ConnectionClosed:
             pass
         finally:
@@ -171,13 +174,19 @@ class PageServer:
                     await connection.send(rows.tobytes())
                 await asyncio.sleep(PERIOD)
 
-    def _receive(self, connection: ServerConnection, text: str | bytes) -> None:
+    def _receive(self, connection: ServerConnection, text: str | bytes, waiting: set[asyncio.Task[None]]) -> None:
         """Validate a request and queue its command, or reply why it is rejected."""
         number: Any = None
 
         def answer(values: dict[str, Any]) -> None:
             words = json_text({"kind": "answer", "id": number, **values})
-            self._loop.call_soon_threadsafe(lambda: self._loop.create_task(_send_quietly(connection, words)))
+            self._loop.call_soon_threadsafe(send, words)
+
+        def send(words: str) -> None:
+            if len(waiting) < MAX_WAITING:  # otherwise the client does not read
+                task = self._loop.create_task(_send_quietly(connection, words))
+                waiting.add(task)
+                task.add_done_callback(waiting.discard)
 
         try:
             fields = _fields(text)
