@@ -168,6 +168,10 @@ def run(prog: str, commands: Mapping[str, Command], description: str, moved: Map
         if sys.stdout:
             sys.stdout.flush()
         sys.exit(code)
+    except SystemExit:
+        if {*_HELP} & {*words}:
+            _end(0)  # rich ends with 1 if the reader of a help has read enough
+        raise
     except UsageError as error:
         _fail(_usage(error, prog), 2)
     except RunError as error:
@@ -184,8 +188,7 @@ def run(prog: str, commands: Mapping[str, Command], description: str, moved: Map
             raise
         _fail(f"needs hsv[{extra}]: pip install './src/hsv[{extra}]'", 2)
     except BrokenPipeError:
-        # The reader of the pipe is gone; end silently, as click and rich do. Who reads the head of a help has it.
-        _end(0 if {*_HELP} & {*words} else 1)
+        _end(1)  # The reader of the pipe is gone; end silently, as click and rich do.
     except OSError as error:
         # The system names a file that it fails to open, but not an output that it fails to write.
         place = f"{error.filename}: cannot be opened" if error.filename else "output: cannot be written"
