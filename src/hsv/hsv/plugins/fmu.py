@@ -27,7 +27,8 @@ from hsv.control.controller import CONTROLLER_INPUTS, CONTROLLER_OUTPUTS, FOREIG
 from hsv.model.plant import PLANT_PARAMETERS
 from hsv.model.signals import ESTIMATE, MEASUREMENT, SignalType, numbers_of
 from hsv.model.vehicle import Vehicle
-from hsv.plugins.library import CBlock, LibraryClass, LibraryController
+from hsv.plugins.library import LibraryClass, LibraryController
+from hsv.plugins.library_answers import CBlock
 
 _INPUTS = [
     number

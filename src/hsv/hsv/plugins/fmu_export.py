@@ -20,7 +20,8 @@ import numpy as np
 from hsv.base.errors import ParameterError
 from hsv.base.units import base_units
 from hsv.model.signals import SignalType, numbers_of
-from hsv.plugins.library import CBlock, load_block
+from hsv.plugins.library import load_block
+from hsv.plugins.library_answers import CBlock
 
 _SOURCE = "fmu.c"
 _HEADER = "fmu_block.h"

@@ -10,7 +10,7 @@ import hashlib
 import re
 from collections.abc import Mapping
 from ctypes import POINTER, Structure, c_char_p, c_double, c_int64, c_void_p
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from types import SimpleNamespace
@@ -34,6 +34,7 @@ from hsv.control.notch_filter import NotchFilter
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import N_INPUTS, SignalType
 from hsv.model.vehicle import Vehicle
+from hsv.plugins.library_answers import CBlock
 from hsv.plugins.library_process import library_user
 
 ABI_VERSION = 1
@@ -71,22 +72,6 @@ class _Block(Structure):
         ("parameter_count", c_int64),
         ("parameters", POINTER(_Parameter)),
     ]
-
-
-@dataclass(frozen=True)
-class CBlock:
-    """The checked description of a block that a library exports."""
-
-    name: str
-    source: str
-    """Path of the source relative to the library's folder, or empty"""
-    address: int
-    """Address of the step function in the process that loaded the library."""
-    state_size: int
-    inputs: tuple[SignalType, ...]
-    outputs: tuple[SignalType, ...]
-    parameters: tuple[Parameter, ...]
-    """Parameters, named ``block.parameter``, in the order in which the step function receives their values"""
 
 
 def include_folder() -> Path:

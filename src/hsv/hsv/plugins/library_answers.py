@@ -10,9 +10,9 @@ import json
 import os
 import struct
 import time
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from select import POLLIN, poll
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,12 +22,26 @@ from hsv.base.parameters import Parameter
 from hsv.model.signals import SignalType
 
 if TYPE_CHECKING:
-    from hsv.plugins.library import CBlock
-
 _HEADER = struct.Struct("<4scq")
 _MARK = b"hsv1"
 _MOST = 2**28
 """Maximum length (bytes) of an answer"""
+
+
+@dataclass(frozen=True)
+class CBlock:
+    """The checked description of a block that a library exports."""
+
+    name: str
+    source: str
+    """Path of the source relative to the library's folder, or empty"""
+    address: int
+    """Address of the step function in the process that loaded the library."""
+    state_size: int
+    inputs: tuple[SignalType, ...]
+    outputs: tuple[SignalType, ...]
+    parameters: tuple[Parameter, ...]
+    """Parameters, named ``block.parameter``, in the order in which the step function receives their values"""
 
 
 def send_answer(descriptor: int, answer: Any) -> None:
@@ -103,8 +117,6 @@ def _unpacked(kind: bytes, content: bytes) -> Any:
 
 def _block(fields: dict[str, Any]) -> CBlock:
     """Return the description of a block from its ``fields``, with the types that it must have."""
-    from hsv.plugins.library import CBlock
-
     parameters = []
     for given in fields["parameters"]:
         default = [float(each) for each in np.ravel(given["default"])]

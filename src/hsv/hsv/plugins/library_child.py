@@ -26,8 +26,8 @@ import numpy as np
 from hsv.base.errors import HsvError, ProcessError, RunError
 from hsv.control.controller import call_step_function
 from hsv.plugins.fmu import LoadedFmu
-from hsv.plugins.library import CBlock, load_block
-from hsv.plugins.library_answers import send_answer
+from hsv.plugins.library import load_block
+from hsv.plugins.library_answers import CBlock, send_answer
 from hsv.plugins.library_process import SharedMemory, use_in_this_process
 
 

@@ -20,15 +20,12 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from hsv.base.errors import ProcessError
-from hsv.plugins.library_answers import receive_answer
-
-if TYPE_CHECKING:
-    from hsv.plugins.library import CBlock
+from hsv.plugins.library_answers import CBlock, receive_answer
 
 NO_PROGRESS = 20.0
 """Time (s) without progress after which a child is ended, while it loads the library or steps it."""
@@ -81,8 +78,6 @@ class LibraryProcess:
             ParameterError: There is no such block, or it is wrong.
             ProcessError: The child crashed or hangs.
         """
-        from hsv.plugins.library import CBlock
-
         with self._lock:
             self._renew()
             if symbol not in self._blocks:
