@@ -21,7 +21,6 @@ from hsv.base.errors import HsvError, ProcessError
 from hsv.base.parameters import Parameter
 from hsv.model.signals import SignalType
 
-if TYPE_CHECKING:
 _HEADER = struct.Struct("<4scq")
 _MARK = b"hsv1"
 _MOST = 2**28
