@@ -65,7 +65,15 @@ coverage: setup ## set up, then measure how much of the flight's packages and co
 		-m "not (long or fuzz)" tests/core/test_binding.py tests/flight/test_golden_flights.py
 	@cd src/hsv && find build/coverage -name scalar.gcda -exec gcov -n {} + | grep -A 1 "'hsv/core/.*\.h'"
 
-lint: setup ## set up, then check style, types and the direction of imports
+# Pinned by themselves, because make setup does not install them.
+.venv/hsv-lint: requirements-lint.txt
+	@source ./env.sh && python3 -m pip install --quiet --requirement requirements-lint.txt && touch $@
+
+lint: setup ## set up, then check style, spelling, types and the direction of imports
+	@$(MAKE) --no-print-directory --silent .venv/hsv-lint
+	@source ./env.sh && clang-format --dry-run --Werror $$(git ls-files '*.c' '*.h' '*.cpp') && taplo lint --no-schema $$(git ls-files '*.toml') 2> /dev/null && \
+		yamllint --strict $$(git ls-files '*.yml' '*.yaml' .yamllint) && codespell $$(git ls-files) && \
+		check-jsonschema --quiet --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	@source ./env.sh && ruff check $(PYTHON_SOURCES) && ruff format --check --quiet $(PYTHON_SOURCES) && mypy && lint-imports --no-logo --verbose
 
 # Versions move only if named: make locks ARGS="--upgrade-package scipy"; --upgrade moves all, those of ROS too.

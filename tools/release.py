@@ -13,6 +13,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 
+MAINTAINER = '<maintainer email="maintainers@example.org">HSV bench maintainers</maintainer>'
+"""Name and address in every package.xml; to be filled in by the owner of a repository, here and nowhere else."""
+
 
 def released(root: Path, version: str, date: str) -> dict[Path, str]:
     """Return the new text of every file below ``root`` that a release changes, by path.
@@ -38,6 +41,7 @@ def released(root: Path, version: str, date: str) -> dict[Path, str]:
         if path.name == "package.xml" and [*map(int, found[0].split("."))] >= [*map(int, version.split("."))]:
             raise ValueError(f"version = {version!r}: expected one above {found[0]}, of {path}")
         texts[path] = re.sub(pattern, new, text, flags=re.MULTILINE)
+        texts[path] = re.sub("<maintainer .*</maintainer>", MAINTAINER, texts[path])
     return texts
 
 

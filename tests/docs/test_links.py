@@ -55,6 +55,14 @@ def test_the_hosted_workflow_builds_the_site_and_tests_with_a_full_installation(
     assert "make docs" in commands and "make test-ros" in commands
 
 
+def test_the_nightly_workflow_runs_what_takes_too_long_for_every_push():
+    [job] = yaml.safe_load((ROOT / ".github" / "workflows" / "nightly.yml").read_text(encoding="utf-8"))["jobs"].values()
+    targets = job["strategy"]["matrix"]["target"]
+    assert targets == ["test-long", "fuzz", "test-portability", "coverage"]
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert all(f"\n{target}: setup ##" in makefile for target in targets)
+
+
 def test_what_the_commands_of_the_readme_write_is_ignored_by_git():
     written = re.findall(r"--(?:bag|out) ((?!docs/)\w+/[^\s`]+)", (ROOT / "README.md").read_text(encoding="utf-8"))
     written += ["bags/case1_20260101T000000Z", "campaigns/case1.parquet", "tutorial/first", "resilience/report.html"]

@@ -15,7 +15,7 @@ from catkin_pkg.package import parse_package
 from packaging.specifiers import SpecifierSet
 
 import hsv
-from release import released
+from release import MAINTAINER, released
 
 ROOT = Path(__file__).parents[2]
 
@@ -68,9 +68,10 @@ def test_a_package_declares_what_it_imports_and_nothing_else(manifest):
 @pytest.mark.parametrize(
     "manifest", [*MANIFESTS, *ROOT.glob("examples/*/package.xml")], ids=lambda path: path.parent.name
 )
-def test_a_package_names_its_authors_its_site_and_its_license(manifest):
+def test_a_package_names_its_authors_its_maintainer_and_its_license(manifest):
     package = parse_package(str(manifest))
-    assert package.authors and package.urls and package.licenses == ["Apache-2.0"]
+    assert package.authors and package.maintainers and package.licenses == ["Apache-2.0"]
+    assert MAINTAINER in manifest.read_text(encoding="utf-8")
     assert (manifest.parent / "LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()
 
 
