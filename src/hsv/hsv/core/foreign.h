@@ -32,8 +32,8 @@ static inline int intact(const double *behind)
 
 /* Call a step function and write its first "count" outputs to "out"; outputs that it does not set are NaN. Return its
  * result, or OVERRUN if it wrote behind its outputs. Not inlined: no arithmetic may move to before the restoration. */
-static __attribute__((noinline, unused)) int32_t call_step(const hsv_call *call, int64_t k, const double *in, double *out,
-                                                   int count)
+static __attribute__((noinline, unused)) int32_t call_step(const hsv_call *call, int64_t k, const double *in,
+                                                           double *out, int count)
 {
     double own[INPUTS + 1 + GUARDS];
     for (int i = 0; i < count; i++) own[i] = __builtin_nan("");

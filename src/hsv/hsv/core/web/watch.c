@@ -10,8 +10,9 @@ int64_t hsv_watch(hsv_flight *flight, Loop *loop, double *effector, double *leve
         loop->levels.worst = -INFINITY; /* the level of this step alone */
         if ((done = hsv_fly(SSE2, 1, &flight, loop, k, k + 1, SENSE | ACT)) < 0) return done;
         for (int j = 0; j < INPUTS; j++)
-            effector[INPUTS * k + j] = loop->equipped ? flight->plant_memory->effector[j]
-                                                      : limited(loop->actuator[j], stops->minimum[j], stops->maximum[j]);
+            effector[INPUTS * k + j] = loop->equipped
+                                           ? flight->plant_memory->effector[j]
+                                           : limited(loop->actuator[j], stops->minimum[j], stops->maximum[j]);
         levels[k] = flight->worst;
         if (flight->ended == k + 1) break;
         flight->history += HISTORY, flight->auxiliary += AUXILIARY;
