@@ -1,0 +1,55 @@
+"""Borders of stability: flights on both sides of the computed ones; and which scenarios have no margins, and why."""
+
+import pytest
+
+from hsv.base.errors import ScenarioError
+from hsv.control.design_file import find_design, read_design
+from hsv.flight.assembly import flight_parameters
+from hsv.flight.margins import corner_file, flown_borders, scenario_loops
+from hsv.flight.scenario import load_scenario, parse_scenario
+
+
+@pytest.mark.parametrize("name", ["case1", "case1_tight", "case1_robust", "winged_cone", "case1_realistic"])
+def test_flights_lose_stability_where_the_loop_does(name):
+    scenario = load_scenario(name)
+    design = read_design(find_design(scenario.design))
+    borders = flown_borders(flight_parameters(scenario), design, scenario_loops(scenario))
+    assert [border.kind for border in borders] == ["gain up", "gain down", "delay"]
+    for border in borders:
+        inside, outside = border.flown_growth
+        assert inside < 0.0 < outside, border
+        assert border.flown_frequency == pytest.approx(border.frequency, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "reason"),
+    [
+        ("case1_rmpc", {}, "controller = 'robust_mpc'"),
+        ("case1_qp", {}, "nominal.law = 'qp': solved in flight"),
+        ("case2", {}, "tau"),
+        ("case1_active", {}, "effectiveness"),
+        ("case1_integral_heavy", {}, "integral"),
+        ("case1", {"estimator.enabled": True}, "estimator"),
+        ("case1", {"link.command.jitter": 2}, "link: random jitter"),
+        ("case1", {"controller": "node:lqr", "design": ""}, "design = ''"),
+    ],
+)
+def test_no_margins_of_another_loop_are_given(name, changes, reason):
+    with pytest.raises(ScenarioError, match="no margins: ") as refused:
+        scenario_loops(load_scenario(name, changes))
+    assert reason in str(refused.value)
+
+
+def test_hardware_and_delay_of_the_scenario_are_in_the_loop():
+    delays = ("0 ms", "30 ms")
+    plain, late = (scenario_loops(load_scenario("case1_realistic", {"link.computational_delay": d})) for d in delays)
+    assert [actuator.natural_frequency for actuator in plain.feedback.hardware.actuators] == [10.0, 50.0]
+    assert late.feedback.hardware.delay == pytest.approx(plain.feedback.hardware.delay + 0.03)
+    assert late.loop("", "start").growth > plain.loop("", "start").growth
+
+
+def test_a_corner_is_a_scenario():
+    scenario = load_scenario("case1_robust")
+    around = scenario_loops(scenario)
+    corner = parse_scenario(corner_file(scenario, around, "-+-----++-"), "corner")
+    assert corner.vehicle.perturbation == pytest.approx(around.changes("-+-----++-"))
