@@ -5,7 +5,7 @@ import pytest
 from hsv.base.errors import ScenarioError
 from hsv.control.design_file import find_design, read_design
 from hsv.flight.assembly import flight_parameters
-from hsv.flight.margins import corner_file, flown_borders, scenario_loops
+from hsv.flight.margins import corner_file, flown_borders, margin_verdict, scenario_loops
 from hsv.flight.scenario import load_scenario, parse_scenario
 
 
@@ -53,3 +53,11 @@ def test_a_corner_is_a_scenario():
     around = scenario_loops(scenario)
     corner = parse_scenario(corner_file(scenario, around, "-+-----++-"), "corner")
     assert corner.vehicle.perturbation == pytest.approx(around.changes("-+-----++-"))
+
+
+def test_a_required_disk_margin_is_judged_by_the_certificate():
+    kept, words = margin_verdict(load_scenario("case1_robust"))
+    assert kept and words == "disk margin 0.900 (limit 0.85)"
+    assert margin_verdict(load_scenario("case1_robust", {"limits.disk_margin": 0.95}))[0] is False
+    solved = load_scenario("case1_qp", {"limits.disk_margin": 0.5})
+    assert margin_verdict(solved) == (None, "disk margin not judged: hsv margins case1_qp")

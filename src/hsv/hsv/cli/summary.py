@@ -63,6 +63,12 @@ def report_flight(
     finished = flight.ending == "finished"
     judged = verdicts(scenario, flight.metrics, ended=finished)
     kept = finished and all(verdict.within for verdict in judged.values())
+    margin_kept, margin_words = None, ""
+    if scenario.disk_margin is not None:
+        from hsv.flight.margins import margin_verdict
+
+        margin_kept, margin_words = margin_verdict(scenario)
+        kept = kept and margin_kept is not False
     factor = time / wall_time if wall_time else None
     same = as_published(flight.fingerprint, scenario, flight.design_hash)
     if json:
@@ -72,6 +78,7 @@ def report_flight(
                 "diverged_at_s": time if flight.ending == "diverged" else None,
                 "within_limits": kept,
                 "not_judged": not_judged(judged, flight.metrics),
+                **({"disk_margin": {"kept": margin_kept, "words": margin_words}} if margin_words else {}),
                 "metrics": output.to_json({name: (v, METRICS[name].unit) for name, v in flight.metrics.items()}, units),
                 "fingerprint": flight.fingerprint,
                 "as_published": same,
@@ -95,6 +102,7 @@ def report_flight(
         print_metrics(scenario.title, flight.metrics, units, judged, every)
         output.print_section("run", run)
         words = verdict_sentence(judged, flight.metrics, units) if every else limits_kept(judged, units)
+        words = "; ".join(filter(None, (words, margin_words)))
         style = "bold red" if not kept else "bold green" if judged else "bold"
         output.console.print(Text.assemble(("verdict ", "bold"), (words, style)))
     if flight.ending == "diverged":
@@ -102,7 +110,7 @@ def report_flight(
     if not finished:
         raise RunError(f"flight broken off at t = {time:.2f} s of {scenario.duration:.2f} s")
     if strict and not kept:
-        raise RunError(limits_kept(judged, units))
+        raise RunError("; ".join(filter(None, (limits_kept(judged, units), margin_words))))
 
 
 def print_metrics(

@@ -10,10 +10,19 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from hsv.base.errors import ScenarioError
+from hsv.base.errors import HsvError, ScenarioError
 from hsv.certificate.loops import Feedback, Hardware, vertex_loops
-from hsv.certificate.margins import LoopMargins, Place, VehicleLoops, WorstCorner, classical_margins, margins_of
+from hsv.certificate.margins import (
+    LoopMargins,
+    Place,
+    VehicleLoops,
+    WorstCorner,
+    classical_margins,
+    is_proved,
+    margins_of,
+)
 from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_certificate, find_design, read_certificate, read_design
 from hsv.control.tube_law import TubeLaw
 from hsv.flight.assembly import assemble_flight, assemble_with
 from hsv.flight.closed_loop import Components, fly
@@ -191,6 +200,29 @@ def scenario_loops(scenario: Scenario) -> VehicleLoops:
         places["fault"] = Place(points[-1], float(np.prod(lost)))
     own = dict(scenario.vehicle.perturbation)
     return VehicleLoops(feedback, initial_trim(values)[0], scenario.vehicle.described.uncertainty, places, own)
+
+
+def margin_verdict(scenario: Scenario) -> tuple[bool | None, str]:
+    """Return whether the design of a scenario has the disk margin that the scenario requires, and a line that says so.
+
+    The margin is that of the elevator loop at the worst vertex, from the certificate; the pencil verifies it there. It
+    is not judged (None) without such a block, or if the loop of the scenario is not that of F.
+    """
+    required, not_judged = scenario.disk_margin, f"disk margin not judged: hsv margins {scenario.name}"
+    try:
+        refuse_other_loops(scenario)
+        design = read_design(find_design(scenario.design))
+        certificate = find_certificate(scenario.design)
+        stated = read_certificate(certificate)["margins"]["vertices"]["elevator"]["margin"] if certificate else []
+        loops = vertex_loops(design)
+        verified = len(stated) == len(loops) and all(
+            is_proved(loop.broken("elevator"), margin) for loop, margin in zip(loops, stated, strict=True)
+        )
+    except (HsvError, LookupError, TypeError):
+        return None, not_judged
+    if required is None or not verified or np.any(design.tau < 1.0):
+        return None, not_judged
+    return min(stated) >= required, f"disk margin {min(stated):.3f} (limit {required:g})"
 
 
 def corner_file(scenario: Scenario, around: VehicleLoops, corner: str) -> str:

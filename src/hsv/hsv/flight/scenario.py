@@ -72,6 +72,8 @@ class Scenario(Table):
     """Tables of a custom controller, as written in the file; only the class of the controller can interpret them"""
     limits: dict[str, float] = Field(default_factory=dict)
     """Largest admissible magnitudes of metrics, SI, by name"""
+    disk_margin: float | None = None
+    """Smallest admissible disk margin of the elevator loop, from the table of limits; None: none is required"""
 
     @property
     def commands(self) -> Breakpoints:
@@ -141,7 +143,9 @@ _LIMITS = tuple(
     for name, metric in METRICS.items()
 )
 
-_NO_KEYS = ("name", "own", "settings")
+_DISK_MARGIN = Parameter("limits.disk_margin", 0.0, "smallest disk margin of the elevator loop", "", 0.0, 2.0)
+
+_NO_KEYS = ("name", "own", "settings", "disk_margin")
 """Fields of a scenario that are not keys of its file."""
 
 _CONTROLLER_TABLES = dict.fromkeys(("tube", "integral", "effectiveness"), "tube_mpc") | {"robust_mpc": "robust_mpc"}
@@ -315,6 +319,8 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
     vehicle = {"coupling": "", **table.get("vehicle", {})}
     try:
         reading = Reading(VehicleTable.model_construct(**vehicle).described)
+        limits = table_values((*_LIMITS, _DISK_MARGIN), {"limits": table.get("limits", {})})
+        required = limits.pop(_DISK_MARGIN.name, None)
         faults = table.get("fault", ())
         given = {
             **table,
@@ -329,10 +335,8 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
             ]
             if isinstance(faults, list | tuple)
             else faults,
-            "limits": {
-                name.removeprefix("limits."): value
-                for name, value in table_values(_LIMITS, {"limits": table.get("limits", {})}).items()
-            },
+            "limits": {name.removeprefix("limits."): value for name, value in limits.items()},
+            "disk_margin": required,
             "vehicle": vehicle,
         }
         scenario = Scenario.model_validate(given, context=reading)
