@@ -56,7 +56,8 @@ def test_the_hosted_workflow_builds_the_site_and_tests_with_a_full_installation(
 
 
 def test_the_nightly_workflow_runs_what_takes_too_long_for_every_push():
-    [job] = yaml.safe_load((ROOT / ".github" / "workflows" / "nightly.yml").read_text(encoding="utf-8"))["jobs"].values()
+    workflow = (ROOT / ".github" / "workflows" / "nightly.yml").read_text(encoding="utf-8")
+    [job] = yaml.safe_load(workflow)["jobs"].values()
     targets = job["strategy"]["matrix"]["target"]
     assert targets == ["test-long", "fuzz", "test-portability", "coverage"]
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
