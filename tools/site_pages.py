@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[1]
 DOCS, MESSAGES = ROOT / "docs", ROOT / "ros_ws" / "src" / "hsv_msgs"
 _INCLUDE = re.compile(r"```\{include\} (\S+)\n```\n")
 _LINK = re.compile(r"\]\(([^()\s#]+)")
+_FLIGHT = re.compile(r"\[([^\[\]]+)\]\(([\w./]*fly)\.md#([\w&=.-]+)\)")
 _WHOLE_LINK = re.compile(r"\[([^\[\]]+)\]\(([^()\s#]+)\)")
 
 
@@ -65,7 +66,8 @@ def included() -> dict[Path, str]:
 def text_of(page: str, source: str, files: dict[Path, str]) -> str:
     """Return the text of a page with its links to files replaced by links to pages of the site.
 
-    Links to folders and to Markdown files that have no page become plain text.
+    Links to folders and to Markdown files that have no page become plain text. After ``fly.md#`` stands a flight of the
+    page that flies, not a heading.
 
     Args:
         page: Path of the page, relative to the folder of the documentation, without suffix.
@@ -89,4 +91,7 @@ def text_of(page: str, source: str, files: dict[Path, str]) -> str:
         elsewhere = target.is_dir() or (target.suffix == ".md" and not target.is_relative_to(DOCS))
         return match[1] if elsewhere and target not in files else match[0]
 
-    return _LINK.sub(link, _WHOLE_LINK.sub(without_page, source))
+    def flight(match: re.Match[str]) -> str:
+        return f'<a href="{match[2]}.html#{match[3].replace("&", "&amp;")}">{match[1]}</a>'
+
+    return _FLIGHT.sub(flight, _LINK.sub(link, _WHOLE_LINK.sub(without_page, source)))

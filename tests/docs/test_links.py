@@ -12,6 +12,7 @@ import yaml
 
 import hsv
 from hsv.core import lib
+from hsv.pages.fly import FIELDS, SCENARIOS
 
 ROOT = page_blocks.ROOT
 PAGES = [ROOT / page for page in page_blocks.PAGES]
@@ -37,7 +38,11 @@ def test_links_lead_somewhere(page):
         file = (page.parent / name).resolve() if name else page
         assert file.exists(), f"{target}: no such file"
         assert file.is_relative_to(ROOT), f"{target}: outside the repository"
-        if anchor and file.suffix == ".md":
+        if anchor and file.name == "fly.md":
+            name, *settings = anchor.split("&")
+            assert name in SCENARIOS, f"{target}: no flight of the page"
+            assert {setting.split("=")[0] for setting in settings} <= {"fault", "size", "at", *FIELDS}
+        elif anchor and file.suffix == ".md":
             assert anchor in anchors(file), f"{target}: no such heading"
 
 

@@ -26,6 +26,7 @@ from hsv.model.vehicle import SHIPPED_VEHICLES, named_parameters
 from hsv.pages.engine import Numbers, Plot, render, write_page
 from hsv.pages.events import Event
 from hsv.pages.flights import DrawnCurve, ReportedRun, reported_runs
+from hsv.pages.fly import SITE, fragment
 from hsv.pages.panels import GROUPS, Kind, Panel
 from hsv.pages.picture import DRAWN, Picture, picture
 from hsv.pages.side_view import geometry
@@ -84,6 +85,8 @@ def report_page(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.m
         differing={name for name in METRICS if len({run.metrics.get(name) for run in runs}) > 1},
         parameters={part: list(_parameters(part, runs)) for part in ("scenario", "design")},
         shipped_scenarios=scenario_names(),
+        fragment=fragment,
+        site=SITE,
         events_shown=EVENTS_SHOWN,
         airframe=geometry(),
     )

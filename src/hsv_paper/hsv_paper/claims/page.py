@@ -25,10 +25,11 @@ but another does not, and **does not hold** if one in bold does not, regardless 
 *relative to* denotes a ratio.
 
 *Uncertain parameters*: the paper flies one perturbation but gives only its bounds; ours is half of each bound
-(`case1_uncertain`, `case2_uncertain`). *Corners*: all {_CORNERS} combinations of the bounds are flown, in addition to
-the nominal vehicle; the *worst corner* is the vehicle least favourable to the claim. The coupling is *paper-like*
-unless another is named ([assumptions](assumptions.md)). With that coupling, the paper's statements on flights without
-the notch filter depend on a narrow margin ([modes rejected](#modes-rejected-paper-like-coupling)).
+(`case1_uncertain`, [`case2_uncertain`](fly.md#case2_uncertain)). *Corners*: all {_CORNERS} combinations of the bounds
+are flown, in addition to the nominal vehicle; the *worst corner* is the vehicle least favourable to the claim. The
+coupling is *paper-like* unless another is named ([assumptions](assumptions.md)). With that coupling, the paper's
+statements on flights without the notch filter depend on a narrow margin ([modes
+rejected](#modes-rejected-paper-like-coupling)).
 
 *Actuators* are ideal, like the paper's, unless others are named. The benefit of the notch filter depends on them: even
 without the filter, a slow elevator stabilises the elastic modes. Readings of claims on the filter therefore name their
