@@ -78,5 +78,4 @@ const hsv_block scheduled = {
     .outputs = outputs,
     .parameter_count = HSV_COUNT(parameters),
     .parameters = parameters,
-    ,
 };
