@@ -31,7 +31,7 @@ test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damag
 	@$(INSTALL) --requirement requirements-docs.txt --requirement requirements-web.txt
 	@$(PYTEST) -n auto --dist loadfile -m long $(ARGS)
 
-fuzz: setup ## set up, then give 10 000 mutated files to every reader (ARGS="--fuzz-inputs 1000" for fewer)
+fuzz: setup ## set up, then give 10 000 mutated inputs to every reader, 300 where each starts a process (ARGS="--fuzz-inputs 1000" for fewer)
 	@$(PYTEST) -n auto -m fuzz $(ARGS)
 
 test-ros: setup ## set up, then run the tests that need a full ROS 2 installation, sourced before (ARGS="-k launch" chooses)

@@ -202,6 +202,7 @@ READERS = {
     "trim": "--vehicle own.toml",
     "linearise": "--vehicle own.toml --out model.mat",
     "list": "scenarios own.toml",
+    "margins": "own.toml",
     "bench": "--compare own.toml",
     "montecarlo summary": "{campaign}",
     "montecarlo replay": "{campaign} --flight 1",

@@ -49,6 +49,7 @@ def rows(client, hub, count):
 
 
 def test_the_page_is_whole_and_may_ask_its_own_server_only(server):
+    assert {listening.getsockname()[0] for listening in server._server.sockets} == {"127.0.0.1"}
     status, page = get(server)
     assert status == 200 and "a flight" in page
     policy = page.partition('Content-Security-Policy" content="')[2].partition('"')[0]
