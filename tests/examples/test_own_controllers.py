@@ -100,6 +100,17 @@ def test_its_page_is_true_to_the_last_command(installed, tmp_path, example):
     assert len(list(tmp_path.glob("*_and_tube.html"))) == sum("hsv report" in line for line in pages) > 0
 
 
+@pytest.mark.parametrize("example", ["vehicle", "scenario", long("fmu")])
+def test_a_vehicle_a_scenario_and_an_fmu_fly_as_their_pages_say(tmp_path, example):
+    shutil.copytree(EXAMPLES / example, tmp_path / "examples" / example, ignore=shutil.ignore_patterns("*.fmu"))
+    for command in printed(f"examples/{example}/README.md"):
+        if not command.startswith("hsv montecarlo"):  # other tests fly campaigns
+            words = [sys.executable, "-m", "hsv.cli.entry", *shlex.split(command)[1:]]
+            ran = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+            assert ran.returncode == 0, f"{command}: {ran.stderr}"
+    assert "verdict within all" in ran.stdout
+
+
 @pytest.fixture(scope="module")
 def checkout(tmp_path_factory):
     """Return a folder with the C example, built, flown and used in a campaign as its page prints."""
