@@ -168,6 +168,7 @@ def build(route: str, names: list[str], env: dict[str, str]) -> Step:
     # All files of messages are generated; linking them would take longer than copying.
     command += ["--ament-cmake-args", "-DAMENT_CMAKE_SYMLINK_INSTALL=OFF", "--cmake-args", "-DBUILD_TESTING=OFF"]
     command += ["-DCMAKE_BUILD_TYPE=Release", f"-DPython3_EXECUTABLE={PYTHON}"]
+    command += ["-DCPP_MESSAGES=OFF"] if route == "wheels" else []  # the wheels have no rclcpp
     return Step(f"Workspace ({', '.join(names)})", command, env)
 
 

@@ -22,7 +22,7 @@ def test_the_groups_that_were_asked_for_are_measured_and_held_against_a_recorded
     path = tmp_path / "before.json"
     path.write_text(json.dumps(kept))
     ran = hsv(*words, "--compare", path)
-    assert ran.code == 1 and ": SLOWER, " in ran.out
+    assert ran.code == 1 and (": SLOWER, " in ran.out or "WORSE than the limit" in ran.error)
 
 
 @pytest.mark.long
@@ -76,6 +76,15 @@ def test_a_change_beyond_the_spread_counts(tmp_path, before, after, slower):
     commit, recorded = read_run(path)
     assert commit == "abc" and recorded["graph"].ratio == before.ratio
     assert after.slower(recorded["graph"]) == pytest.approx(slower)
+
+
+def test_a_ratio_above_its_limit_is_an_error(hsv, monkeypatch):
+    monkeypatch.setattr("hsv.cli.bench.groups", lambda scale: {"graph": lambda: [figure(1.4), figure(1.6)]})
+    for words in ((), ("--json",)):
+        ran = hsv("bench", *words)
+        assert ran.code == 1 and ran.error == "graph 1.6, WORSE than the limit, at most 1.5"
+    monkeypatch.setattr("hsv.cli.bench.groups", lambda scale: {"graph": lambda: [figure(1.4)]})
+    assert hsv("bench").code == 0
 
 
 def test_a_group_that_cannot_be_measured_is_named_and_is_an_error_if_asked_for(hsv, monkeypatch, tmp_path):

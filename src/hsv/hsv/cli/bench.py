@@ -86,10 +86,15 @@ class Figure:
         return float(low), float(high)
 
     @property
+    def worse(self) -> bool:
+        """Whether the ratio is above the limit."""
+        return self.ratio > self.limit
+
+    @property
     def verdict(self) -> str:
         """Text on whether the ratio is within the limit."""
         limit = f"at most {self.limit:g}"
-        return f"{limit}, as promised" if self.ratio <= self.limit else f"WORSE than the limit, {limit}"
+        return f"WORSE than the limit, {limit}" if self.worse else f"{limit}, as promised"
 
     def as_dict(self, group: str) -> dict[str, Any]:
         """Return the figure with all times, for the JSON file that :func:`read_run` reads."""

@@ -284,7 +284,8 @@ def bench(
 ) -> None:
     """Measure the performance of this machine, as ratios of two run times that are measured in alternation.
 
-    The exit code is 1 if a group of --only could not be measured, and with --compare if anything became slower.
+    The exit code is 1 if a ratio is worse than its limit, if a group of --only could not be measured, and with
+    --compare if anything became slower.
 
     Example: hsv bench --only in_process --only startup
     """
@@ -339,5 +340,7 @@ def bench(
             output.say(*(f"    {name}: recorded there, not measured here" for name in absent))
     if only and skipped:
         raise RunError("; ".join(f"only = {name!r}: not measured: {reason}" for name, reason in skipped.items()))
+    if worse := [f"{name} {figure.ratio:.3g}, {figure.verdict}" for name, figure in figures.items() if figure.worse]:
+        raise RunError("; ".join(worse))
     if any(change > 0.0 for change in slower.values()):
         raise typer.Exit(1)
