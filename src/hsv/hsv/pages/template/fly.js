@@ -9,7 +9,7 @@ const PLOTS = [
   ["velocity", "ft/s", [["reference", "reference:1", FEET], ["run0", 1, FEET]]],
   ["angle of attack, pitch angle", "deg", [["run0", 2, DEGREES], ["run1 dash", 3, DEGREES]]],
   ["elevator: command, effector", "deg", [["run0", 22, DEGREES], ["run1 dash", "effector:1", DEGREES]]],
-  ["rates of the elastic modes 1, 2", "kg½ ft/s", [["run0", 6, FEET], ["run1 dash", 8, FEET]]],
+  ["rates of the elastic modes 1, 2", "kg½ m/s", [["run0", 6, 1], ["run1 dash", 8, 1]]],
   ["level of the error in the tube, inside below 1", "", [["bound", "edge", 1], ["run0", "level:0", 1]]],
 ];
 const WIDTHS = { reference: 9, effector: 2, level: 1 };
