@@ -42,6 +42,11 @@ The signals and the topics whose messages contain them. A size that depends on t
 """
 
 _FAULTS = """## Types of faults
+In the order in which simultaneous faults act.
+
+"""
+
+_FAULT_PARAMETERS = """
 Their channels and parameters, as in `fault.parameters`. Every type also has the parameters of the last rows.
 
 """
@@ -51,7 +56,7 @@ def reference() -> str:
     """Return the parameter reference in Markdown: the loop, its signals, one table per node, and the fault types."""
     parts = [_HEADER, _LOOP + _loop() + _SIGNALS + _signals(), "## Every node\n" + _parameters(LOCKSTEP_PARAMETERS)]
     parts += [f"## {node}\n" + _parameters(table) for node, table in NODE_PARAMETERS.items()]
-    return "\n".join([*parts, _FAULTS + _faults()])
+    return "\n".join([*parts, _FAULTS + _kinds() + _FAULT_PARAMETERS + _faults()])
 
 
 def _table(columns: str, rows: Iterable[tuple[object, ...]]) -> str:
@@ -71,8 +76,9 @@ def _signals() -> str:
     rows = []
     for signal in (signal for block in LOOP for signal in block.outputs):
         topics = ", ".join(f"`{topic}`" for topic, carried in CARRIED.items() if signal in carried)
-        rows.append((signal.name, "" if signal.size == VARYING else signal.size, signal.unit, topics))
-    return _table("signal, numbers, unit, topics", rows)
+        size = "" if signal.size == VARYING else signal.size
+        rows.append((signal.name, signal.meaning, size, signal.unit, topics))
+    return _table("signal, meaning, numbers, unit, topics", rows)
 
 
 def _parameters(parameters: Iterable[Parameter]) -> str:
@@ -84,6 +90,10 @@ def _parameters(parameters: Iterable[Parameter]) -> str:
         default = "from the vehicle" if p.name in vehicle else words.get(str(p.default), f"`{p.default}`")
         rows.append((p.name, default, p.constraint, p.description, "" if p.read_only else "yes"))
     return _table("parameter, default, expected, meaning, in flight", rows)
+
+
+def _kinds() -> str:
+    return _table("side, type, meaning", [(kind.side, name, kind.meaning) for name, kind in FAULT_KINDS.items()])
 
 
 def _faults() -> str:

@@ -12,8 +12,6 @@ import page_blocks
 import pytest
 from marking import long
 
-from hsv.model.faults.table import FAULT_KINDS
-
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = ["python.md", long("vehicle.md"), "hardware.md"]
 MODULES = {"python.md": ("mine", "class Mine")}
@@ -80,11 +78,3 @@ def test_code_of_the_page_on_the_core_runs_and_its_lines_of_c_are_those_of_the_c
 def test_numbers_of_the_page_on_the_notch_filter_hold():
     for block in blocks("explanation/notch.md", "python"):
         exec(compile(block, "notch.md", "exec"), {})
-
-
-def test_the_page_on_hardware_has_every_type_of_fault_in_the_order_in_which_they_act():
-    rows = re.findall(
-        r"^\| (\w+) \| (\w+(?:, \w+)*) \|$", (DOCS / "hardware.md").read_text(encoding="utf-8"), re.MULTILINE
-    )
-    listed = [(side, kind) for side, kinds in rows for kind in kinds.split(", ")]
-    assert listed == [(kind.side, name) for name, kind in FAULT_KINDS.items()]
