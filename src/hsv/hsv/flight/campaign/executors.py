@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import multiprocessing
 import os
@@ -303,6 +302,8 @@ def make_executor(workers: int, scheduler: str = "", notice: Notice = lambda wor
 @contextmanager
 def _connected(address: str, notice: Notice) -> Iterator[Any]:
     """Yield a client of the scheduler at ``address``, which has at least one worker; a ``CampaignError`` otherwise."""
+    import asyncio
+
     from distributed import Client
     from distributed.comm import get_address_host_port
 
@@ -341,6 +342,8 @@ async def _answers(address: str, waiting: Callable[[], None]) -> bool:
     After :data:`NOTICE` seconds without an answer, ``waiting`` is called once. Dask's own client is not used here,
     because Ctrl-C does not interrupt it while it waits.
     """
+    import asyncio
+
     from distributed.core import rpc
     from distributed.security import Security
 
