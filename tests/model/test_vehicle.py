@@ -65,7 +65,7 @@ WRONG = [
     ("structure", {}, "structure = {}: expected one of parker, winged_cone"),
     ("title", " ", "title = ' ': expected a text that is not empty"),
     ("rigid_body.mass.uncertainty", "-1 %", "rigid_body.mass.uncertainty = '-1 %': expected from 0 to 90 %"),
-    ("envelope.altitude.minimum", "90000 ft", "altitude_range: 27432.0 to 26365.2, expected a range that increases"),
+    ("envelope.altitude.minimum", "90000 ft", "altitude_range: 27432.0 to 26365.2, expected minimum < maximum"),
     ("envelope.velocity.minimum", "-1 m/s", "velocity_range: from -1.0 m/s, expected above zero"),
     ("envelope.angle.maximum", "0 deg", "angle_limit = 0 rad: expected above zero"),
     ("input_limits.elevator_deflection.maximum", "-40 deg", "elevator_deflection: -0.5235987755982988 to -0.69813"),

@@ -37,7 +37,7 @@ LAST = 1.0
 
 @dataclass(frozen=True)
 class Point:
-    """The flat parameters of a flight, and the vehicles that fly it: relative changes of parameters, nominal first."""
+    """The flat parameters of a flight, and its vehicles as relative parameter changes; the nominal one first."""
 
     values: Mapping[str, Any]
     over: Sequence[Corner]

@@ -108,6 +108,6 @@ def rounded(value: float | None, digits: int = 0) -> float | None:
     return None if value is None or not np.isfinite(value) else round(float(value), digits)
 
 
-def in_words(over: Sequence[Corner]) -> str:
+def vehicles(over: Sequence[Corner]) -> str:
     """Return in words which vehicles ``over`` has: the nominal one, and how many of all corners."""
     return f"nominal vehicle and {len(over) - 1} of the {2 ** len(load_vehicle().uncertainty)} corners"

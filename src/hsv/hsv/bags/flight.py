@@ -1,4 +1,4 @@
-"""Flight data from a bag, for metrics and fingerprint; deviations of sensors, links, effectors and air from ideal."""
+"""Flight data from a bag, for metrics and fingerprint, and what sensors, links, effectors and air added to the signals."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ def _remapped(custom_data: Mapping[str, str]) -> dict[str, str]:
 
 
 def _namespace(topics: Mapping[str, str], source: str) -> str:
-    """Return the namespace of the graph from the names of its topics; refuse the topics of two graphs."""
+    """Return the namespace of the graph from its topics; raise if topics of two graphs are mixed."""
     spaces: dict[str, set[str]] = {}
     for role in _OURS:
         for name, kind in topics.items():

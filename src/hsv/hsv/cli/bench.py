@@ -59,7 +59,7 @@ class Recorded(NamedTuple):
 
 @dataclass(frozen=True)
 class Figure:
-    """A measured ratio of times: that of the measured work, ``ours``, to that of a reference, ``theirs``."""
+    """A measured ratio: the time of our code divided by the time of the reference, ``theirs``."""
 
     name: str
     what: str

@@ -81,7 +81,7 @@ def discretise(sections: Sequence[NotchSection], period: float) -> Struct:
                 f"expected less than the Nyquist frequency {math.pi / period:.6g} rad/s"
             )
         A, _, C, D = section.state_space()
-        # Bilinear transform s = (1 / half) (z - 1) / (z + 1); this "half" maps the centre frequency onto itself.
+        # Bilinear transform s = (1 / half) (z - 1) / (z + 1); this "half" (pre-warping) keeps the centre frequency.
         half = tangent(angle) / section.zero_frequency
         identity = np.eye(2)
         inverse = solve(identity - half * A, identity)

@@ -1,4 +1,4 @@
-"""The nominal law u_n = K x_n + c; in every step, a quadratic programme finds the course of c over a horizon.
+"""The nominal law u_n = K x_n + c; in every step, a quadratic programme computes c over a horizon.
 
 The programme keeps u_n + u_r within U minus F Z and within the range of the certified plans. In the first third of the
 horizon, it keeps the nominal pitch acceleration within the range of those plans, too, because the disturbance set was

@@ -18,7 +18,7 @@ void hsv_sense(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_fault
 {
     if (plant->sensors.ideal && faults->sensor.count == 0)
         for (int i = 0; i < STATES; i++)
-            measurement[i] = memory->sensors[i].given = x[i]; /* "given" is needed if a sensor drops out later */
+            measurement[i] = memory->sensors[i].given = x[i]; /* a later drop-out repeats it */
     else
         hsv_measure(&plant->sensors, memory->sensors, &faults->sensor, k, plant->seed, x, measurement);
     hsv_receive(&plant->link, memory->link, memory->payloads, k, plant->seed, measurement, STATES);

@@ -118,7 +118,7 @@ class Vehicle:
         ranges = {"altitude_range": self.altitude_range, "velocity_range": self.velocity_range, **dict(inputs)}
         for name, (low, high) in ranges.items():
             if not low < high:
-                raise QuantityError(f"{name}: {low} to {high}, expected a range that increases")
+                raise QuantityError(f"{name}: {low} to {high}, expected minimum < maximum")
         if not self.velocity_range[0] > 0.0:
             raise QuantityError(f"velocity_range: from {self.velocity_range[0]} m/s, expected above zero")
         if DERIVED not in self.couplings:

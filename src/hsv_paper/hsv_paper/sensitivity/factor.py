@@ -25,7 +25,7 @@ from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.linear_loop import Corners, largest_growth, stability_limit
 from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, RED, ZERO, new_figure
-from hsv_paper.study import Outcome, Scope, in_words, rounded
+from hsv_paper.study import Outcome, Scope, rounded, vehicles
 
 FACTORS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
 """Values of tau for which designs are made and flown."""
@@ -62,7 +62,7 @@ def run(scope: Scope) -> Outcome:
     axis.legend(loc="best")
     return Outcome(
         figure,
-        f"Growth of the loop around the coupled vehicle, {in_words(scope.over)}. Shaded: one Lyapunov function is "
+        f"Growth of the loop around the coupled vehicle, {vehicles(scope.over)}. Shaded: one Lyapunov function is "
         "found for the factor and all larger ones up to 1, over the vertices of the design's model, which does not "
         "include the coupling.",
         f"One Lyapunov function is found for every factor from τ = {least:.2f} to 1. The linear loop is stable down to "
@@ -73,7 +73,7 @@ def run(scope: Scope) -> Outcome:
         "smaller side, relative to that at τ = 1 (eq. 53); the time until a step of +600 ft, +250 ft/s has settled to "
         "2 % under K'(τ); in Case 2, the integral of the error of altitude and velocity, nominal vehicle, relative to "
         "that at τ = 1, and the attitude deviation from nominal after the fault, "
-        f"{in_words(fraction(load_vehicle().uncertainty))}, a different selection. The paper claims that a smaller "
+        f"{vehicles(fraction(load_vehicle().uncertainty))}, a different selection. The paper claims that a smaller "
         "factor is faster but less robust (4.3). After a step, K' may use more of the inputs; on the ramp, the nominal "
         "input is hardly used.",
         [{name: rounded(value, _DIGITS.get(name, 2)) for name, value in row.items()} for row in rows],

@@ -25,7 +25,7 @@ from hsv_paper.sensitivity.sweep import (
     sweep,
     widths,
 )
-from hsv_paper.study import Outcome, Scope, in_words
+from hsv_paper.study import Outcome, Scope, vehicles
 
 FLOWN = (*ALL, RMPC_DECOUPLED)
 
@@ -59,7 +59,7 @@ def coupling(scope: Scope) -> Outcome:
     legend(figure, shares=False)
     return Outcome(
         figure,
-        f"Case 1 on the coupled model, {in_words(scope.over)}. (a) Growth of the linear loops. (b), (c) Flights; a "
+        f"Case 1 on the coupled model, {vehicles(scope.over)}. (a) Growth of the linear loops. (b), (c) Flights; a "
         "decay time of 100 s means that the rates have not decayed by the end of the flight. With κ = 0 and without "
         "notch, RMPC is the controller of the paper, which flies it on the decoupled model only. The paper-like "
         f"coupling is κ = {PAPER_LIKE:.2f}.",
@@ -80,7 +80,7 @@ def parameters(scope: Scope) -> Outcome:
         axis.axvline(1.0, **plots.DOTTED_GREY)
     return Outcome(
         figure,
-        f"Case 1 on the coupled model with the paper-like coupling, {in_words(scope.over)} of the scaled bounds. "
+        f"Case 1 on the coupled model with the paper-like coupling, {vehicles(scope.over)} of the scaled bounds. "
         f"{LOSSES}",
         "In multiples of the bounds:",
         [{"controller": c.label, **lost_where(scales, columns)} for c, columns in results.items()],
@@ -106,7 +106,7 @@ def fault(scope: Scope) -> Outcome:
         axis.set_xlim(1.0, 0.3)
     return Outcome(
         figure,
-        f"Case 1 on the coupled model with the paper-like coupling, {in_words(scope.over)}. {LOSSES}",
+        f"Case 1 on the coupled model with the paper-like coupling, {vehicles(scope.over)}. {LOSSES}",
         "By effectiveness, from 1 down:",
         [{"controller": c.label, **lost_where(shares, found, 3, rising=False)} for c, found in results.items()],
     )

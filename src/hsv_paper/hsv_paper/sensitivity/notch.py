@@ -17,7 +17,7 @@ from hsv_paper.flights import Point
 from hsv_paper.linear_loop import Corners, growths, stability_limit
 from hsv_paper.plots import BLUE, DOTTED_GREY, RED, letter, new_figure, plain_log
 from hsv_paper.sensitivity.sweep import Controller, sweep
-from hsv_paper.study import Outcome, Scope, in_words, rounded
+from hsv_paper.study import Outcome, Scope, rounded, vehicles
 
 SETS = (Controller("paper-like coupling", "case1", BLUE), Controller("derived coupling", "case1_derived", RED))
 """Both couplings are flown with the baseline's gains and its filter, moved to another centre or depth."""
@@ -73,7 +73,7 @@ def run(scope: Scope) -> Outcome:
     derived = SETS[1].scenario
     return Outcome(
         figure,
-        f"(a), (b) Growth over the centre of the notch and the damping of its zeros, {in_words(scope.over)}. The "
+        f"(a), (b) Growth over the centre of the notch and the damping of its zeros, {vehicles(scope.over)}. The "
         "colours and the solid line, the limit of stability, are those of the nominal vehicle; the dashed line is the "
         "limit of the worst corner; the cross is the baseline's filter. Zeros and poles have the same centre; the "
         f"damping of the poles is {own.pole_damping:g}. (c) Decay time in flight; there is no point where a flight is "

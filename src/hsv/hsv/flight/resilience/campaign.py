@@ -149,7 +149,7 @@ def plan(controllers: Sequence[str], faults: Sequence[str]) -> ResilienceCampaig
         if not names:
             raise CampaignError(f"{field}: none, expected at least one")
         if twice := next((name for name in names if names.count(name) > 1), None):
-            raise CampaignError(f"{field}: {twice!r} twice, expected each once")
+            raise CampaignError(f"{field}: {twice!r} twice, expected no duplicates")
     for name in faults:
         if name not in TRIED:
             raise CampaignError(f"faults = {name!r}: expected {one_of(TRIED, name)}")

@@ -143,7 +143,7 @@ class ResilienceResults:
         }
         for number, case in enumerate(campaign.cases):
             if (outcome := store.read(number)) is None:
-                raise CampaignError(f"{store.folder}: {case.label} is missing; the same command flies it")
+                raise CampaignError(f"{store.folder}: {case.label} is missing; run the same command again to fly it")
             square, (flights, boundary) = squares[case.fault, case.subject.name], outcome
             square.boundaries[case.moment] = boundary
             square.cells[case.moment] = tuple(

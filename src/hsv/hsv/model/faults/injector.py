@@ -73,7 +73,7 @@ class FaultInjector:
         """
         for row in scheduled:
             row.fault.check_period(period)
-        # The first measurement precedes all faults.
+        # Sensor faults act from step 1 on.
         self.scheduled = tuple(
             row._replace(start=max(row.start, 1)) if row.fault.kind.side == SENSOR else row for row in scheduled
         )

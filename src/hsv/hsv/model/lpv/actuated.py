@@ -61,7 +61,7 @@ def sampled_actuators(actuators: Sequence[ActuatorSet], period: float) -> Struct
 
 
 def respond(actuators: Struct, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the actuator states, shape (k, a), at the start of k periods, and the mean positions, (k, 2), over them.
+    """Return the actuator states (k, a) at the start of each period, and the mean positions (k, 2) during it.
 
     Args:
         actuators: Sampled actuators, initially at rest.
