@@ -156,7 +156,11 @@ def test_no_path_in_parameters_is_followed(tmp_path):
     ("name", "value", "message"),
     [
         ("vehicle.mass", 0.0, "parameter vehicle.mass = 0 kg: expected above zero"),
-        ("vehicle.altitude_range", [2.0, 1.0], "parameter vehicle.altitude_range: 2.0 to 1.0, expected a range that"),
+        (
+            "vehicle.altitude_range",
+            [2.0, 1.0],
+            "parameter vehicle.altitude_range: 2.0 to 1.0, expected minimum < maximum",
+        ),
         ("vehicle.input_maximum", [1.5, -1.0], "parameter vehicle.elevator_deflection: "),
         ("vehicle.input_maximum", [1.5], "parameter vehicle.input_maximum = [1.5]: expected 2 numbers"),
         ("vehicle.coupling_sets.names", ["a"], "parameter vehicle.coupling_sets.values = "),

@@ -1,4 +1,4 @@
-"""Flight data from a bag, for metrics and fingerprint, and what sensors, links, effectors and air added to the signals."""
+"""Flight data from a bag, for metrics and fingerprint, and what sensors, links, effectors and air added to signals."""
 
 from __future__ import annotations
 
