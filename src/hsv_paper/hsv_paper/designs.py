@@ -11,7 +11,7 @@ from hsv.base.units import FOOT
 from hsv.control.design import ControlDesign, TubeSet
 from hsv.control.design_file import certificate_path, find_design, read_certificate, read_design
 from hsv.control.notch_filter import NotchSection, continuous, series
-from hsv.design.inputs import DesignInputs, inputs_from_report
+from hsv.design.inputs import DesignInputs, find_inputs, read_inputs
 from hsv.design.model import polytopic_model
 from hsv.model.lpv.linearisation import Filter, extended_jacobian, extended_state, zero_order_hold
 from hsv.model.trim import trim
@@ -44,8 +44,8 @@ def tube_of(name: str) -> TubeSet:
 
 
 def inputs_of(name: str) -> DesignInputs:
-    """Return the inputs of a shipped design, as stated in its certificate."""
-    return inputs_from_report(certificate(name)["inputs"])
+    """Return the inputs of a shipped design."""
+    return read_inputs(find_inputs(name))
 
 
 def extended_model(inputs: DesignInputs, coupling: str | float) -> tuple[np.ndarray, np.ndarray]:

@@ -26,7 +26,6 @@ from hsv.design.baseline import (
     nominal_family,
     nominal_problem,
     nominal_report,
-    versions,
     with_family,
 )
 from hsv.design.disturbance import ChannelModel, DisturbanceSet
@@ -95,7 +94,6 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
     report = {
         **gains.report,
         "nominal": nominal_report(inputs, design, family),
-        "versions": versions(),
         "tube": tube.report,
         "adjustable": {
             **_report(design, inputs, lyapunov, (complete, incomplete), tube),
@@ -131,11 +129,8 @@ def _report(
     tube: Tube,
 ) -> dict[str, Any]:
     share = incomplete_share(inputs)
-    beyond = tube.report["flights"]
-    if share < 1.0:
-        full = Region(design, inputs, 1.0)
-        model = ChannelModel(design, inputs.flown_vehicle)
-        beyond = flights_report(flights_in_tube(model, full, tube.found, lambda *_: None))
+    full, model = Region(design, inputs, 1.0), ChannelModel(design, inputs.flown_vehicle)
+    beyond = flights_report(flights_in_tube(model, full, tube.found, lambda *_: None))
     tau = np.append(design.tau, [design.tau[-1]] * (len(tube.found.half_width) - N_RIGID))
     complete, incomplete = (each.report() for each in sets)
     return {

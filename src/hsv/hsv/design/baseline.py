@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from typing import Any
@@ -14,7 +13,7 @@ from hsv.base.processes import Progress
 from hsv.certificate.loops import vertex_loops
 from hsv.certificate.margin_checks import margins_report
 from hsv.certificate.margins import disk_margin
-from hsv.control.design import ControlDesign
+from hsv.control.design import FORMAT, ControlDesign
 from hsv.control.notch_filter import NotchSection
 from hsv.design.feedback import FeedbackGain, feedback_gain
 from hsv.design.inputs import DesignInputs
@@ -66,7 +65,6 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
     design = replace(gains.design, coupling=inputs.disturbance.coupling, tube=tube.found.seen(), plan_bounds=tube.plan)
     report = {
         **gains.report,
-        "versions": versions(),
         "tube": tube.report,
         "margins": margins_report(design, inputs.flown_vehicle, gains.report["inputs"], tell),
         "parameters_sha256": design.to_parameters()["design.hash"],
@@ -89,9 +87,9 @@ def require_margins(inputs: DesignInputs, design: ControlDesign) -> None:
             )
 
 
-def versions() -> dict[str, str]:
-    """Return the versions of the packages with which a design is computed, by package name."""
-    return {package: version(package) for package in ("numpy", "scipy", "cvxpy", "clarabel")}
+def versions() -> list[str]:
+    """Return the names and versions of the packages with which a design is computed."""
+    return [f"{package} {version(package)}" for package in ("numpy", "scipy", "cvxpy", "clarabel")]
 
 
 def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> DesignResult:
@@ -226,10 +224,11 @@ def _report(
 ) -> dict[str, Any]:
     A, B = design.polytope.A, design.polytope.B
     return {
+        "format": FORMAT,
         "name": inputs.name,
         "units": "SI",
-        "inputs": inputs.model_dump(exclude_none=True),
-        "inputs_sha256": hashlib.sha256(inputs.model_dump_json(exclude_none=True).encode()).hexdigest(),
+        "inputs": inputs.report(),
+        "versions": versions(),
         "vertices": len(A),
         "model": model.report,
         "feedback": {

@@ -20,7 +20,7 @@ from hsv.design.disturbance import (
     scheduled,
     widened,
 )
-from hsv.design.inputs import DesignInputs, inputs_from_report
+from hsv.design.inputs import CertifiedInputs, inputs_from_report
 from hsv.design.region import Region, incomplete_share, measure
 from hsv.design.sets.invariant_set import InvariantSet
 from hsv.design.tube_problem import tube_problem
@@ -34,7 +34,7 @@ class CertifiedDesign(Subject):
     """A design and its certificate, with the sets that the certificate states."""
 
     @cached_property
-    def inputs(self) -> DesignInputs:
+    def inputs(self) -> CertifiedInputs:
         """The design inputs in the certificate, validated."""
         return inputs_from_report(self.certificate["inputs"])
 

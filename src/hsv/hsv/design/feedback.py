@@ -25,7 +25,6 @@ from scipy.linalg import cholesky, solve_discrete_lyapunov
 from hsv.base.errors import DesignError, one_of
 from hsv.lmi.semidefinite import (
     GAIN_DIGITS,
-    SolverReport,
     Unknown,
     Whitening,
     image,
@@ -83,14 +82,10 @@ class FeedbackGain:
     N: np.ndarray
     residuals: np.ndarray
     radii: np.ndarray
-    method: str
-    solver: SolverReport
 
     def report(self) -> dict[str, Any]:
         """Return the numbers with which the gain can be checked independently, for JSON."""
         return {
-            "method": self.method,
-            "solver": self.solver.as_dict(),
             "M": self.M.tolist(),
             "N": self.N.tolist(),
             "lmi_smallest_eigenvalues": self.residuals.tolist(),
@@ -125,20 +120,17 @@ def feedback_gain(
     if method not in _SEARCHES:
         raise DesignError(f"feedback.method = {method!r}: expected {one_of(_SEARCHES, method)}")
     white = lqr_whitening(A, B, state_scale, input_scale)
-    (N_white, M_white, *_), solver = _SEARCHES[method](*white.dynamics(A, B), white, disturbance, state_scale)
+    N_white, M_white, *_ = _SEARCHES[method](*white.dynamics(A, B), white, disturbance, state_scale)
     F = white.gain(np.linalg.solve(N_white, M_white.T).T)
     F = rounded(F, input_scale[:, None] / state_scale, GAIN_DIGITS)
     N = rounded_matrix(white.covariance(N_white))
     residuals = lyapunov_residuals(A + B @ F, N, _NAME)
-    return FeedbackGain(F, F @ N, N, residuals, spectral_radii(A + B @ F), method, solver)
-
-
-Found = tuple[list[np.ndarray], SolverReport]
+    return FeedbackGain(F, F @ N, N, residuals, spectral_radii(A + B @ F))
 
 
 def _guaranteed_cost(
     A: np.ndarray, B: np.ndarray, white: Whitening, disturbance: np.ndarray, state_scale: np.ndarray
-) -> Found:
+) -> list[np.ndarray]:
     n, m = B.shape[1:]
     columns = white.to_white @ disturbance
     columns = columns / np.linalg.norm(columns, 2)
@@ -162,7 +154,7 @@ def _guaranteed_cost(
     return minimise(unknowns, lambda N, M, Z: float(np.trace(Z)), inequalities, _NAME)
 
 
-def _feasibility(A: np.ndarray, B: np.ndarray, *_: object) -> Found:
+def _feasibility(A: np.ndarray, B: np.ndarray, *_: object) -> list[np.ndarray]:
     n, m = B.shape[1:]
 
     def inequalities(N: np.ndarray, M: np.ndarray) -> list[np.ndarray]:
@@ -175,7 +167,7 @@ def _feasibility(A: np.ndarray, B: np.ndarray, *_: object) -> Found:
     return minimise((Unknown((n, n), symmetric=True), Unknown((m, n))), lambda N, M: 0.0, inequalities, _NAME)
 
 
-_SEARCHES: dict[str, Callable[..., Found]] = {"guaranteed_cost": _guaranteed_cost, "feasibility": _feasibility}
+_SEARCHES: dict[str, Callable[..., list[np.ndarray]]] = {"guaranteed_cost": _guaranteed_cost, "feasibility": _feasibility}
 
 
 @dataclass(frozen=True)
@@ -184,14 +176,12 @@ class CommonLyapunov:
 
     N: np.ndarray
     residuals: np.ndarray
-    solver: SolverReport
 
     def report(self) -> dict[str, Any]:
         """Return the matrix and its evidence, for JSON."""
         return {
             "N": self.N.tolist(),
             "lmi_smallest_eigenvalues": self.residuals.tolist(),
-            "solver": self.solver.as_dict(),
         }
 
 
@@ -223,8 +213,8 @@ def common_lyapunov(closed_loop: np.ndarray, scale: np.ndarray, name: str) -> Co
             blocks.append(np.block([[N, AN.T], [AN, N]]) - margin * np.eye(2 * n))
         return blocks
 
-    (N, _), solver = minimise(
+    N, _ = minimise(
         (Unknown((n, n), symmetric=True), Unknown((1, 1))), lambda N, margin: -margin[0, 0], inequalities, name
     )
     found = rounded_matrix(L @ N @ L.T)
-    return CommonLyapunov(found, lyapunov_residuals(closed_loop, found, name), solver)
+    return CommonLyapunov(found, lyapunov_residuals(closed_loop, found, name))

@@ -137,7 +137,8 @@ class ModelInputs(_Table):
     system: Literal["DM", "ECM"] = "DM"
     period: Duration = Positive
     representation: Literal["tensor_product", "grid"]
-    grid: GridInputs
+    grid: GridInputs | None = None
+    """The grid of the representation "grid"."""
     tensor_product: TensorProductInputs
 
 
@@ -225,12 +226,24 @@ class DisturbanceInputs(_Table):
     duration: Duration = Positive
     elevator_effectiveness: Number = Field(gt=0.0, lt=1.0)
     fault_start: Duration = Positive
+    fault_window: list[Duration] = Field(default=[], max_length=2)
+    """First and last start of a fault for which flights stay in the set; empty: ``fault_start`` alone."""
     inflation: Number = Field(ge=1.0)
     """Factor on all measured bounds."""
     share: Number = Field(gt=0.0, le=1.0)
     """Share of the inflated disturbance set for which the invariant set is certified."""
     ramp: RampInputs | None = None
     """Ramp of the commands from the nominal start to the target; None: a step at t = 0."""
+
+    @model_validator(mode="after")
+    def _around_the_fault(self) -> Self:
+        window = self.fault_window
+        if window and not (len(window) == 2 and window[0] <= self.fault_start <= window[1] < self.duration):
+            raise ValueError(
+                f"fault_window = {window}: expected two times, with fault_start = {self.fault_start:g} s between them, "
+                f"before duration = {self.duration:g} s"
+            )
+        return self
 
 
 class RateInputs(_Sizes):
@@ -323,23 +336,20 @@ def _vehicle(value: Any, info: ValidationInfo) -> Vehicle | None:
     return vehicle if vehicle.digest else None
 
 
-class DesignInputs(_Table):
-    """All inputs, in SI, of a design: adjustable (paper section 4) if ``adjustable`` is given, else a baseline."""
+class CertifiedInputs(_Table):
+    """The inputs of a design that its certificate states, SI: those that say what is certified, and how it was flown."""
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
-    description: str
     vehicle: Annotated[Vehicle | None, BeforeValidator(_vehicle), PlainSerializer(_vehicle_values)] = None
     """The vehicle, in a file given by its registered name or a path; None: the default vehicle."""
     model: ModelInputs
     actuator: ActuatorInputs | None = None
     notch: list[NotchInputs] = Field(default=[], max_length=4)
-    feedback: FeedbackInputs
     nominal: NominalInputs
     disturbance: DisturbanceInputs
     invariant_set: InvariantSetInputs
-    tightening: TighteningInputs
     adjustable: AdjustableInputs | None = None
     margins: MarginInputs = Field(default=MarginInputs(), exclude=True)
     """They decide whether a design is written; the certificate states the margins that the design has."""
@@ -364,6 +374,21 @@ class DesignInputs(_Table):
         """The vehicle for which the design is made."""
         return self.vehicle or load_vehicle()
 
+    def report(self) -> dict[str, Any]:
+        """Return these inputs for a certificate, without those of the search and without a grid that is not used."""
+        table = self.model_dump(include=set(CertifiedInputs.model_fields), exclude_none=True)
+        if self.model.representation != "grid":
+            table["model"].pop("grid", None)
+        return table
+
+
+class DesignInputs(CertifiedInputs):
+    """All inputs, in SI, of a design: adjustable (paper section 4) if ``adjustable`` is given, else a baseline."""
+
+    description: str
+    feedback: FeedbackInputs
+    tightening: TighteningInputs
+
     def error_scale(self) -> np.ndarray:
         """Return the scales of the errors, shape (5 + 2 m,), for the rigid states and the m filter sections, SI.
 
@@ -384,9 +409,9 @@ def parse_inputs(table: dict[str, Any]) -> DesignInputs:
     return _validated(DesignInputs, table)
 
 
-def inputs_from_report(table: dict[str, Any]) -> DesignInputs:
+def inputs_from_report(table: dict[str, Any]) -> CertifiedInputs:
     """Return the design inputs in a certificate's ``table``: plain numbers, SI; errors as in :func:`parse_inputs`."""
-    return _validated(DesignInputs, table, "inputs: ", _SI)
+    return _validated(CertifiedInputs, table, "inputs: ", _SI)
 
 
 def _validated(model: type[_Model], table: dict[str, Any], prefix: str = "", context: str = "") -> _Model:

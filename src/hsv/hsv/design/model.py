@@ -72,6 +72,8 @@ def polytopic_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[Notch
     counts, tensor = (options.altitude_samples, options.velocity_samples), (options.tolerance, options.functions)
     of_grid = inputs.representation == "grid"
     if of_grid:
+        if grid is None:
+            raise DesignError("model.grid: missing, expected the numbers of vertices of the grid")
         counts = grid.altitude_vertices, grid.velocity_vertices
     filter_ = Filter(*series(continuous(notch))) if extended else None
     found = polytopic.polytopic_model(vehicle, filter_, inputs.period, counts, scales, None if of_grid else tensor)

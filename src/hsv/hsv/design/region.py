@@ -19,7 +19,7 @@ import numpy as np
 from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import ChannelModel, Extremes
-from hsv.design.inputs import DesignInputs
+from hsv.design.inputs import CertifiedInputs
 from hsv.flight.assembly import assemble_with
 from hsv.flight.closed_loop import fly
 from hsv.flight.corners import Corner, corners, fraction, region_parameters, screening_corners
@@ -30,7 +30,7 @@ from hsv.model.plant import FlightStatus
 Result = TypeVar("Result")
 
 
-def incomplete_share(inputs: DesignInputs) -> float:
+def incomplete_share(inputs: CertifiedInputs) -> float:
     """Return the share of the fault and of the parameter bounds that W' covers (paper eq. 47): tau, or 1 without tau.
 
     If tau differs between the rigid states, the largest factor is returned, which gives the largest set.
@@ -45,7 +45,7 @@ class Region:
     """
 
     def __init__(
-        self, design: ControlDesign, inputs: DesignInputs, share: float, equipment: Mapping[str, Any] | None = None
+        self, design: ControlDesign, inputs: CertifiedInputs, share: float, equipment: Mapping[str, Any] | None = None
     ) -> None:
         declared = region_parameters(inputs.model_dump(), inputs.flown_vehicle, share)
         self._parts = assemble_with(design, {**declared, **(equipment or {})})
@@ -95,28 +95,24 @@ def _checked(corner: Corner, flight: Flight) -> Flight:
 
 @dataclass(frozen=True)
 class RegionResult:
-    """Extremes over all flights, SI: of ``channels``, and by state of f (``remainder``), w (``fault``) and ``delta``.
+    """Extremes over all flights, SI: of ``channels``, and of the feedback due to the actuators' lag behind the plan.
 
-    ``lag_feedback``: feedback due to the actuators' lag behind the plan, by input; 0 if ideal. ``flights``: number.
+    ``lag_feedback`` has an entry per input, 0 with ideal actuators. ``flights`` is the number of flights.
     """
 
     flights: int
     channels: Extremes
-    remainder: Extremes
-    fault: Extremes
-    delta: Extremes
     lag_feedback: Extremes
 
 
 def measure(
     region: Region, model: ChannelModel, over: Sequence[Corner], progress: Callable[[int], None] = lambda done: None
 ) -> RegionResult:
-    """Simulate the flights of the corners ``over``; return the extremes of all disturbances (paper eq. 17, eq. 19)."""
+    """Simulate the flights of the corners ``over``; return the extremes of the disturbances (paper eq. 17, eq. 19)."""
 
     def job(flight: Flight) -> list[np.ndarray]:
-        s = model.signals(flight)
-        parts = (s.channels, s.remainder, s.fault, s.delta, model.errors(flight)[1])
+        parts = model.signals(flight).channels, model.errors(flight)[1]
         return [extreme for part in parts for extreme in (part.min(axis=0), part.max(axis=0))]
 
     columns = [np.stack(column) for column in zip(*region.map(job, over, progress), strict=True)]
-    return RegionResult(len(over), *(Extremes.over(*columns[i : i + 2]) for i in range(0, 10, 2)))
+    return RegionResult(len(over), *(Extremes.over(*columns[i : i + 2]) for i in (0, 2)))

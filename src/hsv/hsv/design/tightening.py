@@ -86,7 +86,7 @@ def plan_bounds(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray
 
 
 def check_plan(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray) -> dict[str, Any]:
-    """Return the range of the nominal plan and its margins to the tightened bounds, for JSON.
+    """Return the margins of the nominal plan to the tightened bounds, for JSON.
 
     Args:
         bounds: The tightened bounds.
@@ -105,8 +105,6 @@ def check_plan(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray)
                 f"by {_amount(-sides.min(), unit)}, expected it inside"
             )
     return {
-        "lowest": lowest.tolist(),
-        "highest": highest.tolist(),
         "margin_to_lower": margins[:, 0].tolist(),
         "margin_to_upper": margins[:, 1].tolist(),
     }

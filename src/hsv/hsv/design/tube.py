@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hsv.base.errors import DesignError
 from hsv.base.processes import Progress
 from hsv.control.design import ControlDesign, PlanBounds
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership, widened
@@ -23,15 +24,7 @@ from hsv.flight.random_sequences import random_sequences
 from hsv.model.signals import PITCH_RATE
 
 SEQUENCES, STEPS, SEED = 100_000, 600, 1
-"""Number of random sequences, their steps and their seed."""
-
-_SHOWN = (
-    "altitude_end_error",
-    "velocity_end_error",
-    "post_fault_attitude_deviation",
-    "post_fault_attitude_from_nominal",
-    "saturated_steps",
-)
+"""Number of random sequences that test the set, their steps and their seed."""
 
 
 @dataclass(frozen=True)
@@ -74,11 +67,10 @@ class MeasuredSet:
 
     def report(self) -> dict[str, Any]:
         """Return the disturbance set, the invariant set and the tightened inputs, for JSON."""
-        found = self.found
         lag = {"lag_feedback": {"lower": self.lag[0].tolist(), "upper": self.lag[1].tolist()}} if self.lag else {}
         return {
-            "disturbance": _disturbance_report(self.measured, self.disturbance),
-            "invariant_set": {**found.report(), "certificate": self.certified},
+            "disturbance": {"channels": self.disturbance.report()},
+            "invariant_set": {**self.found.report(), "certificate": self.certified},
             "tightening": {**lag, "lower": self.bounds.lower.tolist(), "upper": self.bounds.upper.tolist()},
         }
 
@@ -118,24 +110,49 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
     """
     region = Region(design, inputs, incomplete_share(inputs))
     tube = measured_set(design, region, inputs, progress)
-    found, bounds = tube.found, tube.bounds
+    return certified_tube(design, inputs, region, tube, progress)
 
+
+def certified_tube(
+    design: ControlDesign, inputs: DesignInputs, region: Region, tube: MeasuredSet, progress: Progress
+) -> Tube:
+    """Return the certified ``tube`` with its evidence: random sequences, counter-examples, flights at all corners.
+
+    Raises:
+        DesignError: A random sequence leaves the set, a flight leaves all of W, or the plan exceeds the bounds.
+    """
+    found, bounds = tube.found, tube.bounds
     progress("random sequences", 0, 1)
     columns = found.problem.columns(found.centre)
-    sampling = random_sequences(found.problem.system.A, columns, found.centre, found.Q, SEQUENCES, STEPS, SEED)
+    drawn = random_sequences(found.problem.system.A, columns, found.centre, found.Q, SEQUENCES, STEPS, SEED)
     progress("random sequences", 1, 1)
+    if not drawn["worst_level"] <= 1.0:
+        raise DesignError(f"invariant set: level {drawn['worst_level']:.9g} in a random sequence, expected at most 1")
 
     flown = flights_in_tube(ChannelModel(design, inputs.flown_vehicle), region, found, progress)
-    lowest, highest = np.min([f.lowest for f in flown], axis=0), np.max([f.highest for f in flown], axis=0)
-    plan = check_plan(bounds, lowest[:2], highest[:2])
-    allowed = plan_bounds(bounds, lowest, highest)
-    plan["pitch_acceleration"] = [float(lowest[2]), float(highest[2])]
+    lowest, highest = (np.array([getattr(f, side) for f in flown]) for side in ("lowest", "highest"))
+    least, most = lowest.min(axis=0), highest.max(axis=0)
+    plan = check_plan(bounds, least[:2], most[:2]) | {
+        "lowest": least.tolist(),
+        "highest": most.tolist(),
+        "lowest_flight": lowest.argmin(axis=0).tolist(),
+        "highest_flight": highest.argmax(axis=0).tolist(),
+    }
     report = tube.report()
-    report["invariant_set"]["sampling"] = sampling
+    report["disturbance"] |= {
+        "flights": tube.measured.flights,
+        "measured": {name: extreme.tolist() for name, extreme in vars(tube.measured.channels).items()},
+    }
     report["invariant_set"]["counter_examples"] = counter_examples(found.problem).as_dict()
     report["tightening"]["plan"] = plan
-    report["flights"] = flights_report(flown)
-    return Tube(found, bounds, allowed, report)
+    report["flights"] = flights_report(flown) | membership_report(flown) | nominal_report(region)
+    if inputs.disturbance.share == 1.0 and report["flights"]["outside"]:
+        worst = max(flown, key=lambda f: f.membership.ratio).membership
+        raise DesignError(
+            f"disturbance set: a flight reaches {worst.ratio:.4g} of {worst.channel}, expected at most 1: "
+            "a larger inflation helps"
+        )
+    return Tube(found, bounds, plan_bounds(bounds, least, most), report)
 
 
 def flights_in_tube(
@@ -149,58 +166,51 @@ def flights_in_tube(
 
 @dataclass(frozen=True)
 class FlightEvidence:
-    """Evidence of one flight: largest ``level`` of the tube error e, ``membership`` of the disturbances in W, metrics.
+    """Evidence of one flight: largest ``level`` of the tube error e, and ``membership`` of the disturbances in W.
 
-    ``ratios`` (n): largest |e - c| of each state over the half-width z of the set with centre c. ``lowest`` and
-    ``highest``: extremes of the two total nominal inputs, then of the nominal pitch acceleration (rad/s^2).
+    ``lowest`` and ``highest``: extremes of the two total nominal inputs, then of the nominal pitch acceleration
+    (rad/s^2).
     """
 
     level: float
-    ratios: np.ndarray
     membership: Membership
     lowest: np.ndarray
     highest: np.ndarray
-    metrics: np.ndarray
 
 
 def flight_evidence(flight: Flight, found: InvariantSet, model: ChannelModel) -> FlightEvidence:
     """Return the evidence of ``flight`` for the invariant set ``found``; ``model`` computes its disturbances."""
     (errors, _), plan = model.errors(flight), flight.plan
     pitch_acceleration = np.diff(flight.history.deviation[:, PITCH_RATE]) / flight.period
-    metrics = flight.metrics
     return FlightEvidence(
         level=float(found.level(errors).max()),
-        ratios=np.max(np.abs(errors - found.centre), axis=0) / found.half_width,
         membership=found.problem.disturbance.membership(model.signals(flight).channels),
         lowest=np.append(plan.min(axis=0), pitch_acceleration.min()),
         highest=np.append(plan.max(axis=0), pitch_acceleration.max()),
-        metrics=np.array([abs(metrics[name]) for name in _SHOWN]),
     )
 
 
-def _disturbance_report(measured: RegionResult, disturbance: DisturbanceSet) -> dict[str, Any]:
-    extremes = {"f": measured.remainder, "w": measured.fault, "delta": measured.delta}
-    return {
-        "statement": "bounds of the declared region only; every other flight is to be checked for membership",
-        "flights": measured.flights,
-        "channels": disturbance.report(),
-        "measured": {name: extreme.tolist() for name, extreme in vars(measured.channels).items()},
-        "boxes": {name: {"lower": e.lower.tolist(), "upper": e.upper.tolist()} for name, e in extremes.items()},
-    }
-
-
 def flights_report(flown: list[FlightEvidence]) -> dict[str, Any]:
-    """Return the number of flights and the worst value over them of each quantity, for JSON."""
-    worst = max((f.membership for f in flown), key=lambda membership: membership.ratio)
+    """Return the number of flights, their largest level, and the flight that has it, for JSON."""
+    levels = [f.level for f in flown]
+    worst = int(np.argmax(levels))
+    return {"flights": len(flown), "worst_level": levels[worst], "worst_level_flight": worst}
+
+
+def membership_report(flown: list[FlightEvidence]) -> dict[str, Any]:
+    """Return how many flights leave W, and the largest ratio to a bound with its flight, channel and step, for JSON."""
+    worst = int(np.argmax([f.membership.ratio for f in flown]))
+    at = flown[worst].membership
     return {
-        "flights": len(flown),
-        "worst_level": max(f.level for f in flown),
-        "worst_ratio_to_half_width": np.max([f.ratios for f in flown], axis=0).tolist(),
-        "disturbance_membership": {
-            "outside": sum(not f.membership.inside for f in flown),
-            "worst_ratio": worst.ratio,
-            "channel": worst.channel,
-            "step": worst.step,
-        },
-        "worst": dict(zip(_SHOWN, np.max([f.metrics for f in flown], axis=0).tolist(), strict=True)),
+        "outside": sum(not f.membership.inside for f in flown),
+        "worst_ratio": at.ratio,
+        "worst_ratio_flight": worst,
+        "channel": at.channel,
+        "step": at.step,
     }
+
+
+def nominal_report(region: Region) -> dict[str, Any]:
+    """Return the number of steps and the fingerprint of the nominal flight of ``region``, for JSON."""
+    flight = region.fly({})
+    return {"steps": len(flight.time) - 1, "nominal_fingerprint": flight.fingerprint}

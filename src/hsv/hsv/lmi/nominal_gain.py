@@ -27,7 +27,6 @@ import numpy as np
 from hsv.base.errors import DesignError
 from hsv.lmi.semidefinite import (
     GAIN_DIGITS,
-    SolverReport,
     Unknown,
     lqr_whitening,
     minimise,
@@ -129,8 +128,7 @@ def _decrease_blocks(contraction: np.ndarray, weighted: np.ndarray) -> np.ndarra
 class NominalGain:
     """The gain K = Y Q^-1 of one ellipsoid x' Q^-1 x <= 1, with the numbers that show that eq. 31 to 35 hold.
 
-    ``K`` (m, n) and ``Q`` (n, n) are in SI and rounded, ``Y`` (m, n) is K Q. ``gamma`` is the solver's bound of the
-    cost (s, eq. 32). All other numbers are recomputed from the rounded K and Q: ``certified_gamma``, a bound of the
+    ``K`` (m, n) and ``Q`` (n, n) are in SI and rounded, ``Y`` (m, n) is K Q. All other numbers are recomputed from the rounded K and Q: ``certified_gamma``, a bound of the
     cost (s) from any state of the ellipsoid; ``decrease`` (r), the smallest eigenvalue of the matrix of eq. 34 at each
     vertex with this bound, diagonal blocks scaled to 1; ``state``, 1 minus the level of the design state (eq. 33);
     ``input`` (m), 1 minus the largest squared input over its squared bound (eq. 35); ``nesting``, the smallest
@@ -142,7 +140,6 @@ class NominalGain:
     K: np.ndarray
     Y: np.ndarray
     Q: np.ndarray
-    gamma: float
     certified_gamma: float
     state: float
     decrease: np.ndarray
@@ -150,16 +147,13 @@ class NominalGain:
     nesting: float | None
     between: np.ndarray | None
     radii: np.ndarray
-    solver: SolverReport
 
     def report(self) -> dict[str, Any]:
-        """Return the matrices, residuals and solver report with which the gain can be checked, for JSON."""
+        """Return the matrices, and residuals with which the gain can be checked, for JSON."""
         between = {} if self.between is None else {"between_smallest_eigenvalues": self.between.tolist()}
         return {
-            "solver": self.solver.as_dict(),
             "Y": self.Y.tolist(),
             "Q": self.Q.tolist(),
-            "gamma": self.gamma,
             "certified_gamma": self.certified_gamma,
             "state_residual": self.state,
             "lmi_smallest_eigenvalues": self.decrease.tolist(),
@@ -227,7 +221,7 @@ def nominal_gain(
 
     # One matrix G for two Lyapunov functions (de Oliveira, Bernussou, Geromel, Systems & Control Letters 37, 1999).
     slack = [Unknown((n, n)), Unknown((1, 1))] if interpolated and limit is not None else []
-    (Q, Y, gamma, *found), solver = minimise(
+    Q, Y, _, *found = minimise(
         (Unknown((n, n), symmetric=True), Unknown((m, n)), Unknown((1, 1)), *slack),
         lambda Q, Y, gamma, *slack: gamma[0, 0],
         inequalities,
@@ -260,10 +254,8 @@ def nominal_gain(
                 f"{name}: decrease of the level in the ellipsoid before it = {between.min():.3g}, expected above zero "
                 "for interpolated gains; scales that are closer to each other help"
             )
-    radii, bound_of_cost = spectral_radii(problem.A + problem.B @ K), gamma[0, 0] * size**2 * problem.period
-    return NominalGain(
-        K, K @ Q_si, Q_si, bound_of_cost, certified, level, decrease, inputs, nesting, between, radii, solver
-    )
+    radii = spectral_radii(problem.A + problem.B @ K)
+    return NominalGain(K, K @ Q_si, Q_si, certified, level, decrease, inputs, nesting, between, radii)
 
 
 def nested_gains(

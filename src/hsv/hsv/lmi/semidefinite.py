@@ -30,21 +30,6 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, cholesky, solve_dis
 from hsv.base.errors import DesignError
 
 
-@dataclass(frozen=True)
-class SolverReport:
-    """Report on a solved problem: versions of solver and modelling tool, status, iterations and objective value."""
-
-    solver: str
-    modelling: str
-    status: str
-    iterations: int
-    objective: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the report as a dictionary for JSON; it is reproducible on one machine, as it contains no times."""
-        return asdict(self)
-
-
 def smallest_eigenvalues(matrices: np.ndarray) -> np.ndarray:
     """Return the smallest eigenvalue (r) of the symmetric part of each matrix (r, k, k)."""
     return np.linalg.eigvalsh(0.5 * (matrices + np.swapaxes(matrices, -1, -2)))[..., 0]
@@ -243,8 +228,8 @@ class _Inequality:
 
 def minimise(
     unknowns: Sequence[Unknown], cost: Cost, inequalities: Inequalities, name: str
-) -> tuple[list[np.ndarray], SolverReport]:
-    """Return a solution on the central path, with a cost about :data:`GAP` (relative) above the minimum, and a report.
+) -> list[np.ndarray]:
+    """Return a solution on the central path, with a cost about :data:`GAP` (relative) above the minimum.
 
     Args:
         unknowns: Unknown matrices; the solution is a list with a matrix for each, in this order.
@@ -271,18 +256,16 @@ def minimise(
         found.append(_Inequality(constant, acting, slopes[acting]))
     c = np.array([cost(*split(unit)) for unit in np.eye(n)])
     if not c.any():
-        x, report = _solved(c, found, 0.0, name)
-        return split(x), report
-    x, report = _inside(c, found, name)
+        return split(_solved(c, found, 0.0, name)[0])
+    x, least = _inside(c, found, name)
     degree = sum(len(one.constant) for one in found)
     # A power of two, so that differences between processors in the solver's optimum rarely change t.
-    t = 2.0 ** round(np.log2(degree / (GAP * max(abs(report.objective), 1e-12))))
-    x = _centre(t * c, found, x, name)
-    return split(x), replace(report, objective=float(c @ x))
+    t = 2.0 ** round(np.log2(degree / (GAP * max(abs(least), 1e-12))))
+    return split(_centre(t * c, found, x, name))
 
 
-def _solved(c: np.ndarray, found: list[_Inequality], least: float, name: str) -> tuple[np.ndarray, SolverReport]:
-    """Return the x that minimises c'x, found by Clarabel, and the solver's report.
+def _solved(c: np.ndarray, found: list[_Inequality], least: float, name: str) -> tuple[np.ndarray, float]:
+    """Return the x that minimises c'x, found by Clarabel, and the minimum.
 
     No eigenvalue of a matrix G_k(x) may be below ``least``. Clarabel runs in one thread, so that the same input gives
     the same bits on the same machine. The status "optimal_inaccurate" is accepted, because every caller recomputes its
@@ -309,28 +292,20 @@ def _solved(c: np.ndarray, found: list[_Inequality], least: float, name: str) ->
     accepted = (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
     if problem.status not in accepted:
         raise DesignError(f"{name}: status {problem.status!r}, expected one of {', '.join(accepted)}")
-    statistics = problem.solver_stats
-    report = SolverReport(
-        solver=f"Clarabel {version('clarabel')}",
-        modelling=f"cvxpy {version('cvxpy')}",
-        status=str(problem.status),
-        iterations=int(statistics.num_iters or 0),
-        objective=float(problem.value),
-    )
-    return np.asarray(x.value), report
+    return np.asarray(x.value), float(problem.value)
 
 
-def _inside(c: np.ndarray, found: list[_Inequality], name: str) -> tuple[np.ndarray, SolverReport]:
-    """Return an x near the minimum of c'x at which all inequalities hold strictly, and the solver's report."""
+def _inside(c: np.ndarray, found: list[_Inequality], name: str) -> tuple[np.ndarray, float]:
+    """Return an x near the minimum of c'x at which all inequalities hold strictly, and the solver's minimum."""
     failure = DesignError(f"{name}: no solution inside all inequalities, expected a feasible design")
     for least in _INSIDE:
         try:
-            x, report = _solved(c, found, least, name)
+            x, minimum = _solved(c, found, least, name)
         except DesignError as error:
             failure = error
             continue
         if _factors(found, x) is not None:
-            return x, report
+            return x, minimum
     raise failure
 
 

@@ -26,7 +26,6 @@ from hsv.design.sets.star_norms import StarNorms
 from hsv.design.tube_problem import TubeProblem
 from hsv.lmi.semidefinite import (
     MATRIX_DIGITS,
-    SolverReport,
     Unknown,
     image,
     inverse,
@@ -74,7 +73,6 @@ class InvariantSet:
     Q: np.ndarray
     contraction: float
     multipliers: np.ndarray
-    solver: SolverReport
     star_norms: StarNorms | None = None
     rated: Rated | None = None
 
@@ -172,7 +170,6 @@ class InvariantSet:
             "Q": self.Q.tolist(),
             "contraction": self.contraction,
             "multipliers": self.multipliers.tolist(),
-            "solver": self.solver.as_dict(),
             **star,
         }
 
@@ -191,8 +188,7 @@ class InvariantSet:
         if "rated" in report:
             rates, half_range, horizon = (report["rated"][name] for name in ("rates", "half_range", "horizon"))
             rated = Rated(np.array(rates), np.array(half_range), horizon)
-        solver = SolverReport(**report["solver"])
-        return cls(problem, centre, Q, report["contraction"], multipliers, solver, star, rated)
+        return cls(problem, centre, Q, report["contraction"], multipliers, star, rated)
 
 
 def ellipsoid(
@@ -254,7 +250,7 @@ def _solve(problem: TubeProblem, weight: np.ndarray, contraction: float) -> Inva
             blocks.append(np.block(rows))
         return blocks
 
-    (Q, shift, multipliers), solver = minimise(
+    Q, shift, multipliers = minimise(
         (Unknown((n, n), symmetric=True), Unknown((n, 1)), Unknown((r, d))),
         lambda Q, shift, multipliers: float(np.trace(weighted @ Q @ weighted.T)),
         inequalities,
@@ -263,4 +259,4 @@ def _solve(problem: TubeProblem, weight: np.ndarray, contraction: float) -> Inva
     Q_si = rounded_matrix(_INFLATION * T @ Q @ T.T)
     centre = rounded(guess + T @ shift[:, 0], np.sqrt(np.diag(Q_si)), MATRIX_DIGITS)
     multipliers = rounded(multipliers, 1.0 - contraction, MATRIX_DIGITS)
-    return InvariantSet(problem, centre, Q_si, contraction, multipliers, solver)
+    return InvariantSet(problem, centre, Q_si, contraction, multipliers)

@@ -212,7 +212,7 @@ def _solve(A: np.ndarray, g: np.ndarray, row: np.ndarray, contraction: float) ->
             for A_i, g_i in zip(inside, columns, strict=True)
         ]
 
-    (Q,), _ = minimise(
+    (Q,) = minimise(
         (Unknown((len(T), len(T)), symmetric=True),),
         lambda Q: float(output @ Q @ output + _BOUNDED * np.trace(Q)),
         inequalities,
