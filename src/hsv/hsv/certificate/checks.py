@@ -14,6 +14,7 @@ from hsv.base.errors import DesignError
 from hsv.certificate.tolerances import PARAMETERS, TOLERANCES, entry_size
 from hsv.control.design import ControlDesign
 from hsv.control.design_file import certificate_path, read_certificate, read_design
+from hsv.model.signals import INPUT_NAMES, N_RIGID, STATE_NAMES
 from hsv.model.vehicle import Vehicle, load_vehicle
 
 
@@ -139,6 +140,11 @@ def at_most(name: str, value: float, limit: float) -> Check:
     return Check(name, float(value), f"at most {limit:g}", bool(value <= limit))
 
 
+def at_least(name: str, value: float, limit: float) -> Check:
+    """Return the check that ``value`` is at least ``limit``; NaN fails."""
+    return Check(name, float(value), f"at least {limit:g}", bool(value >= limit))
+
+
 def above(name: str, value: float, limit: float) -> Check:
     """Return the check that ``value`` is above ``limit``; NaN fails."""
     return Check(name, float(value), f"above {limit:g}", bool(value > limit))
@@ -160,23 +166,37 @@ def gathered(name: str, checks: Callable[[], Checks]) -> Iterator[Check]:
         yield Check(name, value, "to be recomputable", False, required=True)
 
 
-def unchecked(subject: Subject, checks: Iterable[Check], *, whole: bool = True) -> list[str]:
-    """Return the fields of the certificate that none of the ``checks`` covers: they are stated, not checked.
+_SCALES = [*STATE_NAMES[:N_RIGID], *INPUT_NAMES]
 
-    By default a table without any covered field is listed as one path, not field by field, and ``*`` replaces every
-    index of a list, as in ``nominal.*.gamma``. With ``whole=False`` every uncovered field is listed by its own path.
+STATED = {
+    "versions": "names the packages that computed the design; nothing follows from them",
+    "inputs.model.tensor_product.tolerance": "any value below the least singular value kept gives the same model",
+    "inputs.disturbance.fault_window": "held by flights at drawn times, which are a sample",
+    "inputs.invariant_set.contraction": "values that were tried; that of the set is checked",
+    **{
+        f"inputs.invariant_set.{'input' if name in INPUT_NAMES else 'state'}_scale.{name}": "weighs the sets searched"
+        for name in _SCALES
+    },
+}
+"""Fields of a certificate that no check recomputes: the reason for each."""
+
+
+def under(field: str, names: Iterable[str]) -> tuple[str, ...]:
+    """Return the paths of the fields ``names`` of the table ``field``."""
+    return tuple(f"{field}.{name}" for name in names)
+
+
+def field_checks(subject: Subject, checks: Iterable[Check], later: Iterable[str] = ()) -> Checks:
+    """Check that every field of the certificate is known: one of the ``checks`` or of :data:`STATED` covers it.
+
+    ``later`` are the fields of checks that were not made.
     """
-    held = {field for check in checks for field in check.fields}
-    free: dict[str, bool] = {}
+    held = {*STATED, *later, *(field for check in checks for field in check.fields)}
     for leaf in leaves(subject.certificate):
-        parts = leaf.split(".")
-        above = [".".join(parts[: n + 1]) for n in range(len(parts))]
-        for field in above:
-            free[field] = free.get(field, True) and held.isdisjoint(above)
-    if not whole:
-        return [field for field in leaves(subject.certificate) if free[field]]
-    named = [field for field, is_free in free.items() if is_free and not free.get(field.rpartition(".")[0])]
-    return list(dict.fromkeys(".".join("*" if part.isdigit() else part for part in f.split(".")) for f in named))
+        if leaf not in held:
+            yield Check(leaf, "unknown field", "none of that name", False, required=True)
+    for field in STATED:
+        subject.stated(field)
 
 
 def leaves(value: Any, field: str = "") -> Iterator[str]:

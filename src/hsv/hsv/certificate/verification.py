@@ -14,7 +14,6 @@ x' Q^-1 x <= 1 into itself if and only if the largest singular value of L^-1 M L
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -29,6 +28,7 @@ from hsv.certificate.checks import (
     Checks,
     Subject,
     above,
+    at_least,
     at_most,
     equal,
     gathered,
@@ -37,11 +37,12 @@ from hsv.certificate.checks import (
     recomputed,
     required,
     same,
+    under,
 )
 from hsv.certificate.convolution import LONGEST, rated_bounds
-from hsv.certificate.tolerances import ROUNDING
+from hsv.certificate.tolerances import ACCURACY, ROUNDING
 from hsv.control.design import PLAN_SHIFT, ControlDesign
-from hsv.control.design_file import find_certificate, read_certificate
+from hsv.control.design_file import FORMAT, find_certificate, read_certificate
 from hsv.control.notch_filter import continuous, discretise, series
 from hsv.model.lpv.actuated import actuator_names, sampled_actuators
 from hsv.model.lpv.linearisation import (
@@ -63,27 +64,24 @@ from hsv.model.signals import (
     STATE_NAMES,
 )
 from hsv.model.trim import trim
-from hsv.model.vehicle import Vehicle
+from hsv.model.vehicle import Vehicle, load_vehicle, vehicle_names
 
 if TYPE_CHECKING:
     from hsv.model.lpv.polytopic import PolytopicModel
 
-STEERING = (
-    "inputs.description",
-    "inputs.feedback",
-    "inputs.invariant_set.contraction",
-    "inputs.invariant_set.input_scale",
-    "inputs.invariant_set.state_scale",
-    "inputs.model.grid",
-    "inputs.model.tensor_product.tolerance",
-    "inputs.tightening",
-)
-"""Inputs that steer the search for a design. They count as stated, not as checked, although their digest is checked."""
-
 _LONGEST = 10_000
 """Maximum length of a counter-example, steps."""
 
-_STATUS = ("optimal", "optimal_inaccurate")
+FLOWN_FIELDS = (
+    *under("inputs.disturbance", ("fault_start", "duration", "elevator_effectiveness")),
+    *under("inputs.disturbance.ramp", ("start", "end", "blend")),
+    *under("tube.disturbance", ("flights", *under("measured", ("lower", "upper", "lower_flight", "upper_flight")))),
+    *under("tube.tightening.plan", ("lowest_flight", "highest_flight")),
+    *under("tube.flights", ("flights", "steps", "nominal_fingerprint", "outside", "channel", "step")),
+    *under("tube.flights", ("worst_level", "worst_level_flight", "worst_ratio", "worst_ratio_flight")),
+    *under("adjustable.complete_fault", ("flights", "worst_level", "worst_level_flight")),
+)
+"""Fields that only flights can check."""
 
 
 # --- algebra ----------------------------------------------------------------------------------------------------------
@@ -132,18 +130,26 @@ def sizes(table: Mapping[str, float], names: Sequence[str]) -> np.ndarray:
 
 
 def statement_checks(subject: Subject) -> Checks:
-    """Compare name, units, number of vertices and digests; a digest replaces no check of the numbers themselves."""
-    from pydantic import TypeAdapter  # formats numbers as the design does; imported here to keep nodes light
+    """Compare name, units, number of vertices and the digest of the design file, which replaces no check of numbers.
 
-    design, inputs = subject.design, subject.certificate["inputs"]
+    Check also whether the design is certified for all of W: a share of it bounds no flight that leaves the share.
+    """
+    design = subject.design
+    yield equal(subject, "format", FORMAT)
     yield equal(subject, "name", design.name)
     yield equal(subject, "inputs.name", design.name)
     yield equal(subject, "units", "SI")
-    check = equal(subject, "inputs_sha256", hashlib.sha256(TypeAdapter(dict).dump_json(inputs)).hexdigest())
-    fields = (f"inputs.{field}" for field in leaves(inputs))
-    yield replace(check, fields=(check.name, *(field for field in fields if not field.startswith(STEERING))))
     yield equal(subject, "parameters_sha256", design.digest)
     yield recomputed(subject, "vertices", len(design.polytope.A), "copied")
+    partial_set = only_share(subject.certificate)
+    yield Check("share of W", partial_set or "all of W", "all of W", not partial_set)
+
+
+def only_share(certificate: Mapping[str, Any]) -> str:
+    """Return what a ``certificate`` for a share of W says, in words; empty if it is for all of W."""
+    share, flights = certificate["inputs"]["disturbance"]["share"], certificate["tube"]["flights"]
+    left = f"{flights['outside']} of {flights['flights']} measured flights leave it"
+    return f"certified for {share:g} W; {left}" if share < 1.0 else ""
 
 
 def input_checks(subject: Subject) -> Checks:
@@ -153,6 +159,7 @@ def input_checks(subject: Subject) -> Checks:
     weights sum to one (eq. 11), and none is negative (eq. 12).
     """
     design, inputs = subject.design, subject.certificate["inputs"]
+    yield from _vehicle_checks(subject)
     yield recomputed(subject, "inputs.model.period", design.period, "copied")
     for i, section in enumerate(design.notch):
         for name, value in vars(section).items():
@@ -161,9 +168,10 @@ def input_checks(subject: Subject) -> Checks:
     yield equal(subject, "inputs.disturbance.coupling", design.coupling)
     known = " ".join(name for name in (inputs.get("actuator") or {}).values() if name)
     given = " ".join(design.actuators)
-    yield Check("design.actuators", given, repr(known), given == known, required=True, fields=("inputs.actuator",))
+    fields = under("inputs.actuator", inputs.get("actuator") or ())
+    yield Check("design.actuators", given, repr(known), given == known, required=True, fields=fields)
     limits, digest = subject.vehicle.decoupled, subject.vehicle.digest
-    yield Check("design.vehicle", design.vehicle, repr(digest), design.vehicle == digest, fields=("inputs.vehicle",))
+    yield Check("design.vehicle", design.vehicle, repr(digest), design.vehicle == digest)
     yield parameter(subject, "input.minimum", design.input_minimum, limits.input_minimum)
     yield parameter(subject, "input.maximum", design.input_maximum, limits.input_maximum)
     for axis, (_, weights) in (("altitude", design.altitude_samples), ("velocity", design.velocity_samples)):
@@ -172,12 +180,20 @@ def input_checks(subject: Subject) -> Checks:
         yield above(f"scheduling.{axis}.weights, least", weights.min(), -ROUNDING)
 
 
-def solver_checks(subject: Subject) -> Checks:
-    """Check the status of every solver; other checks judge the matrices that the solvers returned."""
-    for field in leaves(subject.certificate):
-        if field.endswith("solver.status"):
-            found = subject.stated(field)
-            yield Check(field, repr(found), f"one of {', '.join(_STATUS)}", found in _STATUS, fields=(field,))
+def _vehicle_checks(subject: Subject) -> Checks:
+    """Check that the vehicle in the certificate is complete, and the installed one if one of its name is installed."""
+    stated = subject.certificate["inputs"].get("vehicle")
+    if stated is None:
+        return
+    fields = under("inputs.vehicle", stated)
+    wrong = [name for name, value in subject.vehicle.to_parameters().items() if stated.get(name) != value]
+    wrong += [name for name in stated if name not in subject.vehicle.to_parameters()]
+    yield Check("inputs.vehicle", ", ".join(wrong[:1]) or "complete", "complete", not wrong, True, fields)
+    name = stated["vehicle.name"]
+    if name in vehicle_names():
+        same_vehicle = load_vehicle(name).to_parameters() == stated
+        value = "as installed" if same_vehicle else f"not the installed vehicle {name!r}"
+        yield Check("inputs.vehicle.vehicle.name", value, "as installed", same_vehicle, required=True)
 
 
 # --- polytopic model, eq. 10 to 12, eq. 45 ----------------------------------------------------------------------------
@@ -221,7 +237,9 @@ def model_checks(subject: Subject) -> Checks:
     for axis, flown, sampled in zip(("altitude", "velocity"), given, model.samples, strict=True):
         yield parameter(subject, f"scheduling.{axis}.breakpoints", flown[0], sampled[0])
         yield parameter(subject, f"scheduling.{axis}.weights", flown[1], sampled[1])
-    yield equal(subject, "model.representation", inputs["representation"])
+    read = [field for field in leaves(inputs) if field != "tensor_product.tolerance"]
+    check = equal(subject, "model.representation", inputs["representation"])
+    yield replace(check, fields=(check.name, *under("inputs.model", read)))
     yield recomputed(subject, "model.vertices", [weights.shape[1] for _, weights in model.samples], "copied")
     shown_values = [values[:8] for values in model.singular_values]
     yield recomputed(subject, "model.singular_values", shown_values, "singular values")
@@ -229,6 +247,8 @@ def model_checks(subject: Subject) -> Checks:
     for name, value in model.accuracy(judged, scales).items():
         kind = {"points": "copied", "smallest_weight": "weights", "weight_sum_error": "sums"}.get(name, "accuracy")
         yield recomputed(subject, f"model.accuracy.{name}", value, kind)
+        if name in ACCURACY:
+            yield at_most(f"{name}, between the samples", value, ACCURACY[name])
 
 
 # --- feedback gain F, eq. 24 ------------------------------------------------------------------------------------------
@@ -251,7 +271,6 @@ def feedback_checks(subject: Subject) -> Checks:
     whole = radii(A + B @ F).max()
     yield recomputed(subject, "feedback.spectral_radius_all_states", whole, "spectral radii")
     yield required(at_most("spectral radius of A + BF, all states", whole, 1.0 - 1e-6))
-    yield equal(subject, "feedback.method", subject.stated("inputs.feedback.method"))
 
 
 # --- nominal gains K, eq. 31 to 35 ------------------------------------------------------------------------------------
@@ -321,8 +340,8 @@ def nominal_checks(subject: Subject) -> Checks:
         ("input_bound", design.nominal_input_bound, weights.bound),
     ):
         relaxed = name == "input_bound" and "adjustable" in subject.certificate
-        field = "adjustable.input_bound" if relaxed else f"inputs.nominal.{name}"
-        yield parameter(subject, f"nominal.{name}", flown, scale, fields=(field,))
+        fields = ("adjustable.input_bound",) if relaxed else under(f"inputs.nominal.{name}", inputs[name])
+        yield parameter(subject, f"nominal.{name}", flown, scale, fields=fields)
     counts = [len(design.nominal_gains), len(design.nominal_ellipsoids), len(stated)]
     yield same("number of nominal gains, ellipsoids, statements", counts, [len(inputs["scales"])] * 3, "copied")
     start = step(subject)
@@ -332,7 +351,9 @@ def nominal_checks(subject: Subject) -> Checks:
         yield parameter(subject, "nominal.gains", K, quotient(np.array(one["Y"]), Q), shown, fields=fields)
         yield parameter(subject, "nominal.ellipsoids", P, inverse(Q), f"nominal.ellipsoids[{i}] = Q^-1", i)
         yield from _gain_checks(subject, field, weights, K[:, :N_RIGID], inputs["scales"][i] * start)
-        yield recomputed(subject, f"{field}.scale", inputs["scales"][i], "copied")
+        check = recomputed(subject, f"{field}.scale", inputs["scales"][i], "copied")
+        points = (f"inputs.nominal.{at}.{axis}" for at in ("start", "target") for axis in ("altitude", "velocity"))
+        yield replace(check, fields=(f"{field}.scale", "inputs.nominal.scales", *points))
         radius = radii(design.polytope.A + design.polytope.B @ K).max()
         yield recomputed(subject, f"{field}.spectral_radius_all_states", radius, "spectral radii")
         yield required(at_most(f"spectral radius of A + BK, gain {i}", radius, 1.0 - 1e-6))
@@ -619,7 +640,12 @@ class StarNorms(NamedTuple):
 def set_checks(subject: Subject) -> Checks:
     """Check the tube used in flight: invariance, half-widths, W, star norms, tightened bounds and bounds of plans."""
     design = subject.design
-    tube = Tube(subject, design, "tube")
+    tube, inputs = Tube(subject, design, "tube"), subject.certificate["inputs"]["disturbance"]
+    yield required(at_least("inputs.disturbance.inflation", inputs["inflation"], 1.0))
+    yield required(at_most("inputs.disturbance.share", inputs["share"], 1.0))
+    if inputs["share"] == 1.0:
+        yield required(at_most("largest ratio to W", subject.stated("tube.flights.worst_ratio"), 1.0))
+    yield required(at_most("largest level", subject.stated("tube.flights.worst_level"), 1.0))
     yield Check("tube parameters", str(design.tube is not None), "True", design.tube is not None)
     seen = len(tube.c) - sum(name.startswith(INPUT_NAMES) for name in tube.system.names)
     if design.tube is not None:
@@ -639,26 +665,24 @@ def set_checks(subject: Subject) -> Checks:
     stated = tube.rated is not None
     yield required(Check("bounds at limited rates", str(stated), str(bool(rates)), stated == bool(rates)))
     yield from _tube_checks(subject, tube)
-    declared, carried = subject.stated("inputs.invariant_set.method") == "star_norms", tube.star is not None
-    fields = ("inputs.invariant_set.method",)
-    yield Check("star norms", str(carried), str(declared), carried == declared, fields=fields)
+    method = "ellipsoid" if tube.star is None else "star_norms"
+    yield required(equal(subject, "inputs.invariant_set.method", method))
     if tube.star:
         yield from _star_checks(subject, tube)
     tightening, bounds = subject.certificate["tube"]["tightening"], tube.tightened(lag_feedback(subject))
     plan = tightening["plan"]
     lowest, highest = np.array(plan["lowest"]), np.array(plan["highest"])
-    yield recomputed(subject, "tube.tightening.plan.margin_to_lower", lowest - bounds[0], "room of plans")
-    yield recomputed(subject, "tube.tightening.plan.margin_to_upper", bounds[1] - highest, "room of plans")
-    yield above("room of the nominal plan", min((lowest - bounds[0]).min(), (bounds[1] - highest).min()), 0.0)
+    room = lowest[:2] - bounds[0], bounds[1] - highest[:2]
+    yield recomputed(subject, "tube.tightening.plan.margin_to_lower", room[0], "room of plans")
+    yield recomputed(subject, "tube.tightening.plan.margin_to_upper", room[1], "room of plans")
+    yield above("room of the nominal plan", float(np.min(room)), 0.0)
     yield Check("nominal plan bounds", str(design.plan_bounds is not None), "True", design.plan_bounds is not None)
     if design.plan_bounds is not None:
         # Not in the paper: plans in flight also keep to the range of the certified ones, shifted down.
-        low, high = plan["pitch_acceleration"]
-        lowest, highest = np.append(lowest, low), np.append(highest, high)
         shift = PLAN_SHIFT * (highest - lowest) * np.array([1.0, 1.0, 0.0])
         expected = bounds[0], bounds[1], lowest - shift, highest - shift
         names = "input_minimum", "input_maximum", "region_minimum", "region_maximum"
-        of_plans = [f"tube.tightening.plan.{name}" for name in ("lowest", "highest", "pitch_acceleration")]
+        of_plans = under("tube.tightening.plan", ("lowest", "highest"))
         for name, value in zip(names, expected, strict=True):
             shown, flown = f"nominal.{name} from the tightened bounds and plans", getattr(design.plan_bounds, name)
             yield parameter(subject, f"nominal.{name}", flown, value, shown, fields=of_plans)
@@ -673,7 +697,7 @@ def lag_feedback(subject: Subject) -> Sequence[Sequence[float]]:
 def _tube_checks(subject: Subject, tube: Tube) -> Checks:
     """Check what the field of ``tube`` states: set (eq. 25 to 28), W (eq. 19) and tightened bounds (eq. 30, 53)."""
     field = tube.field
-    inside, inputs = f"{field}.invariant_set", subject.certificate["inputs"]["disturbance"]
+    inside = f"{field}.invariant_set"
     yield equal(subject, f"{inside}.kind", "ellipsoid")
     yield equal(subject, f"{inside}.states", list(tube.system.names))
     yield symmetric(f"{inside}.Q", tube.Q)
@@ -688,22 +712,29 @@ def _tube_checks(subject: Subject, tube: Tube) -> Checks:
     at_start = float(level(tube.Q, -tube.c))
     yield required(at_most(f"{field}: level of e = 0", at_start, 1.0))
     yield recomputed(subject, f"{inside}.certificate.level_of_zero_error", at_start, "eigenvalues")
-    # W (eq. 19) from the measured bounds; inflation and share are not in the paper.
-    measured = subject.stated(f"{field}.disturbance.measured")
-    for side, bounds, sign in (("lower", tube.lower, -1.0), ("upper", tube.upper, 1.0)):
-        outward = widened(sign * np.array(measured[side]), inputs["inflation"])
-        fields = (
-            f"{field}.disturbance.measured.{side}",
-            *(f"{field}.disturbance.channels.{c.name}.{side}" for c in CHANNELS),
-        )
-        check = same(f"{field}.disturbance, {side}", bounds, sign * inputs["share"] * outward, "disturbance bounds")
-        yield replace(check, fields=fields)
+    yield from _measured_checks(subject, tube)
     for channel in CHANNELS:
         yield equal(subject, f"{field}.disturbance.channels.{channel.name}.unit", channel.unit)
     lag = lag_feedback(subject) if field == "tube" else ((0.0, 0.0), (0.0, 0.0))
     for side, bound in zip(("lower", "upper"), tube.tightened(lag), strict=True):
         check = recomputed(subject, f"{field}.tightening.{side}", bound, "tightened bounds")
         yield replace(check, fields=(*check.fields, f"{field}.tightening.lag_feedback.{side}"))
+
+
+def _measured_checks(subject: Subject, tube: Tube) -> Checks:
+    """Check that W is the measured disturbances (eq. 19) times inflation and share, both not in the paper.
+
+    The two preliminary sets of an adjustable design state W alone: its flights had the gains before the last step.
+    """
+    field, inputs = f"{tube.field}.disturbance", subject.certificate["inputs"]["disturbance"]
+    for side, bounds, sign in (("lower", tube.lower, -1.0), ("upper", tube.upper, 1.0)):
+        fields = under(f"{field}.channels", (f"{channel.name}.{side}" for channel in CHANNELS))
+        if tube.field != "tube":
+            yield replace(at_least(f"{field}, {side}", float((sign * bounds).min()), 0.0), fields=fields)
+            continue
+        outward = widened(sign * np.array(subject.stated(f"{field}.measured.{side}")), inputs["inflation"])
+        check = same(f"{field}, {side}", bounds, sign * inputs["share"] * outward, "disturbance bounds")
+        yield replace(check, fields=(*fields, *under("inputs.disturbance", ("inflation", "share"))))
 
 
 def widened(bounds: np.ndarray, inflation: float) -> np.ndarray:
@@ -769,13 +800,17 @@ def reach(A: np.ndarray, columns: np.ndarray, row: np.ndarray, sequence: Sequenc
 
     It is the sum of |l g_i| over all steps, with l the response of the output to the v after the step. ``columns`` (r,
     n, d) are the g_i; the sequence has pairs of vertex i and number of steps, first step first.
+
+    Raises:
+        DesignError: A pair is none, or the steps are too many.
     """
-    reached, left = 0.0, _LONGEST
+    reached = 0.0
+    if not all(vertex >= 0 < steps for vertex, steps in sequence) or sum(steps for _, steps in sequence) > _LONGEST:
+        raise DesignError(f"counter-examples: expected a vertex and its steps, in turn, at most {_LONGEST} steps")
     for vertex, steps in reversed(sequence):
-        for _ in range(min(steps, left)):
+        for _ in range(steps):
             reached += float(np.abs(row @ columns[vertex]).sum())
             row = row @ A[vertex]
-        left -= steps
     return reached
 
 
@@ -808,7 +843,7 @@ def factor_checks(subject: Subject) -> Checks:
     # At tau = 1, too, the plan keeps within the tightened bounds of eq. 30.
     bounds = Tube(subject, replace(design, tau_minimum=np.ones(N_RIGID)), "tube").tightened()
     plan = subject.stated("tube.tightening.plan")
-    room = np.minimum(plan["lowest"] - bounds[0], bounds[1] - plan["highest"])
+    room = np.minimum(plan["lowest"][:2] - bounds[0], bounds[1] - plan["highest"][:2])
     yield recomputed(subject, "adjustable.room_at_one", room, "room of plans")
     yield required(above("least room of the nominal plan at tau = 1", float(room.min()), 0.0))
 
@@ -838,7 +873,8 @@ def adjustable_checks(subject: Subject) -> Checks:
     bound = sizes(subject.stated("inputs.nominal.input_bound"), INPUT_NAMES)
     relaxed = np.round(bound * rooms[1] / rooms[0], 6)
     check = recomputed(subject, "adjustable.input_bound", relaxed, "relaxed bounds")
-    yield replace(check, fields=("adjustable.input_bound", "inputs.nominal.input_bound"))
+    names = under("inputs.nominal.input_bound", INPUT_NAMES)
+    yield replace(check, fields=("adjustable.input_bound", *names))
     single, weights = "adjustable.single_gain", NominalWeights.of(subject)
     Q = np.array(subject.stated(f"{single}.Q"))
     K = quotient(np.array(subject.stated(f"{single}.Y")), Q)[:, :N_RIGID]
@@ -895,7 +931,6 @@ QUICK: dict[str, Part] = {
 
 RECOMPUTED: dict[str, Part] = {
     "statement": statement_checks,
-    "solvers": solver_checks,
     "polytopic model": model_checks,
     "adjustable design": adjustable_checks,
     "counter-examples": counter_example_checks,

@@ -42,7 +42,6 @@ def design(
     name: Annotated[str, Argument(help="Name of a design input in offline_design/, or path of a TOML file.")],
     out: Annotated[Path | None, Option(help="Parameter file to write; default: NAME.yaml.")] = None,
     force: ForceOption = False,
-    compare_sets: Annotated[bool, Option("--compare-sets", help="Also print star norms and counter-examples.")] = False,
     tau: Annotated[str, Option(help="Adjustable factor: one number, or five with commas between.")] = "",
     check: Annotated[bool, Option("--check", help="Only compare with the shipped parameter file.")] = False,
     units: UnitsOption = UnitSystem.metric,
@@ -50,13 +49,15 @@ def design(
 ) -> None:
     """Compute a controller with its tube offline, and write its parameter file and its certificate.
 
-    The certificate is written next to the parameter file; existing files are not overwritten unless --force is given.
+    The certificate is written next to the parameter file; existing files are not overwritten unless --force is given. A
+    design for a share of the disturbances W is written, too, and the exit code is 1.
     With --check, nothing is written: the design is compared with the shipped one, and if the largest deviation is above
     the tolerance, it is printed and the exit code is 1.
 
     Example: hsv design baseline; hsv design adjustable --tau 0.8 --out softer.yaml; hsv design baseline --check
     """
     from hsv.certificate.checks import load_subject
+    from hsv.certificate.verification import only_share
     from hsv.control.design_file import certificate_path, write_certificate, write_design
     from hsv.design.adjustable import design_adjustable
     from hsv.design.baseline import design_baseline
@@ -71,8 +72,8 @@ def design(
             if isinstance(error, DesignError):
                 raise
             raise DesignError(f"tau = {tau!r}: expected one number, or five separated by commas") from error
-    if check and (out or force or tau or compare_sets):
-        raise ParameterError("check: --out, --force, --tau or --compare-sets given, expected --check alone")
+    if check and (out or force or tau):
+        raise ParameterError("check: --out, --force or --tau given, expected --check alone")
     target = out or Path(f"{source.stem}.yaml")
     # Check the files before the computation, which takes minutes.
     shipped = load_subject(source.with_suffix(".yaml")) if check else None
@@ -92,31 +93,19 @@ def design(
         write_design(target, result.design, f"Written by: {command}. SI units; see offline_design/README.md.")
     with writing(certificate_path(target), "certificate"):
         write_certificate(certificate_path(target), result.report)
-    rows: list[Any] = []
-    if compare_sets:
-        from hsv.design import compare, disturbance, tube_problem
-
-        W = disturbance.DisturbanceSet.from_report(result.report["tube"]["disturbance"]["channels"])
-        problem = tube_problem.tube_problem(result.design, inputs.flown_vehicle, W)
-        rows = compare.compare_sets(result.design, problem, inputs.invariant_set)
     if json:
-        compared = {"compared_sets": [row.as_dict() for row in rows]} if rows else {}
-        output.print_json(result.report | compared | {"file": str(target)})
-        return
-    _summary(result.report)
-    output.say(f"written {target}, {certificate_path(target).name}")
-    if rows:
-        title = "Invariant sets: half-widths about the centre"
-        sets = [(row.name, _half_widths(row.half_width, row.feedback, row.size)) for row in rows]
-        output.console.print(output.quantity_table(title, {**HALF_WIDTHS, "size": "1"}, sets, units))
-        output.say(*(output.folded(f"{row.name}: {row.note}") for row in rows if row.note))
+        output.print_json(result.report | {"file": str(target)})
+    else:
+        _summary(result.report)
+        output.say(f"written {target}, {certificate_path(target).name}")
+    if partly := only_share(result.report):
+        output.report_error(f"{inputs.name}: {partly}")
+        raise typer.Exit(1)
 
 
-def _half_widths(half_width: np.ndarray | None, feedback: np.ndarray | None, *size: float | None) -> list[float] | None:
-    """Return half-widths of a set: rigid states, feedback F Z, then any given ``size``; None if one is unknown."""
-    if half_width is None or feedback is None or None in size:
-        return None
-    return [*half_width[:5], *feedback, *(value for value in size if value is not None)]
+def _half_widths(half_width: np.ndarray | None, feedback: np.ndarray | None) -> list[float] | None:
+    """Return half-widths of a set: rigid states, then feedback F Z; None if one is unknown."""
+    return None if half_width is None or feedback is None else [*half_width[:5], *feedback]
 
 
 def _check(shipped: Subject, found: ControlDesign, json: bool) -> None:
@@ -159,25 +148,36 @@ def verify(
     scenario: Annotated[str, Option(help="Fly this scenario, and check level, disturbances, inputs.")] = "",
     corners: Annotated[bool, Option("--corners", help="With --scenario: also corners.")] = False,
     exact: Annotated[bool, Option("--exact", help="First prove the inequalities in rational numbers.")] = False,
+    seed: Annotated[int | None, Option(min=0, help="Seed of drawn flights and sequences; default: a new one.")] = None,
+    flights: Annotated[int | None, Option(min=1, help="Number of flights to draw; default: 192.")] = None,
     json: JsonOption = False,
 ) -> None:
     """Recompute what a design and its certificate state, and name the first item that fails.
 
-    The checks share no code with the design. Fields of the certificate that no check recomputes are listed as "stated,
-    not checked".
+    Inequalities, sets and bounds are computed by other code than in the design. Vehicle, linearisation, trim,
+    actuators, notch filter, flights and their corners are the same code, which has tests of its own. The flights that
+    measure W are flown again, and others are drawn: the seed is printed, and --seed repeats it. Fields that no check
+    recomputes are listed as "not recomputed", and unknown fields are refused. A design for a share of W fails.
 
-    Example: hsv verify offline_design/baseline.yaml --scenario case1_qp
+    Example: hsv verify offline_design/baseline.yaml --seed 1; hsv verify baseline --scenario case1_qp
     """
-    from hsv.certificate.checks import gathered, load_subject, unchecked
+    import secrets
+
+    from hsv.certificate.checks import STATED, gathered, load_subject
     from hsv.certificate.exact import UNPROVED, exact_checks
     from hsv.control.design_file import find_design
     from hsv.flight.scenario import load_scenario
-    from hsv.flight.verification import bounding_corners, scenario_checks
+    from hsv.flight.verification import DRAWN, bounding_corners, scenario_checks
     from hsv.flight.verification import verify as recompute
 
     if corners and not scenario:
         raise QuantityError("corners: expected with --scenario only")
+    quick = quick or bool(scenario)
+    for name, value in {"seed": seed, "flights": flights}.items():
+        if quick and value is not None:
+            raise QuantityError(f"{name}: given, expected without --quick and --scenario, which draw no flights")
     subject = load_subject(find_design(file))
+    seed = secrets.randbits(32) if seed is None else seed
     proofs = []
     # Each proof is printed at once, so that an interruption leaves those that are finished.
     for proof in gathered("exact arithmetic", partial(exact_checks, subject)) if exact else ():
@@ -185,19 +185,18 @@ def verify(
         if not json:
             _say_check(proof)
     with output.stages() as progress:
-        checks = recompute(subject, quick or bool(scenario), progress)
+        checks = recompute(subject, quick, progress, seed=seed, flights=flights or DRAWN)
         if scenario:
             over = bounding_corners(subject) if corners else [{}]
             checks["scenario"] = list(scenario_checks(subject, load_scenario(scenario), over, progress))
     rows = [("exact arithmetic", proof) for proof in proofs]
     rows += [(part, check) for part, made in checks.items() for check in made]
     failing = [(part, check) for part, check in rows if not check.ok]
-    stated = unchecked(subject, [check for _, check in rows])
     unproved = list(UNPROVED) if exact else []
     if json:
         claims = [{"part": part, **vars(check)} for part, check in rows]
-        not_proved = {"not_proved": unproved} if exact else {}
-        output.print_json({"claims": claims, "stated": stated, **not_proved, "ok": not failing})
+        others = ({} if quick else {"seed": seed}) | ({"not_proved": unproved} if exact else {})
+        output.print_json({"claims": claims, "stated": STATED, **others, "ok": not failing})
     else:
         for part, made in checks.items():
             if made:
@@ -205,8 +204,9 @@ def verify(
             for check in made:
                 _say_check(check)
         output.say(*(output.folded(f"not proved, {item}") for item in unproved))
-        if stated:
-            output.say(output.folded(f"stated, not checked: {', '.join(stated)}"))
+        output.say(output.folded(f"not recomputed: {', '.join(STATED)}"))
+        if not quick:
+            output.say(f"flights and sequences drawn with --seed {seed}")
         output.say(Text(f"{len(rows) - len(failing)} of {len(rows)} checks pass", "bold"))
     if failing:
         part, check = failing[0]

@@ -18,6 +18,9 @@ from hsv.control.design import DESIGN_PARAMETERS, ControlDesign
 _SHIPPED = Path(__file__).parents[1] / "designs"
 """Folder of the shipped designs: a link to ``offline_design`` in a checkout, a copy in an installed package."""
 
+FORMAT = 2
+"""Version of the fields of a certificate."""
+
 _NAMES = [parameter.name for parameter in DESIGN_PARAMETERS]
 
 
@@ -177,14 +180,31 @@ def read_certificate(path: Path) -> dict[str, Any]:
     """Return the contents of a certificate.
 
     Raises:
-        DesignError: The file is missing or is not a certificate.
+        DesignError: The file is missing, or :func:`parse_certificate` refuses it.
     """
     try:
-        report = parse_json(read_text(path))
+        text = read_text(path)
     except DocumentError as error:
         raise DesignError(f"{path}: {error}, expected a design certificate in JSON") from error
+    return parse_certificate(text, str(path))
+
+
+def parse_certificate(text: str | bytes, source: str) -> dict[str, Any]:
+    """Return the contents of a certificate from its JSON ``text``.
+
+    Raises:
+        DesignError: It is not a certificate of this format; the message names ``source``.
+    """
+    try:
+        report = parse_json(text)
+    except DocumentError as error:
+        raise DesignError(f"{source}: {error}, expected a design certificate in JSON") from error
     if not isinstance(report, dict) or not {"inputs", "feedback", "nominal", "tube"} <= report.keys():
-        raise DesignError(f"{path}: expected a design certificate with inputs, feedback, nominal and tube")
+        raise DesignError(f"{source}: expected a design certificate with inputs, feedback, nominal and tube")
+    if (found := report.get("format", 1)) != FORMAT:
+        raise DesignError(
+            f"{source}: format = {found!r}: expected {FORMAT}; compute the design again with hsv design NAME --force"
+        )
     return report
 
 

@@ -13,7 +13,8 @@ from hsv.base.processes import Progress
 from hsv.certificate.loops import vertex_loops
 from hsv.certificate.margin_checks import margins_report
 from hsv.certificate.margins import disk_margin
-from hsv.control.design import FORMAT, ControlDesign
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import FORMAT
 from hsv.control.notch_filter import NotchSection
 from hsv.design.feedback import FeedbackGain, feedback_gain
 from hsv.design.inputs import DesignInputs

@@ -167,7 +167,10 @@ def _feasibility(A: np.ndarray, B: np.ndarray, *_: object) -> list[np.ndarray]:
     return minimise((Unknown((n, n), symmetric=True), Unknown((m, n))), lambda N, M: 0.0, inequalities, _NAME)
 
 
-_SEARCHES: dict[str, Callable[..., list[np.ndarray]]] = {"guaranteed_cost": _guaranteed_cost, "feasibility": _feasibility}
+_SEARCHES: dict[str, Callable[..., list[np.ndarray]]] = {
+    "guaranteed_cost": _guaranteed_cost,
+    "feasibility": _feasibility,
+}
 
 
 @dataclass(frozen=True)

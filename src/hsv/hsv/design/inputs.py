@@ -337,7 +337,7 @@ def _vehicle(value: Any, info: ValidationInfo) -> Vehicle | None:
 
 
 class CertifiedInputs(_Table):
-    """The inputs of a design that its certificate states, SI: those that say what is certified, and how it was flown."""
+    """The inputs of a design that its certificate states, SI: those that say what is certified and how it was flown."""
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import hadamard
@@ -56,6 +56,34 @@ def screening_corners(bounds: Mapping[str, float], share: float = 1.0) -> list[C
     runs = hadamard(16)[:, 1 : 1 + len(bounds)]
     rows = share * np.vstack((runs, -runs)) * np.array(list(bounds.values()))
     return [{}, *(dict(zip(bounds, map(float, row), strict=True)) for row in rows)]
+
+
+class Drawn(NamedTuple):
+    """A drawn flight of a design's region: parameter changes, first step of the fault and elevator effectiveness."""
+
+    corner: Corner
+    start: int
+    effectiveness: float
+
+
+def drawn_flights(inputs: Mapping[str, Any], vehicle: Vehicle, share: float, number: int, seed: int) -> list[Drawn]:
+    """Return ``number`` random flights of the region that the ``inputs`` (SI) of a design declare.
+
+    The fault starts in the window. Half of the flights have the largest loss of effectiveness and half a smaller one;
+    half of the vehicles are corners and half lie inside the bounds. ``share`` multiplies bounds and loss (eq. 47).
+    """
+    random, declared, period = np.random.default_rng(seed), inputs["disturbance"], inputs["model"]["period"]
+    first, last = declared["fault_window"] or [declared["fault_start"]] * 2
+    names, bounds = list(vehicle.uncertainty), share * np.array(list(vehicle.uncertainty.values()))
+    loss = share * (1.0 - declared["elevator_effectiveness"])
+    found = []
+    for start, inside, smaller in random.random((number, 3)).tolist():
+        draws = random.uniform(-1.0, 1.0, len(bounds))
+        changes = bounds * (draws if inside < 0.5 else np.sign(draws))
+        lost = loss * (2.0 * smaller if smaller < 0.5 else 1.0)
+        step = round((first + start * (last - first)) / period)
+        found.append(Drawn(dict(zip(names, changes.tolist(), strict=True)), step, 1.0 - lost))
+    return found
 
 
 def region_parameters(inputs: Mapping[str, Any], vehicle: Vehicle, share: float = 1.0) -> dict[str, Any]:

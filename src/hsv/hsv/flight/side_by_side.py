@@ -18,6 +18,7 @@ from hsv.flight.metrics import FlightData, curve_memory
 from hsv.model.faults.table import ENGINE_SIDE
 
 Result = TypeVar("Result")
+Variant = TypeVar("Variant")
 
 _MOST_HISTORY = 64 * 2**20
 """Largest memory (bytes) of the histories of all lanes; longer flights fly one at a time"""
@@ -90,28 +91,38 @@ class TubeLevels:
         return float(lib.hsv_worst_level(self.set.pointer, len(flight.time), *given))
 
 
+def fly_each(
+    variants: Sequence[Variant],
+    build: Callable[[Variant], Components],
+    job: Callable[[Variant, Flight], Result],
+    progress: Callable[[int], None] = lambda done: None,
+) -> list[Result]:
+    """Fly the components that ``build`` returns for each variant; return the results of ``job(variant, flight)``.
+
+    The results are in order. The flights are simulated in one thread per processor, with :class:`FlightGroup` where
+    possible. ``progress`` receives the number of finished flights.
+    """
+    width = lanes()
+
+    def of_some(some: Sequence[Variant]) -> list[Result]:
+        varied = [build(variant) for variant in some]
+        together = FlightGroup.takes(varied)
+        flown = [flight for flight, _ in FlightGroup().fly(varied)] if together else map(fly, varied)
+        return [job(variant, flight) for variant, flight in zip(some, flown, strict=True)]
+
+    groups = [variants[start : start + width] for start in range(0, len(variants), width)]
+    done = over_threads(of_some, groups, lambda groups: progress(min(groups * width, len(variants))))
+    return [result for results in done for result in results]
+
+
 def fly_perturbed(
     components: Components,
     perturbations: Sequence[Mapping[str, float]],
     job: Callable[[Mapping[str, float], Flight], Result],
     progress: Callable[[int], None] = lambda done: None,
 ) -> list[Result]:
-    """Fly every perturbation of a vehicle and return the results of ``job(perturbation, flight)``, in order.
-
-    The flights are simulated in one thread per processor. ``components`` are those of the nominal vehicle,
-    ``perturbations`` relative changes of its parameters. ``progress`` receives the number of finished flights.
-    """
-    width = lanes()
-
-    def of_some(some: Sequence[Mapping[str, float]]) -> list[Result]:
-        varied = [components.perturbed(perturbation) for perturbation in some]
-        together = FlightGroup.takes(varied)
-        flown = [flight for flight, _ in FlightGroup().fly(varied)] if together else map(fly, varied)
-        return [job(perturbation, flight) for perturbation, flight in zip(some, flown, strict=True)]
-
-    groups = [perturbations[start : start + width] for start in range(0, len(perturbations), width)]
-    done = over_threads(of_some, groups, lambda groups: progress(min(groups * width, len(perturbations))))
-    return [result for results in done for result in results]
+    """Fly ``components`` with every perturbation of the vehicle, relative changes by name, as :func:`fly_each` does."""
+    return fly_each(perturbations, components.perturbed, job, progress)
 
 
 def _shared(components: Components) -> tuple[Any, ...]:

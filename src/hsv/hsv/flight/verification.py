@@ -15,9 +15,21 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.base.processes import Progress
-from hsv.certificate.checks import Check, Checks, Subject, above, at_most, gathered, recomputed
+from hsv.certificate.checks import (
+    Check,
+    Checks,
+    Subject,
+    above,
+    at_most,
+    equal,
+    field_checks,
+    gathered,
+    recomputed,
+    under,
+)
 from hsv.certificate.tolerances import ROUNDING, TOLERANCES
 from hsv.certificate.verification import (
+    FLOWN_FIELDS,
     QUICK,
     RECOMPUTED,
     Part,
@@ -25,25 +37,32 @@ from hsv.certificate.verification import (
     acceleration_channels,
     lag_feedback,
     level,
+    widened,
 )
 from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import discretise
 from hsv.flight.assembly import assemble_flight, assemble_with
 from hsv.flight.closed_loop import Components, fly
-from hsv.flight.corners import Corner, corners, fraction, region_parameters
+from hsv.flight.corners import Corner, Drawn, corners, drawn_flights, fraction, region_parameters
 from hsv.flight.flight import Flight
 from hsv.flight.random_sequences import random_sequences
 from hsv.flight.responses import along_filter, lag_response
 from hsv.flight.scenario import Scenario
-from hsv.flight.side_by_side import fly_perturbed
+from hsv.flight.side_by_side import fly_each, fly_perturbed
+from hsv.model.faults.injector import FaultInjector
+from hsv.model.faults.schedule import ScheduledFault
+from hsv.model.faults.table import Fault
 from hsv.model.lpv.actuated import respond, sampled_actuators
 from hsv.model.lpv.polytope import evaluate
 from hsv.model.plant import FlightStatus
 from hsv.model.signals import ACCELERATED, CHANNELS, N_INPUTS, N_RIGID, N_STATES, PITCH_RATE, REMAINING
 from hsv.model.trim import trim
 
-_FLIGHTS, _SEED = 48, 7
-"""Number and seed of random corners that are flown in addition to those that determine a bound."""
+DRAWN = 192
+"""Number of flights that are drawn from a design's region by default."""
+
+SEQUENCES, STEPS = 20_000, 600
+"""Number of random sequences of vertices and disturbances, and their steps."""
 
 
 def region(subject: Subject, design: ControlDesign, share: float) -> Components:
@@ -161,55 +180,104 @@ def share_of(inputs: Mapping[str, Any]) -> float:
     return float(max(inputs["adjustable"]["tau"])) if inputs.get("adjustable") else 1.0
 
 
-def flight_checks(subject: Subject) -> Checks:
-    """Yield the checks of flights at the corners where a bound of W was measured (eq. 19), and at random corners.
+def flight_checks(subject: Subject, seed: int, number: int = DRAWN) -> Checks:
+    """Yield the checks of the flights over which W was measured (eq. 19), and of ``number`` drawn with a ``seed``.
 
     Errors must stay in the set (eq. 26), and plans u_r + u_n in the stated range, which is within the bounds of eq. 30.
-    The check of the pitch acceleration is our own.
+    The check of the pitch acceleration is our own. If the certificate is for a share of W, every flight may leave it.
     """
-    certified = replace(subject.design, tau=subject.design.tau_minimum)  # a flight may use another tau
-    subject = replace(subject, design=certified)
-    tube, share, bounds = Tube(subject, certified, "tube"), share_of(subject.certificate["inputs"]), subject.vehicle
-    parts, seen = region(subject, certified, share), fraction(bounds.uncertainty, share)
-    measured = subject.stated("tube.disturbance.measured")
-    setters = sorted({0, *measured["lower_flight"], *measured["upper_flight"]})
+    subject = replace(subject, design=replace(subject.design, tau=subject.design.tau_minimum))  # in flight: any tau
+    inputs, vehicle, tube = subject.certificate["inputs"], subject.vehicle, Tube(subject, subject.design, "tube")
+    share, declared = share_of(inputs), inputs["disturbance"]
+    parts, seen = region(subject, subject.design, share), fraction(vehicle.uncertainty, share)
+    everyone = corners(vehicle.uncertainty, share)
+    yield from _statements(subject, len(seen), len(everyone), parts)
 
-    def show(corner: Corner, flight: Flight) -> Evidence:
+    def show(_: object, flight: Flight) -> Evidence:
         return evidence(subject, tube, flight)
 
-    again = fly_perturbed(parts, [seen[i] for i in setters], show)
-    for k, side in enumerate(("lower", "upper")):
-        attained = [again[setters.index(i)].channels[k, j] for j, i in enumerate(measured[f"{side}_flight"])]
-        field = f"tube.disturbance.measured.{side}"
-        yield replace(recomputed(subject, field, attained, "flights"), fields=(field, f"{field}_flight"))
-    yield recomputed(subject, "tube.disturbance.flights", len(seen), "copied")
-    everyone = corners(bounds.uncertainty, share)
-    yield recomputed(subject, "tube.flights.flights", len(everyone), "copied")
-    drawn = np.random.default_rng(_SEED).choice(len(everyone), min(_FLIGHTS, len(everyone)), replace=False)
-    flown = [*again, *fly_perturbed(parts, [everyone[i] for i in (0, *drawn)], show)]
-    yield from _worst(subject, "tube.flights", flown)
-    plan = subject.stated("tube.tightening.plan")
-    low, high = plan["pitch_acceleration"]
-    least, most = np.append(plan["lowest"], low), np.append(plan["highest"], high)
-    yield above("nominal plan of flown corners, lowest", min(float(np.min(f.lowest - least)) for f in flown), -ROUNDING)
-    yield above(
-        "nominal plan of flown corners, highest", min(float(np.min(most - f.highest)) for f in flown), -ROUNDING
-    )
+    stated, plan = subject.stated("tube.flights"), subject.stated("tube.tightening.plan")
+    sides = [*plan["lowest_flight"], *plan["highest_flight"]]
+    pinned = sorted({stated["worst_level_flight"], stated["worst_ratio_flight"], *sides})
+    measured = fly_perturbed(parts, seen, show)
+    again = dict(zip(pinned, fly_perturbed(parts, [everyone[i] for i in pinned], show), strict=True))
+    yield from _measured(subject, measured)
+    worst, largest = again[stated["worst_level_flight"]], again[stated["worst_ratio_flight"]]
+    field = "tube.flights"
+    yield _pinned(subject, f"{field}.worst_level", worst.level)
+    check = _pinned(subject, f"{field}.worst_ratio", largest.ratio)
+    yield replace(check, fields=(*check.fields, f"{field}.channel", f"{field}.step"))
+    place, found = (stated["channel"], stated["step"]), (largest.channel, largest.step)
+    yield Check(f"{field}.channel, {field}.step", str(place), str(found), place == found)
+    for side in ("lowest", "highest"):
+        extremes = [getattr(again[f], side)[i] for i, f in enumerate(plan[f"{side}_flight"])]
+        check = recomputed(subject, f"tube.tightening.plan.{side}", extremes, "flights")
+        yield replace(check, fields=(*check.fields, f"{check.fields[0]}_flight"))
+
+    def build(drawn: Drawn) -> Components:
+        lost = Fault.of("elevator_deflection", "loss_of_effectiveness", {"effectiveness": drawn.effectiveness})
+        injector = FaultInjector([ScheduledFault(lost, drawn.start)], subject.design.period)
+        return replace(parts.perturbed(drawn.corner), fault_injector=injector)
+
+    drawn = drawn_flights(inputs, vehicle, share, number, seed)
+    flown = [*measured, *again.values(), *fly_each(drawn, build, show)]
+    allowance = 1.0 + TOLERANCES["flights"].relative
+    own = [*measured, *again.values()]
+    yield at_most("flights of the region: level", max(f.level for f in own), stated["worst_level"] * allowance)
+    yield at_most("flights of the region: ratio to W", max(f.ratio for f in own), stated["worst_ratio"] * allowance)
+    yield at_most(f"{number} drawn flights: level", max(f.level for f in flown), 1.0)
+    if declared["share"] == 1.0:
+        yield at_most(f"{number} drawn flights: ratio to W", max(f.ratio for f in flown), 1.0)
+    if declared["share"] < 1.0:  # every flight counts
+        own = fly_perturbed(parts, everyone, show)
+    yield recomputed(subject, f"{field}.outside", sum(f.ratio > 1.0 for f in own), "copied")
+    low, high = (np.array([getattr(f, side) for f in flown]) for side in ("lowest", "highest"))
+    yield above("nominal plan of all flights, lowest", float((low - plan["lowest"]).min()), -ROUNDING)
+    yield above("nominal plan of all flights, highest", float((plan["highest"] - high).min()), -ROUNDING)
     yield _lag_check("feedback to the lag of the plan", subject, flown)
     if "adjustable" in subject.certificate:
         # Our own check: with the whole fault (W), too, these flights stay in the set for W' (eq. 47), beyond eq. 26.
-        whole, everyone = region(subject, certified, 1.0), corners(bounds.uncertainty, 1.0)
-        field = "adjustable.complete_fault"
+        field, everyone = "adjustable.complete_fault", corners(vehicle.uncertainty, 1.0)
         yield recomputed(subject, f"{field}.flights", len(everyone), "copied")
-        yield from _worst(subject, field, fly_perturbed(whole, [everyone[i] for i in (0, *drawn)], show))
+        first = subject.stated(f"{field}.worst_level_flight")
+        some = [everyone[i] for i in (first, *np.random.default_rng(seed).choice(len(everyone), 48))]
+        worst, *others = fly_perturbed(region(subject, subject.design, 1.0), some, show)
+        yield _pinned(subject, f"{field}.worst_level", worst.level)
+        limit = min(1.0, subject.stated(f"{field}.worst_level") * allowance)
+        yield at_most(f"{field}: level", max(f.level for f in others), limit)
 
 
-def _worst(subject: Subject, field: str, flown: Sequence[Evidence]) -> Checks:
-    """Yield the checks of the flights' levels (at most 1) and disturbances against the certificate's, in ``field``."""
-    stated, allowance = subject.stated(field), 1.0 + TOLERANCES["flights"].relative
-    yield at_most(f"{field}: level", max(f.level for f in flown), min(1.0, stated["worst_level"] * allowance))
-    ratio = stated["disturbance_membership"]["worst_ratio"] * allowance
-    yield at_most(f"{field}: disturbance over its bound", max(f.ratio for f in flown), ratio)
+def _statements(subject: Subject, seen: int, everyone: int, parts: Components) -> Checks:
+    """Yield the checks of counts, and of the nominal flight of the region, whose bits are the same on every machine."""
+    declared = subject.stated("inputs.disturbance")
+    yield recomputed(subject, "tube.disturbance.flights", seen, "copied")
+    yield recomputed(subject, "tube.flights.flights", everyone, "copied")
+    steps = round(declared["duration"] / subject.design.period)
+    yield replace(recomputed(subject, "tube.flights.steps", steps, "copied"), fields=("tube.flights.steps",))
+    names = ("fault_start", "duration", "elevator_effectiveness")
+    check = equal(subject, "tube.flights.nominal_fingerprint", fly(parts).fingerprint)
+    ramp = under("inputs.disturbance.ramp", declared.get("ramp") or ())
+    yield replace(check, fields=(*check.fields, *under("inputs.disturbance", names), *ramp))
+
+
+def _measured(subject: Subject, flown: Sequence[Evidence]) -> Checks:
+    """Yield the checks of the extremes over the flights that measure W: of disturbances, and of the plan's lag."""
+    field = "tube.disturbance.measured"
+    for k, (side, extreme) in enumerate((("lower", np.min), ("upper", np.max))):
+        channels = np.array([f.channels[k] for f in flown])
+        yield recomputed(subject, f"{field}.{side}", extreme(channels, axis=0), "flights")
+        attained = [channels[i, j] for j, i in enumerate(subject.stated(f"{field}.{side}_flight"))]
+        check = recomputed(subject, f"{field}.{side}", attained, "flights")
+        yield replace(check, name=f"{field}.{side}_flight", fields=(f"{field}.{side}_flight",))
+        if subject.design.actuators:
+            sign, inflation = 2.0 * k - 1.0, subject.stated("inputs.disturbance.inflation")
+            worst = sign * widened(sign * extreme([f.lag[k] for f in flown], axis=0), inflation)
+            yield recomputed(subject, f"tube.tightening.lag_feedback.{side}", worst, "flights")
+
+
+def _pinned(subject: Subject, field: str, value: float) -> Check:
+    """Return the check of an extreme with the flight that has it."""
+    return replace(recomputed(subject, field, value, "flights"), fields=(field, f"{field}_flight"))
 
 
 def _lag_check(name: str, subject: Subject, flown: Sequence[Evidence]) -> Check:
@@ -222,17 +290,11 @@ def _lag_check(name: str, subject: Subject, flown: Sequence[Evidence]) -> Check:
     return above(f"{name}, room to its bounds", room, -ROUNDING)
 
 
-def sequence_checks(subject: Subject) -> Checks:
-    """Yield the checks of repeated random disturbance sequences, whose errors must stay in the tube's set (eq. 26)."""
-    tube, field = Tube(subject, subject.design, "tube"), "tube.invariant_set.sampling"
-    numbers = subject.count(f"{field}.sequences", 1_000_000), subject.count(f"{field}.steps", 10_000)
-    drawn = random_sequences(tube.A, tube.columns, tube.c, tube.Q, *numbers, subject.stated(f"{field}.seed"))
-    yield at_most("worst level of random sequences", drawn["worst_level"], 1.0)
-    check = recomputed(subject, f"{field}.worst_level", drawn["worst_level"], "random sequences")
-    yield replace(check, fields=(check.name, *(f"{field}.{name}" for name in ("sequences", "steps", "seed"))))
-    for start in ("worst_level_from_zero", "worst_level_from_boundary"):
-        for kind, value in drawn[start].items():
-            yield recomputed(subject, f"{field}.{start}.{kind}", value, "random sequences")
+def sequence_checks(subject: Subject, seed: int) -> Checks:
+    """Yield the check of random disturbance sequences, whose errors must stay in the tube's set (eq. 26)."""
+    tube = Tube(subject, subject.design, "tube")
+    drawn = random_sequences(tube.A, tube.columns, tube.c, tube.Q, SEQUENCES, STEPS, seed)
+    yield at_most(f"worst level of {SEQUENCES} random sequences", drawn["worst_level"], 1.0)
 
 
 def bounding_corners(subject: Subject) -> list[Corner]:
@@ -271,15 +333,27 @@ def scenario_checks(
     yield above(f"{name}: room of the nominal plan in U minus F Z", float(room), 0.0)
 
 
-FLOWN: dict[str, Part] = {"flights": flight_checks, "random sequences": sequence_checks}
-"""The checks that take longer, by part of the verification."""
+def verify(
+    subject: Subject, quick: bool = False, progress: Progress = lambda *_: None, *, seed: int, flights: int = DRAWN
+) -> dict[str, list[Check]]:
+    """Return the checks by part; with ``quick``, those without flights and random sequences.
 
-
-def verify(subject: Subject, quick: bool = False, progress: Progress = lambda *_: None) -> dict[str, list[Check]]:
-    """Return the checks by part; with ``quick``, those without flights and random sequences."""
+    Args:
+        subject: Design and certificate.
+        quick: Whether to omit flights and random sequences.
+        progress: Called with the name of a part, and whether it is done.
+        seed: Seed of the flights and random sequences.
+        flights: Number of flights to draw.
+    """
+    flown: dict[str, Part] = {
+        "flights": partial(flight_checks, seed=seed, number=flights),
+        "random sequences": partial(sequence_checks, seed=seed),
+    }
     checks: dict[str, list[Check]] = {}
-    for name, part in (QUICK | RECOMPUTED | ({} if quick else FLOWN)).items():
+    for name, part in (QUICK | RECOMPUTED | ({} if quick else flown)).items():
         progress(name, 0, 1)
         checks[name] = list(gathered(name, partial(part, subject)))
         progress(name, 1, 1)
+    made = [check for part in checks.values() for check in part]
+    checks["fields"] = gathered("fields", partial(field_checks, subject, made, FLOWN_FIELDS if quick else ()))
     return checks

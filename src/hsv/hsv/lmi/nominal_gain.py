@@ -128,13 +128,13 @@ def _decrease_blocks(contraction: np.ndarray, weighted: np.ndarray) -> np.ndarra
 class NominalGain:
     """The gain K = Y Q^-1 of one ellipsoid x' Q^-1 x <= 1, with the numbers that show that eq. 31 to 35 hold.
 
-    ``K`` (m, n) and ``Q`` (n, n) are in SI and rounded, ``Y`` (m, n) is K Q. All other numbers are recomputed from the rounded K and Q: ``certified_gamma``, a bound of the
-    cost (s) from any state of the ellipsoid; ``decrease`` (r), the smallest eigenvalue of the matrix of eq. 34 at each
-    vertex with this bound, diagonal blocks scaled to 1; ``state``, 1 minus the level of the design state (eq. 33);
-    ``input`` (m), 1 minus the largest squared input over its squared bound (eq. 35); ``nesting``, the smallest
-    eigenvalue of 1 - Q in coordinates in which the next ellipsoid outside is the unit ball; ``between`` (r),
-    :func:`decrease_between` in that ellipsoid; ``radii`` (r), the closed-loop spectral radii. ``nesting`` is None
-    without an ellipsoid outside, ``between`` also if the family is not interpolated.
+    ``K`` (m, n) and ``Q`` (n, n) are in SI and rounded, ``Y`` (m, n) is K Q. All other numbers are recomputed from the
+    rounded K and Q: ``certified_gamma``, a bound of the cost (s) from any state of the ellipsoid; ``decrease`` (r), the
+    smallest eigenvalue of the matrix of eq. 34 at each vertex with this bound, diagonal blocks scaled to 1; ``state``,
+    1 minus the level of the design state (eq. 33); ``input`` (m), 1 minus the largest squared input over its squared
+    bound (eq. 35); ``nesting``, the smallest eigenvalue of 1 - Q in coordinates in which the next ellipsoid outside is
+    the unit ball; ``between`` (r), :func:`decrease_between` in that ellipsoid; ``radii`` (r), the closed-loop spectral
+    radii. ``nesting`` is None without an ellipsoid outside, ``between`` also if the family is not interpolated.
     """
 
     K: np.ndarray

@@ -20,8 +20,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
-from importlib.metadata import version
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -226,9 +225,7 @@ class _Inequality:
         return np.asarray(self.constant + np.tensordot(x[self.acting], self.slopes, 1))
 
 
-def minimise(
-    unknowns: Sequence[Unknown], cost: Cost, inequalities: Inequalities, name: str
-) -> list[np.ndarray]:
+def minimise(unknowns: Sequence[Unknown], cost: Cost, inequalities: Inequalities, name: str) -> list[np.ndarray]:
     """Return a solution on the central path, with a cost about :data:`GAP` (relative) above the minimum.
 
     Args:
