@@ -8,13 +8,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import DesignError
+from hsv.certificate.coverage import region_parameters
 from hsv.design.adjustable import design_adjustable
 from hsv.design.certified import load_certified
 from hsv.design.disturbance import ChannelModel
 from hsv.design.error_system import error_system
 from hsv.design.inputs import read_inputs, with_tau
 from hsv.design.region import incomplete_share
-from hsv.flight.corners import corners, region_parameters
+from hsv.flight.corners import corners
 from hsv.model.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"

@@ -7,11 +7,11 @@ from marking import long
 from real_hardware import HARDWARE, RANDOM, SHORT
 
 from hsv.base.errors import ScenarioError
+from hsv.certificate.coverage import region_parameters
 from hsv.control.design import ControlDesign
 from hsv.design.inputs import find_inputs, read_inputs
 from hsv.flight.assembly import assemble, assemble_flight, flight_parameters
 from hsv.flight.closed_loop import fly
-from hsv.flight.corners import region_parameters
 from hsv.flight.governed import governed
 from hsv.flight.scenario import load_scenario
 from hsv.model.plant import FlightStatus

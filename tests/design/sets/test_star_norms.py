@@ -4,11 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from hsv.design.compare import compare_sets
 
 from hsv.base.errors import DesignError
 from hsv.control.design_file import find_design
 from hsv.design.certified import load_certified
-from hsv.design.compare import compare_sets
+from hsv.design.sets.counter_example import counter_examples
 from hsv.design.sets.star_norms import StarNorms
 
 

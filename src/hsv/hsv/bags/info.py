@@ -34,10 +34,12 @@ from hsv.bags.reader import Bag
 from hsv.bags.steps import bag_warnings, complete_stamps, cut_off, joined
 from hsv.base.errors import HsvError, ParameterError, RecordingError
 from hsv.base.files import parse_json
-from hsv.certificate.coverage import uncovered
+from hsv.certificate.coverage import FlownFault, uncovered
 from hsv.control.design import design_of
+from hsv.control.design_file import FORMAT
 from hsv.flight.fingerprint import as_published
 from hsv.flight.scenario import Scenario, parse_scenario
+from hsv.model.faults.injector import NEVER_TIME
 from hsv.model.faults.table import FAULT_KINDS, SENSOR
 from hsv.model.faults.table import fault_parameters as parameters_of
 from hsv.model.signals import INPUT_NAMES
@@ -179,10 +181,17 @@ def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | N
         sections = [ParameterSections.parse(bag.text(name), name) for name in ("design.yaml", "scenario.yaml")]
         values = sections[0].overlaid(sections[1]).of(TUBE_MPC.name)
         report = bag.attachments.get("certificate.json")
-        flown = [(fault["channel"], fault["type"], fault["parameters"]) for fault in faults or ()]
-        return uncovered(values, design_of(values), parse_json(report) if report else None, flown)
+        certificate = parse_json(report) if report else None
+        if isinstance(certificate, dict) and (version := certificate.get("format", 1)) != FORMAT:
+            return [f"all of it: certificate.json has format {version!r}, expected {FORMAT}; fly the design of today"]
+        return uncovered(values, design_of(values), certificate, map(_flown, faults or ()))
     except (HsvError, ValueError, LookupError, TypeError):
         return None  # the attachments are of another version or incomplete
+
+
+def _flown(fault: dict[str, Any]) -> FlownFault:
+    end = NEVER_TIME if fault["end_s"] is None else fault["end_s"]
+    return FlownFault(fault["channel"], fault["type"], fault["parameters"], fault["start_s"], end)
 
 
 def _step_times(bag: Bag) -> dict[str, Any] | None:

@@ -1,14 +1,15 @@
 """List the properties of a flight that the certificate of its design does not cover.
 
 A certificate holds for a vehicle with its uncertainty, the actuators of the design, ideal sensors and links, still air
-of the model's density, and a loss of elevator effectiveness down to the value in the inputs of the design. It says
-nothing about other flights, which may succeed all the same; ``hsv certify`` looks for a certificate that covers them.
+of the model's density, the commands of the flight in which W was measured, and one loss of elevator effectiveness: down
+to the value in the inputs of the design, from a time in their window to the end. It says nothing about other flights,
+which may succeed all the same; ``hsv certify`` looks for a certificate that covers other hardware.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,12 +20,26 @@ from hsv.control.controller import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
 from hsv.control.hardware import uncovered_hardware
 from hsv.control.notch_filter import flown_sections
+from hsv.model.actuators import ACTUATOR_SETS
+from hsv.model.faults.injector import NEVER_TIME
 from hsv.model.faults.table import fault_parameters
 from hsv.model.signals import INPUT_NAMES, STATE_NAMES
-from hsv.model.vehicle import Vehicle
+from hsv.model.vehicle import Vehicle, load_vehicle
 
 _LAW = "tube_mpc"
 """Name of the only controller that has a certificate."""
+
+_LOSS = INPUT_NAMES[1], "loss_of_effectiveness"
+"""Channel and type of the only fault that a certificate covers."""
+
+_COMMANDS = ("initial.", "reference.")
+"""Prefixes of the parameters of the initial point and the commands."""
+
+_INSTANT = 1e-6
+"""Difference between two times that are the same, s."""
+
+_NO_STOP = 1e3
+"""Position limit of an actuator that is never reached, because the vehicle's own input limits are smaller."""
 
 
 def uncovered_vehicle(values: Mapping[str, Any], design: ControlDesign) -> list[str]:
@@ -52,37 +67,91 @@ def uncovered_vehicle(values: Mapping[str, Any], design: ControlDesign) -> list[
     return found
 
 
-def uncovered_faults(faults: Iterable[tuple[str, str, Mapping[str, float]]], effectiveness: float | None) -> list[str]:
-    """Return a message for each fault that the certificate does not cover.
+class FlownFault(NamedTuple):
+    """A fault of a flight: channel, type, parameters (SI), and the times at which it starts and ends, s."""
+
+    channel: str
+    type: str
+    parameters: Mapping[str, float]
+    start: float
+    stop: float = NEVER_TIME
+
+
+def uncovered_faults(
+    faults: Iterable[FlownFault], declared: Mapping[str, Any] | None, duration: float = NEVER_TIME
+) -> list[str]:
+    """Return a message for each fault that the certificate does not cover, or that comes at another time.
 
     Args:
-        faults: Channel, type and parameters (SI) of each fault.
-        effectiveness: Smallest certified elevator effectiveness, or ``None`` if it is not known.
+        faults: Faults of the flight.
+        declared: The table ``inputs.disturbance`` of the certificate, or ``None`` if it is not known.
+        duration: Duration of the flight, s.
+    """
+    found, losses = [], []
+    for fault in faults:
+        least = fault.parameters.get("effectiveness", 1.0)
+        if (fault.channel, fault.type) != _LOSS:
+            why = "a loss of elevator effectiveness alone"
+        elif declared is None:
+            why = "a loss whose size no available certificate states"
+        elif least < declared["elevator_effectiveness"]:
+            why = f"a loss to {declared['elevator_effectiveness']:g} at most"
+        else:
+            losses.append(fault)
+            continue
+        found.append(f"fault: {_fault_in_words(fault)}; the certificate is for {why}")
+    if declared is not None and losses:
+        first, last = declared["fault_window"] or [declared["fault_start"]] * 2
+        window = f"{first:g} s" if first == last else f"{first:g} s to {last:g} s"
+        times = [fault.start for fault in losses if not first - _INSTANT <= fault.start <= last + _INSTANT]
+        found += [f"fault: at {time:g} s; the certificate is for {window}" for time in times]
+        ends = [fault.stop for fault in losses if fault.stop < duration - _INSTANT]
+        found += [f"fault: ends at {time:g} s; the certificate is for one that stays" for time in ends]
+        if len(losses) > 1:
+            found.append(f"fault: {len(losses)} losses of elevator effectiveness; the certificate is for one")
+    return list(dict.fromkeys(found))
+
+
+def _fault_in_words(fault: FlownFault) -> str:
+    known = {parameter.name: parameter for parameter in fault_parameters(fault.channel, fault.type)}
+    shown = ", ".join(
+        f"{name} {known[name].written(fault.channel, value, UnitSystem.paper)}"
+        for name, value in fault.parameters.items()
+    )
+    return f"{fault.type} of {fault.channel}{f' ({shown})' if shown else ''}"
+
+
+def uncovered_commands(values: Mapping[str, Any], declared: Mapping[str, Any]) -> list[str]:
+    """Return a message if initial point, commands or duration in ``values`` are not those ``declared`` by the region.
+
+    Both are flat parameters, ``declared`` those of :func:`region_parameters`.
     """
     found = []
-    for channel, kind, parameters in dict.fromkeys((c, k, tuple(p.items())) for c, k, p in faults):
-        least = dict(parameters).get("effectiveness", 1.0)
-        if (channel, kind) != (INPUT_NAMES[1], "loss_of_effectiveness"):
-            why = "a loss of elevator effectiveness alone"
-        elif effectiveness is None:
-            why = "a loss whose size no available certificate states"
-        elif least < effectiveness:
-            why = f"a loss to {effectiveness:g} at most"
-        else:
-            continue
-        known = {parameter.name: parameter for parameter in fault_parameters(channel, kind)}
-        shown = ", ".join(
-            f"{name} {known[name].written(channel, value, UnitSystem.paper)}" for name, value in parameters
-        )
-        found.append(f"fault: {kind} of {channel}{f' ({shown})' if shown else ''}; the certificate is for {why}")
+    if values.get("duration", 0.0) > declared["duration"] + _INSTANT:
+        found.append(f"duration: {values['duration']:g} s; the certificate is for {declared['duration']:g} s at most")
+    expected = {"reference.blend": 0.0, "reference.blends": [], "reference.trim": "climbing", **declared}
+    for name, value in values.items():
+        if name.startswith(_COMMANDS) and not _equal(value, expected.get(name)):
+            given, certified = (" ".join(map(_number, np.atleast_1d(each))) for each in (value, expected[name]))
+            found.append(f"{name}: {given}; the certificate is for {certified or 'none'}")
     return found
+
+
+def _number(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _equal(value: Any, expected: Any) -> bool:
+    if isinstance(value, str) or isinstance(expected, str):
+        return bool(value == expected)
+    return np.shape(value) == np.shape(expected) and bool(np.allclose(value, expected, rtol=1e-9, atol=0.0))
 
 
 def uncovered(
     values: Mapping[str, Any],
     design: ControlDesign | None,
     certificate: Mapping[str, Any] | None,
-    faults: Iterable[tuple[str, str, Mapping[str, float]]],
+    faults: Iterable[FlownFault],
 ) -> list[str]:
     """Return a message for each property of a flight that the certificate does not cover; empty if all are covered.
 
@@ -90,34 +159,29 @@ def uncovered(
         values: Flat parameters of the flight.
         design: Design of the flight.
         certificate: Certificate of the design, or None if it is not available.
-        faults: Channel, type and parameters (SI) of each fault.
+        faults: Faults of the flight.
 
     Raises:
         ParameterError: A parameter is wrong; the message names it.
-        DesignError: The certificate does not state which loss of effectiveness it covers.
+        DesignError: The certificate does not state which flights it covers.
     """
     controller = str(validate(CONTROLLER_PARAMETERS, values)["controller"])
     if controller != _LAW or design is None or design.tube is None:
         which = "the design" if controller == _LAW else f"controller {controller}"
         return [f"all of it: {which} has no certified tube"]
-    effectiveness = _effectiveness(certificate) if certificate else None
-    changed = ["design: not as it was written, its parameters do not have the digest design.hash"]
-    return [
-        *(changed if design.modified else []),
-        *uncovered_vehicle(values, design),
-        *uncovered_hardware(values, design),
-        *uncovered_faults(faults, effectiveness),
-    ]
-
-
-def _effectiveness(certificate: Mapping[str, Any]) -> float:
-    field = "inputs.disturbance.elevator_effectiveness"
-    value: Any = certificate
-    for key in field.split("."):
-        value = value.get(key) if isinstance(value, Mapping) else None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
-        raise DesignError(f"certificate: {field} = {value!r}: expected a number from 0 to 1")
-    return float(value)
+    found = ["design: not as it was written, its parameters do not have the digest design.hash"] * design.modified
+    found += [*uncovered_vehicle(values, design), *uncovered_hardware(values, design)]
+    if certificate is None:
+        return found + uncovered_faults(faults, None)
+    try:
+        declared = certificate["inputs"]["disturbance"]
+        region = region_parameters(certificate["inputs"], load_vehicle())
+        partly = only_share(certificate)
+        found += uncovered_commands(values, region)
+        found += uncovered_faults(faults, declared, values.get("duration", NEVER_TIME))
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        raise DesignError(f"certificate: {error}: expected the region that it covers") from error
+    return found + [f"disturbances: {partly}"] * bool(partly)
 
 
 def uncovered_rates(design: ControlDesign | None, states: np.ndarray) -> list[str]:
@@ -136,3 +200,40 @@ def uncovered_rates(design: ControlDesign | None, states: np.ndarray) -> list[st
         for name, unit, rate, limit, fast in found
         if fast
     ]
+
+
+def only_share(certificate: Mapping[str, Any]) -> str:
+    """Return what a ``certificate`` for a share of W says, in words; empty if it is for all of W."""
+    share, flights = certificate["inputs"]["disturbance"]["share"], certificate["tube"]["flights"]
+    left = f"{flights['outside']} of {flights['flights']} measured flights leave it"
+    return f"certified for {share:g} W; {left}" if share < 1.0 else ""
+
+
+def region_parameters(inputs: Mapping[str, Any], vehicle: Vehicle, share: float = 1.0) -> dict[str, Any]:
+    """Return the flat parameters of the flight that the ``inputs`` (SI) of a design declare, without the design itself.
+
+    The lost elevator effectiveness is ``share`` (0 to 1) times the declared loss (paper eq. 47).
+    """
+    declared, ramp = inputs["disturbance"], inputs["disturbance"].get("ramp")
+    start, target = inputs["nominal"]["start"], inputs["nominal"]["target"]
+    points = [start, target] if ramp else [target]
+    values: dict[str, Any] = {
+        "duration": declared["duration"],
+        **vehicle.to_parameters(),
+        "vehicle.coupling": declared["coupling"],
+        "initial.altitude": start["altitude"],
+        "initial.velocity": start["velocity"],
+        "reference.times": [ramp["start"], ramp["end"]] if ramp else [0.0],
+        "reference.altitudes": [point["altitude"] for point in points],
+        "reference.velocities": [point["velocity"] for point in points],
+        "fault.channels": ["elevator_deflection"],
+        "fault.types": ["loss_of_effectiveness"],
+        "fault.parameters": [f"effectiveness={1.0 - share * (1.0 - declared['elevator_effectiveness'])!r}"],
+        "fault.starts": [declared["fault_start"]],
+    }
+    if ramp and ramp.get("blend"):
+        values["reference.blend"] = ramp["blend"]
+    for name in filter(None, (inputs.get("actuator") or {}).values()):
+        channel = f"actuator.{ACTUATOR_SETS[name].channel}"
+        values |= {f"{channel}.set": name, f"{channel}.stop": [_NO_STOP]}
+    return values

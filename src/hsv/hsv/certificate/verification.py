@@ -4,7 +4,7 @@ This module imports no code that computes designs. It shares with that code only
 the discretisation of the notch filter (:mod:`hsv.control.notch_filter`), the reading of the files, and names. The
 numbers in flight (vertices A_i, B_i, gains F and K) come from the design file, the statements about them from the
 certificate. The vertices are recomputed from the parameters of the vehicle, and every inequality from its matrices.
-:mod:`hsv.flight.verification` repeats the flights, and :func:`hsv.certificate.checks.unchecked` lists the fields that
+:mod:`hsv.flight.verification` repeats the flights, and :data:`hsv.certificate.checks.STATED` names the fields that
 no check covers. The parts follow the paper: model (eq. 10 to 12), gain F (eq. 24), gains K (eq. 31 to 35), error system
 (eq. 22, 23), invariant set (eq. 25 to 28), tightened bounds (eq. 30), adjustable factor (eq. 47 to 54).
 
@@ -40,6 +40,7 @@ from hsv.certificate.checks import (
     under,
 )
 from hsv.certificate.convolution import LONGEST, rated_bounds
+from hsv.certificate.coverage import only_share
 from hsv.certificate.tolerances import ACCURACY, ROUNDING
 from hsv.control.design import PLAN_SHIFT, ControlDesign
 from hsv.control.design_file import FORMAT, find_certificate, read_certificate
@@ -145,13 +146,6 @@ def statement_checks(subject: Subject) -> Checks:
     yield Check("share of W", partial_set or "all of W", "all of W", not partial_set)
 
 
-def only_share(certificate: Mapping[str, Any]) -> str:
-    """Return what a ``certificate`` for a share of W says, in words; empty if it is for all of W."""
-    share, flights = certificate["inputs"]["disturbance"]["share"], certificate["tube"]["flights"]
-    left = f"{flights['outside']} of {flights['flights']} measured flights leave it"
-    return f"certified for {share:g} W; {left}" if share < 1.0 else ""
-
-
 def input_checks(subject: Subject) -> Checks:
     """Check what the design copies from its inputs, and that the scheduling weights of each axis are convex.
 
@@ -164,7 +158,8 @@ def input_checks(subject: Subject) -> Checks:
     for i, section in enumerate(design.notch):
         for name, value in vars(section).items():
             yield recomputed(subject, f"inputs.notch.{i}.{name}", value, "copied")
-    yield same("notch, sections", len(design.notch), len(inputs["notch"]), "copied")
+    check = same("notch, sections", len(design.notch), len(inputs["notch"]), "copied")
+    yield replace(check, fields=() if design.notch else ("inputs.notch",))
     yield equal(subject, "inputs.disturbance.coupling", design.coupling)
     known = " ".join(name for name in (inputs.get("actuator") or {}).values() if name)
     given = " ".join(design.actuators)

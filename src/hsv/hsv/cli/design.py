@@ -57,7 +57,7 @@ def design(
     Example: hsv design baseline; hsv design adjustable --tau 0.8 --out softer.yaml; hsv design baseline --check
     """
     from hsv.certificate.checks import load_subject
-    from hsv.certificate.verification import only_share
+    from hsv.certificate.coverage import only_share
     from hsv.control.design_file import certificate_path, write_certificate, write_design
     from hsv.design.adjustable import design_adjustable
     from hsv.design.baseline import design_baseline

@@ -17,12 +17,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hsv.base.errors import DesignError
+from hsv.certificate.coverage import region_parameters
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import ChannelModel, Extremes
 from hsv.design.inputs import CertifiedInputs
 from hsv.flight.assembly import assemble_with
 from hsv.flight.closed_loop import fly
-from hsv.flight.corners import Corner, corners, fraction, region_parameters, screening_corners
+from hsv.flight.corners import Corner, corners, fraction, screening_corners
 from hsv.flight.flight import Flight
 from hsv.flight.side_by_side import fly_perturbed
 from hsv.model.plant import FlightStatus

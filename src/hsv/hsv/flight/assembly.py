@@ -10,13 +10,14 @@ from typing import Any
 
 from hsv.base.errors import HsvError, ParameterError, ScenarioError, TrimError
 from hsv.base.parameters import table_values
-from hsv.certificate.coverage import uncovered
+from hsv.certificate.coverage import FlownFault, uncovered
 from hsv.control.controller import NODE, SHIPPED_CONTROLLERS
 from hsv.control.design import TAU, ControlDesign, design_of
 from hsv.control.design_file import certificate_path, find_design, read_certificate, read_design, read_parameters
 from hsv.flight.blocks import LOOP
 from hsv.flight.closed_loop import Components
 from hsv.flight.scenario import Scenario
+from hsv.model.faults.injector import NEVER_TIME
 from hsv.plugins.controllers import controller_class, names_code
 
 _FIELDS = {
@@ -130,7 +131,11 @@ def uncovered_of(
         path = certificate_path(find_design(scenario.design))
         certificate = read_certificate(path) if path.is_file() else None
     values = {**(design.loop_parameters if design else {}), **scenario.parameters()}
-    return uncovered(values, design, certificate, [(f.channel, f.type, f.parameters) for f in scenario.fault])
+    faults = [
+        FlownFault(f.channel, f.type, f.parameters, f.start, NEVER_TIME if f.stop is None else f.stop)
+        for f in scenario.fault
+    ]
+    return uncovered(values, design, certificate, faults)
 
 
 def require_trust(controller: str, source: object, trust: bool) -> None:

@@ -1,4 +1,4 @@
-"""The flight in which a design's disturbances are measured, and the corners of the vehicle's uncertain parameters."""
+"""The flights of a design's region: corners of the vehicle's uncertain parameters, and random flights."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import hadamard
 
-from hsv.model.actuators import ACTUATOR_SETS
 from hsv.model.vehicle import Vehicle
 
 Corner = Mapping[str, float]
@@ -17,9 +16,6 @@ Corner = Mapping[str, float]
 
 _FRACTIONED = 10
 """Number of uncertain parameters from which :func:`fraction` returns only a quarter of the corners."""
-
-_NO_STOP = 1e3
-"""Position limit of an actuator that is never reached, because the vehicle's own input limits are smaller."""
 
 
 def corners(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, float]]:
@@ -84,33 +80,3 @@ def drawn_flights(inputs: Mapping[str, Any], vehicle: Vehicle, share: float, num
         step = round((first + start * (last - first)) / period)
         found.append(Drawn(dict(zip(names, changes.tolist(), strict=True)), step, 1.0 - lost))
     return found
-
-
-def region_parameters(inputs: Mapping[str, Any], vehicle: Vehicle, share: float = 1.0) -> dict[str, Any]:
-    """Return the flat parameters of the flight that the ``inputs`` (SI) of a design declare, without the design itself.
-
-    The lost elevator effectiveness is ``share`` (0 to 1) times the declared loss (paper eq. 47).
-    """
-    declared, ramp = inputs["disturbance"], inputs["disturbance"].get("ramp")
-    start, target = inputs["nominal"]["start"], inputs["nominal"]["target"]
-    points = [start, target] if ramp else [target]
-    values: dict[str, Any] = {
-        "duration": declared["duration"],
-        **vehicle.to_parameters(),
-        "vehicle.coupling": declared["coupling"],
-        "initial.altitude": start["altitude"],
-        "initial.velocity": start["velocity"],
-        "reference.times": [ramp["start"], ramp["end"]] if ramp else [0.0],
-        "reference.altitudes": [point["altitude"] for point in points],
-        "reference.velocities": [point["velocity"] for point in points],
-        "fault.channels": ["elevator_deflection"],
-        "fault.types": ["loss_of_effectiveness"],
-        "fault.parameters": [f"effectiveness={1.0 - share * (1.0 - declared['elevator_effectiveness'])!r}"],
-        "fault.starts": [declared["fault_start"]],
-    }
-    if ramp and ramp.get("blend"):
-        values["reference.blend"] = ramp["blend"]
-    for name in filter(None, (inputs.get("actuator") or {}).values()):
-        channel = f"actuator.{ACTUATOR_SETS[name].channel}"
-        values |= {f"{channel}.set": name, f"{channel}.stop": [_NO_STOP]}
-    return values

@@ -27,6 +27,7 @@ from hsv.certificate.checks import (
     recomputed,
     under,
 )
+from hsv.certificate.coverage import region_parameters
 from hsv.certificate.tolerances import ROUNDING, TOLERANCES
 from hsv.certificate.verification import (
     FLOWN_FIELDS,
@@ -43,7 +44,7 @@ from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import discretise
 from hsv.flight.assembly import assemble_flight, assemble_with
 from hsv.flight.closed_loop import Components, fly
-from hsv.flight.corners import Corner, Drawn, corners, drawn_flights, fraction, region_parameters
+from hsv.flight.corners import Corner, Drawn, corners, drawn_flights, fraction
 from hsv.flight.flight import Flight
 from hsv.flight.random_sequences import random_sequences
 from hsv.flight.responses import along_filter, lag_response
@@ -231,9 +232,11 @@ def flight_checks(subject: Subject, seed: int, number: int = DRAWN) -> Checks:
     if declared["share"] < 1.0:  # every flight counts
         own = fly_perturbed(parts, everyone, show)
     yield recomputed(subject, f"{field}.outside", sum(f.ratio > 1.0 for f in own), "copied")
-    low, high = (np.array([getattr(f, side) for f in flown]) for side in ("lowest", "highest"))
-    yield above("nominal plan of all flights, lowest", float((low - plan["lowest"]).min()), -ROUNDING)
-    yield above("nominal plan of all flights, highest", float((plan["highest"] - high).min()), -ROUNDING)
+    low, high = (np.array([getattr(f, side) for f in own]) for side in ("lowest", "highest"))
+    yield above("flights of the region: lowest of plans", float((low - plan["lowest"]).min()), -ROUNDING)
+    yield above("flights of the region: highest of plans", float((plan["highest"] - high).min()), -ROUNDING)
+    bounds = subject.stated("tube.tightening")
+    yield above(f"{number} drawn flights: room of plans in U minus F Z", plan_room(bounds, flown), 0.0)
     yield _lag_check("feedback to the lag of the plan", subject, flown)
     if "adjustable" in subject.certificate:
         # Our own check: with the whole fault (W), too, these flights stay in the set for W' (eq. 47), beyond eq. 26.
@@ -328,9 +331,14 @@ def scenario_checks(
     yield at_most(where, worst.ratio, 1.0)
     if subject.design.actuators:
         yield _lag_check(f"{name}: feedback to the lag of the plan", subject, flown)
-    stated = subject.stated("tube.tightening")
-    room = min(min((f.lowest[:2] - stated["lower"]).min(), (stated["upper"] - f.highest[:2]).min()) for f in flown)
-    yield above(f"{name}: room of the nominal plan in U minus F Z", float(room), 0.0)
+    room = plan_room(subject.stated("tube.tightening"), flown)
+    yield above(f"{name}: room of the nominal plan in U minus F Z", room, 0.0)
+
+
+def plan_room(bounds: Mapping[str, Any], flown: Sequence[Evidence]) -> float:
+    """Return the least distance of the plans of flights from the tightened ``bounds``, negative beyond them."""
+    rooms = [(f.lowest[:2] - bounds["lower"], bounds["upper"] - f.highest[:2]) for f in flown]
+    return float(np.min(rooms))
 
 
 def verify(
@@ -355,5 +363,5 @@ def verify(
         checks[name] = list(gathered(name, partial(part, subject)))
         progress(name, 1, 1)
     made = [check for part in checks.values() for check in part]
-    checks["fields"] = gathered("fields", partial(field_checks, subject, made, FLOWN_FIELDS if quick else ()))
+    checks["fields"] = list(gathered("fields", partial(field_checks, subject, made, FLOWN_FIELDS if quick else ())))
     return checks

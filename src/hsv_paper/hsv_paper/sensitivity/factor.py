@@ -10,6 +10,7 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.certificate.loops import Feedback
+from hsv.certificate.coverage import region_parameters
 from hsv.control.design import ControlDesign
 from hsv.design.adjustable import certified_loops, relaxed_bound
 from hsv.design.baseline import design_gains, nominal_family, nominal_problem, with_family
@@ -19,7 +20,7 @@ from hsv.design.region import Region
 from hsv.design.tube import MeasuredSet, measured_set
 from hsv.flight.assembly import assemble
 from hsv.flight.closed_loop import fly
-from hsv.flight.corners import fraction, region_parameters
+from hsv.flight.corners import fraction
 from hsv.model.signals import N_RIGID
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
