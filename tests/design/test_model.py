@@ -75,9 +75,8 @@ def sections(inputs):
 
 def test_the_cost_is_above_its_optimum_by_the_gap():
     # The minimum of t x - log(x - 3) is at x = 3 + 1 / t.
-    (x,), report = minimise([Unknown((1, 1))], lambda x: x[0, 0], lambda x: [x - 3.0], "scalar")
+    (x,) = minimise([Unknown((1, 1))], lambda x: x[0, 0], lambda x: [x - 3.0], "scalar")
     assert GAP / 2.0 < x[0, 0] / 3.0 - 1.0 < 2.0 * GAP
-    assert report.objective == x[0, 0]
 
 
 def test_what_has_no_solution_is_refused_by_name():
