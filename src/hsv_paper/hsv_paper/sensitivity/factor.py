@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.certificate.loops import Feedback
 from hsv.certificate.coverage import region_parameters
+from hsv.certificate.loops import Feedback
 from hsv.control.design import ControlDesign
 from hsv.design.adjustable import certified_loops, relaxed_bound
 from hsv.design.baseline import design_gains, nominal_family, nominal_problem, with_family
