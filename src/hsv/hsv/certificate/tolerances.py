@@ -52,7 +52,6 @@ TOLERANCES = {
     "flights": Tolerance(1e-05, 1e-12),
     "disk margins": Tolerance(5e-06, 1e-12),
     "frequencies of margins": Tolerance(1e-03, 1e-12),
-    "random sequences": Tolerance(1e-06, 1e-12),
 }
 """Tolerances by kind of quantity."""
 

@@ -193,4 +193,4 @@ def room_at_one(design: ControlDesign, vehicle: Vehicle, tube: dict[str, Any]) -
         InvariantSet.from_report(problem, tube["invariant_set"]), design.input_minimum, design.input_maximum
     )
     plan = tube["tightening"]["plan"]
-    return np.asarray(bounds.margins(np.array(plan["lowest"]), np.array(plan["highest"])).min(axis=1))
+    return np.asarray(bounds.margins(np.array(plan["lowest"][:2]), np.array(plan["highest"][:2])).min(axis=1))

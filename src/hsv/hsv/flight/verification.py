@@ -28,6 +28,7 @@ from hsv.certificate.checks import (
     under,
 )
 from hsv.certificate.coverage import region_parameters
+from hsv.certificate.margin_checks import margin_checks
 from hsv.certificate.tolerances import ROUNDING, TOLERANCES
 from hsv.certificate.verification import (
     FLOWN_FIELDS,
@@ -350,7 +351,7 @@ def verify(
         subject: Design and certificate.
         quick: Whether to omit flights and random sequences.
         progress: Called with the name of a part, and whether it is done.
-        seed: Seed of the flights and random sequences.
+        seed: Seed of the flights, the random sequences and the corners whose margins are computed.
         flights: Number of flights to draw.
     """
     flown: dict[str, Part] = {
@@ -358,7 +359,8 @@ def verify(
         "random sequences": partial(sequence_checks, seed=seed),
     }
     checks: dict[str, list[Check]] = {}
-    for name, part in (QUICK | RECOMPUTED | ({} if quick else flown)).items():
+    margins: dict[str, Part] = {"margins": partial(margin_checks, seed=seed)}
+    for name, part in (QUICK | RECOMPUTED | margins | ({} if quick else flown)).items():
         progress(name, 0, 1)
         checks[name] = list(gathered(name, partial(part, subject)))
         progress(name, 1, 1)
