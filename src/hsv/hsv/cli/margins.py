@@ -32,10 +32,10 @@ def margins(
     Example: hsv margins case1_robust --corners; hsv margins baseline --out margins.html
     """
     from hsv.certificate.checks import load_subject
+    from hsv.certificate.coverage import region_parameters
     from hsv.certificate.margins import CASES, design_loops
     from hsv.control.design_file import find_design
     from hsv.flight.assembly import assemble_flight, flight_parameters
-    from hsv.flight.corners import region_parameters
     from hsv.flight.margins import MarginResults, corner_file, flown_borders, scenario_loops
     from hsv.flight.scenario import load_scenario, scenario_names
 
