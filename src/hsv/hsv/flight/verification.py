@@ -137,6 +137,7 @@ class Evidence:
     The largest ratio occurs in ``channel`` at ``step``. ``lowest`` and ``highest``, shape (3,), are the extremes of the
     two inputs u_r + u_n and of the nominal pitch acceleration (rad/s^2). ``lag``, shape (2, 2), and ``channels``, shape
     (2, 7), have the minima (row 0) and maxima (row 1) of the two fields of :class:`Disturbances` with these names.
+    ``moved``, shape (2,), is the largest change of altitude (m) and velocity (m/s) in a step.
     """
 
     level: float
@@ -147,6 +148,7 @@ class Evidence:
     highest: np.ndarray
     lag: np.ndarray
     channels: np.ndarray
+    moved: np.ndarray
 
 
 def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
@@ -174,6 +176,7 @@ def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
         np.append(plan.max(axis=0), turning.max()),
         np.stack((found.lag.min(axis=0), found.lag.max(axis=0))),
         np.stack((found.channels.min(axis=0), found.channels.max(axis=0))),
+        np.abs(np.diff(h.state[:, :2], axis=0)).max(axis=0),
     )
 
 
@@ -239,6 +242,7 @@ def flight_checks(subject: Subject, seed: int, number: int = DRAWN) -> Checks:
     bounds = subject.stated("tube.tightening")
     yield above(f"{number} drawn flights: room of plans in U minus F Z", plan_room(bounds, flown), 0.0)
     yield _lag_check("feedback to the lag of the plan", subject, flown)
+    yield from _rate_checks("all flights", subject, flown)
     if "adjustable" in subject.certificate:
         # Our own check: with the whole fault (W), too, these flights stay in the set for W' (eq. 47), beyond eq. 26.
         field, everyone = "adjustable.complete_fault", corners(vehicle.uncertainty, 1.0)
@@ -294,6 +298,17 @@ def _lag_check(name: str, subject: Subject, flown: Sequence[Evidence]) -> Check:
     return above(f"{name}, room to its bounds", room, -ROUNDING)
 
 
+def _rate_checks(name: str, subject: Subject, flown: Sequence[Evidence]) -> Checks:
+    """Yield the check that altitude and velocity change no faster than the bounds of the feedback require, if they do.
+
+    The check is our own: the paper's set holds for any change.
+    """
+    tube = subject.design.tube
+    if tube is not None and len(tube.rates):
+        share = max(float((f.moved / (subject.design.period * tube.rates)).max()) for f in flown)
+        yield at_most(f"{name}: rates of altitude and velocity, share of the certified ones", share, 1.0)
+
+
 def sequence_checks(subject: Subject, seed: int) -> Checks:
     """Yield the check of random disturbance sequences, whose errors must stay in the tube's set (eq. 26)."""
     tube = Tube(subject, subject.design, "tube")
@@ -332,6 +347,7 @@ def scenario_checks(
     yield at_most(where, worst.ratio, 1.0)
     if subject.design.actuators:
         yield _lag_check(f"{name}: feedback to the lag of the plan", subject, flown)
+    yield from _rate_checks(name, subject, flown)
     room = plan_room(subject.stated("tube.tightening"), flown)
     yield above(f"{name}: room of the nominal plan in U minus F Z", room, 0.0)
 
