@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from hsv.certificate.checks import load_subject, unchecked
+from hsv.certificate.checks import field_checks, leaves, load_subject
 from hsv.certificate.loops import INPUTS, MEASUREMENTS, BrokenLoop, vertex_loops
 from hsv.certificate.margin_checks import corner_checks, margin_checks, margins_report
 from hsv.certificate.margins import (
@@ -135,8 +135,10 @@ def test_published_margins_of_robust(stated):
     assert min(block["vertices"]["both"]["margin"]) == pytest.approx(0.846, abs=5e-4)
     assert block["corners"]["designed"]["margin"] == pytest.approx(0.772, abs=5e-4)
     assert block["corners"]["slow"]["margin"] == pytest.approx(0.528, abs=5e-4)
-    assert all(check.ok for check in margin_checks(stated)) and all(check.ok for check in corner_checks(stated))
-    assert not [field for field in unchecked(stated, margin_checks(stated), whole=False) if field.startswith("margins")]
+    made = list(margin_checks(stated, seed=1))
+    assert all(check.ok for check in made) and all(check.ok for check in corner_checks(stated))
+    others = [field for field in leaves(stated.certificate) if not field.startswith("margins")]
+    assert list(field_checks(stated, made, others)) == []
 
 
 CHANGES = [
@@ -164,7 +166,7 @@ def test_a_tampered_field_fails(stated, change):
         table[key][7] *= value
     else:
         table[key] = table[key] * value if isinstance(value, float) else value
-    assert not all(check.ok for check in margin_checks(replace(stated, certificate=certificate)))
+    assert not all(check.ok for check in margin_checks(replace(stated, certificate=certificate), seed=1))
 
 
 def test_an_interruption_leaves_the_corners_that_are_done():
