@@ -31,7 +31,8 @@ _INTERRUPTED = 130
 
 EXIT_CODES = {
     0: "done",
-    1: "failed, or the result is negative: a flight lost, a claim or comparison that does not hold",
+    1: "failed, or the result is negative: a flight lost, a claim or comparison that does not hold, a check of "
+    "`hsv verify` that fails, a design for only a share of its disturbances (`design`, `verify`)",
     2: "refused: bad input, or a file that cannot be read or written",
     _INTERRUPTED: "interrupted",
 }
