@@ -120,10 +120,8 @@ def walk_certificate(falsifier, draw, every=1):
         changed = 2.0 * value if field.startswith("model.accuracy") and type(value) is float else other(value, draw)
         falsifier.try_("change", field, falsifier.with_certificate, set_in, field, changed)
         falsifier.try_("remove", field, falsifier.with_certificate, remove, field)
-        twins = (
-            [k for k in table if k != key and np.shape(table[k]) == np.shape(value)] if isinstance(table, dict) else []
-        )
-        if twins and np.shape(value):
+        twins = [k for k in table if k != key and shape(table[k]) == shape(value)] if isinstance(table, dict) else []
+        if twins and shape(value):
             twin = twins[int(draw.integers(len(twins)))]
             if differ(table[twin], value):
                 falsifier.try_("swap", field, falsifier.with_certificate, swap, field, twin)
@@ -132,10 +130,20 @@ def walk_certificate(falsifier, draw, every=1):
         falsifier.try_("add", f"{table}.x", falsifier.with_certificate, add, table)
 
 
+def shape(value):
+    """Return the shape of an array; an empty one if the value is a number, a text or a list of unequal rows."""
+    try:
+        return np.shape(value)
+    except ValueError:
+        return ()
+
+
 def differ(a, b):
-    if type(a) is not type(b) or isinstance(np.ravel(a)[0], str):
+    """Return whether two values of the same shape differ, beyond rounding if they are numbers."""
+    flat = [np.ravel(each).tolist() for each in (a, b)]
+    if not all(isinstance(value, int | float) for each in flat for value in each):
         return a != b
-    return not np.allclose(a, b, rtol=1e-3, atol=0.0)
+    return not np.allclose(*flat, rtol=1e-3, atol=0.0)
 
 
 def remove(certificate, field):
