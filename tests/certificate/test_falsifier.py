@@ -266,7 +266,7 @@ def test_a_consistent_lie_is_noticed(check):
         if not c.ok
     ]
     if check.startswith("tube"):
-        assert failing == []  # only flights can show it
+        # W is rounded outward, which shows this lie even before the flights do.
         failing = [c.name for c in gathered("flights", partial(PARTS["flights"], lie)) if not c.ok]
     assert any(name.startswith(check) for name in failing)
 
