@@ -71,7 +71,7 @@ def test_export_of_a_scene_is_of_every_topic(hsv, bag, tmp_path):
     ("words", "said"),
     [
         ("export BAG --scene --topic /hsv/state", "topic: expected with a table"),
-        ("export BAG --scene --csv", "--csv, --parquet, --npz and --scene"),
+        ("export BAG --scene --csv", "choose --csv, --parquet, --npz, --scene"),
         ("export BAG --scene --exaggeration=-1", "from 0 to 150"),
         ("export BAG --csv --exaggeration 10", "exaggeration: expected with --scene"),
         ("report BAG --out page.pdf", "out = 'page.pdf': expected a file that ends in .html"),

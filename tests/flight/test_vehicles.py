@@ -102,7 +102,7 @@ def test_a_tube_is_certified_for_its_own_vehicle(design, changes, status):
 @pytest.mark.parametrize(
     ("vehicle", "message"),
     [
-        ('vehicle = "parkr"', "vehicle 'parkr': expected one of parker, winged_cone or the path of a TOML"),
+        ('vehicle = "parkr"', "vehicle 'parkr': expected one of parker, winged_cone, winged_cone_lift or the path"),
         ("[vehicle]\nname = 3", "vehicle.name = 3: expected a name or a path"),
         ("[vehicle]\ndefinition = { wings = 2 }", "vehicle 'parker': wings: unknown key, expected one of title"),
         ("[vehicle]\ncoupling = { uniform = [-1, 1] }", "vehicle.coupling = -1.0: expected one of paper_like, derived"),

@@ -30,7 +30,7 @@ from hsv.design.tube_problem import tube_problem
 from hsv.model.actuators import ACTUATOR_SETS, IDEAL, SUBSTEPS
 from hsv.model.lpv.actuated import actuator_names, actuator_system
 from hsv.model.lpv.linearisation import zero_order_hold
-from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_RIGID
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_RIGID
 from hsv.model.trim import trim
 
 Lag = tuple[np.ndarray, np.ndarray] | None
@@ -222,7 +222,7 @@ def verdict(
     """
     tube, inputs = subject.certificate["tube"], subject.inputs.invariant_set
     problem = with_models(tube_problem(design, subject.vehicle, subject.disturbance), models)
-    lowest, highest = (np.array(tube["tightening"]["plan"][name]) for name in ("lowest", "highest"))
+    lowest, highest = (np.array(tube["tightening"]["plan"][name])[:N_INPUTS] for name in ("lowest", "highest"))
     measured = [model for model in models if isinstance(model, Measured)]
     error = sum((model.error for model in measured), np.zeros(N_RIGID))
     late = sum((model.late for model in measured), np.zeros(N_RIGID, int))[:N_SCHEDULING] > 0
