@@ -98,7 +98,10 @@ def _subject(name: str, find: Any, load: Any) -> Any:
 
 def _print(results: Any) -> None:
     for title in results.loops:
-        for heading, rows in (("disk margins", results.disk_rows(title)), ("classical", results.classical_rows(title))):
+        for heading, rows in (
+            ("disk margins", results.disk_rows(title)),
+            ("gain, phase and delay", results.classical_rows(title)),
+        ):
             if rows:
                 table = output.new_table(*rows[0], title=f"{title}: {heading}", right=[*rows[0]][1:6])
                 table.columns[0].no_wrap = True

@@ -74,7 +74,7 @@ class MarginResults:
         return [
             {
                 "loop at": each.name.replace("_", " "),
-                "disk margin": f"{each.disk.margin:.3f}" if each.disk.margin else "unstable",
+                "disk": f"{each.disk.margin:.3f}" if each.disk.margin else "unstable",
                 "gain dB": f"{20.0 * np.log10(each.disk.gain):.2f}",
                 "phase deg": f"{np.degrees(each.disk.phase):.1f}",
                 "at rad/s": f"{each.disk.frequency:.4g}",
@@ -95,10 +95,10 @@ class MarginResults:
             rows.append(
                 {
                     "loop at": each.name.replace("_", " "),
-                    "gain up dB": decibels[0],
+                    "up dB": decibels[0],
                     "down dB": decibels[1],
                     "phase deg": f"{np.degrees(c.phase):.1f}" if c.phase < np.inf else "none",
-                    "crossover rad/s": f"{c.gain_crossover:.4g}",
+                    "at rad/s": f"{c.gain_crossover:.4g}",
                     "delay ms": delay[0],
                     "periods": delay[1],
                 }
