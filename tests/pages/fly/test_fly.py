@@ -37,6 +37,7 @@ def test_layouts_are_those_of_the_compiler_where_there_are_no_pointers():
         ("case1", {"fault": [], "command[0].altitude_change": "-300 ft"}, "case1&fault=none&dh=-300.0"),
         ("case2", {"tube.tau": 0.9, "wind.forward": "-5 m/s", "seed": 3}, "case2&seed=3&tau=0.9&wind=-5.0"),
         ("case1", {"duration": "150 s"}, None),
+        ("case1", {"fault[0].effectiveness": 0.12345678}, None),
         ("case1", {"vehicle.perturbation.mass": "50 %"}, None),
         ("case1_rmpc", {}, None),
     ],
@@ -133,6 +134,10 @@ def test_the_page_flies_as_published_and_follows_settings_and_address(browser, p
     assert (
         "mass = 999, expected -20 to 20" in said and "<img" in said and not browser.run("return document.images.length")
     )
+    published = ["result as-published", "Fingerprint as published"]
+    assert show(browser, page, "#case1&size=0.9") == show(browser, page, "#case1&mass=%zz") == published
+    browser.run("document.querySelector('.skip').click()")
+    assert browser.run("return document.activeElement.id + location.hash") == "set-scenario#case1&mass=%zz"
     assert browser.console() == []
 
 

@@ -225,7 +225,8 @@ def _settings(scenario: Scenario) -> dict[str, float | str]:
     found |= {shares[name]: 100.0 * share for name, share in scenario.vehicle.perturbation.items() if name in shares}
     found |= {"tau": scenario.tube.tau[0]} if scenario.tube.tau else {}
     found["wind"] = scenario.settings.get("wind.forward", 0.0)
-    return {key: float(f"{value:.10g}") if isinstance(value, float) else value for key, value in found.items()}
+    # The page rounds to six digits, too; what a scenario has beyond them, it cannot fly.
+    return {key: round(value, 6) if isinstance(value, float) else value for key, value in found.items()}
 
 
 def _changes(own: Mapping[str, float | str], given: Mapping[str, float | str]) -> dict[str, object]:

@@ -19,6 +19,8 @@ const element = (name, properties = {}, ...children) => {
   made.append(...children);
   return made;
 };
+/* Decode a text of the address; one that is not an encoding stays as it is. */
+const decoded = (text) => { try { return decodeURIComponent(text); } catch { return text; } };
 const inWords = (name) => name.replaceAll("_", " ");
 
 class Page {
@@ -33,6 +35,7 @@ class Page {
     this.form.addEventListener("input", ({ target }) => this.set(target));
     this.form.addEventListener("submit", (event) => event.preventDefault());
     addEventListener("hashchange", () => this.read());
+    document.querySelector(".skip").addEventListener("click", (event) => { event.preventDefault(); $("set-scenario").focus(); }); // the address holds the flight
     $("copy").addEventListener("click", () => navigator.clipboard.writeText($("toml").textContent));
     $("link").addEventListener("click", () => navigator.clipboard.writeText(location.href));
     this.read();
@@ -48,7 +51,7 @@ class Page {
 
   /* Read the address; what stands there is data, and a setting out of its range is named and not used. */
   read() {
-    const [name, ...entries] = decodeURIComponent(location.hash.slice(1)).split("&"), { scenarios, kinds, fields } = this.core, refused = [];
+    const [name, ...entries] = decoded(location.hash.slice(1)).split("&"), { scenarios, kinds, fields } = this.core, refused = [];
     Object.assign(this, { name: Object.hasOwn(scenarios, name) ? name : "case1", given: {}, time: null });
     if (name && this.name !== name) refused.push(`no scenario ${name}`);
     const pairs = new URLSearchParams(entries.join("&")), type = pairs.get("fault");
@@ -60,6 +63,7 @@ class Page {
       if (good) this.given[key] = value;
       else refused.push(range ? `${key} = ${text}, expected ${range[0]} to ${range[1]}` : `${key} = ${text}, not a setting of this flight`);
     }
+    this.reduce();
     $("trouble").textContent = refused.length ? `Not used from the address: ${refused.join("; ")}.`.slice(0, 300) : "";
     $("trouble").hidden = !refused.length;
     this.choices();
@@ -68,11 +72,11 @@ class Page {
 
   /* Make the form for the scenario. */
   choices() {
-    const { scenarios, kinds, fields } = this.core, options = (names, chosen) => names.map((each) => element("option", { value: each, textContent: inWords(each), selected: each === chosen }));
+    const { scenarios, kinds, fields } = this.core, options = (names, chosen) => names.map((each) => element("option", { value: each, textContent: scenarios[each]?.title ?? inWords(each), selected: each === chosen }));
     const label = (key, text, control) => element("label", { htmlFor: `set-${key}` }, element("span", { textContent: text }), element("output", { id: `value-${key}` }), Object.assign(control, { id: `set-${key}`, name: key }));
     const select = (key, names, chosen) => label(key, key[0].toUpperCase() + key.slice(1), element("select", {}, ...options(names, chosen)));
     const type = this.given.fault ?? scenarios[this.name].fault.fault, words = inWords(kinds[type]?.parameter ?? "");
-    const texts = { size: `Size of the fault: ${words}`, at: "Start of the fault", ...Object.fromEntries(Object.entries(fields).map(([key, entry]) => [key, entry[2]])) };
+    const texts = { size: `Fault: ${words}`, at: "Start of the fault", ...Object.fromEntries(Object.entries(fields).map(([key, entry]) => [key, entry[2]])) };
     const sliders = Object.entries(texts).filter(([key]) => this.slider(key)).map(([key, text]) => {
       const [min, max, step, usual] = this.slider(key);
       return label(key, text, element("input", { type: key === "seed" ? "number" : "range", min, max, step, value: this.given[key] ?? usual }));
@@ -90,8 +94,7 @@ class Page {
       Object.assign(this.given, { fault: value, size: undefined, at: value === "none" ? undefined : at });
     } else if (value === "" || !this.slider(key)) return;
     else this.given[key] = key === "seed" ? Math.min(Math.max(Math.round(Number(value)), 0), this.slider(key)[1]) : Number(value);
-    const { fault } = this.core.scenarios[this.name];
-    for (const [each, chosen] of Object.entries(this.given)) if (chosen === undefined || chosen === (each === "fault" ? fault.fault : this.slider(each)?.[3])) delete this.given[each];
+    this.reduce();
     if (again) {
       this.choices();
       $(`set-${key}`).focus();
@@ -99,6 +102,12 @@ class Page {
     this.write();
     cancelAnimationFrame(this.waiting);
     this.waiting = requestAnimationFrame(() => this.fly());
+  }
+
+  /* Leave out the settings that have their shipped values. */
+  reduce() {
+    const { fault } = this.core.scenarios[this.name];
+    for (const [each, chosen] of Object.entries(this.given)) if (chosen === undefined || chosen === (each === "fault" ? fault.fault : this.slider(each)?.[3])) delete this.given[each];
   }
 
   write() {
@@ -112,7 +121,7 @@ class Page {
   }
 
   async fly() {
-    const { core, name } = this, given = this.settings(), published = core.scenarios[name].fingerprint, begun = performance.now();
+    const { core, name } = this, given = this.settings(), published = core.scenarios[name].fingerprint, begun = performance.now(), latest = (this.latest = {});
     for (const key of ["size", "at", ...Object.keys(core.fields)]) {
       const range = this.slider(key), shown = $(`value-${key}`), unit = key === "at" ? "s" : key === "size" ? core.kinds[this.given.fault ?? core.scenarios[name].fault.fault]?.unit : core.fields[key]?.[1];
       if (!range || !shown) continue;
@@ -138,7 +147,8 @@ class Page {
       return;
     }
     const found = await core.fingerprint(flown), meaning = "SHA-256 of all numbers of the flight, 25 in each of its steps";
-    if (shipped && found === published) this.say("as-published", "Fingerprint as published", found, `${meaning}: every other machine and form of this bench computes the same.`);
+    if (latest !== this.latest) return; // another flight began meanwhile
+    if (shipped && found === published) this.say("as-published", "Fingerprint as published", found, `${meaning}: your browser computed them all as published, to the last bit, as every machine and form of this bench does.`);
     else if (shipped) this.say("wrong", "Not the published flight: this browser or this build computes something else", found, `Published is ${published}.`);
     else this.say("", `${end}Changed: hsv simulate prints this fingerprint too`, found, `${meaning}. The file below flies the same.`);
     Object.assign(document.body.dataset, { done: found, milliseconds: picture });
