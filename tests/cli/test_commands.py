@@ -217,7 +217,6 @@ def test_a_bad_scenario_or_design_is_refused_before_anything_is_written(hsv, tmp
         ("simulate case1 --out x.csv", "out = 'x.csv': expected a file that ends in .npz"),
         # Options without effect.
         ("run case1 --live-port 9000", "live-port = 9000: expected with --live"),
-        ("verify baseline --corners", "corners: expected with --scenario"),
         ("linearise --reading printed", "reading = 'printed': expected with model ECM"),
         ("montecarlo fly case1 --corners --samples 4", "samples = 4: expected no --samples with"),
         ("montecarlo case1 --scheduler tcp://127.0.0.1:9 --workers 2", "workers = 2: expected no"),

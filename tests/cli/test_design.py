@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.certificate.checks import load_subject
-from hsv.control.design_file import find_design, read_design, read_parameters, write_design
+from hsv.control.design_file import find_certificate, find_design, read_design, read_parameters, write_design
 from hsv.design.inputs import find_inputs
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
@@ -29,7 +29,7 @@ def small(tmp_path):
         'extends = "baseline_single_k"\n'
         '[model]\nrepresentation = "grid"\n'
         "[model.grid]\naltitude_vertices = 2\nvelocity_vertices = 2\n"
-        '[disturbance]\nduration = "8 s"\nfault_start = "4 s"\nshare = 0.5\n'
+        '[disturbance]\nduration = "8 s"\nfault_start = "4 s"\nfault_window = ["4 s", "4 s"]\nshare = 0.5\n'
     )
     return path
 
@@ -82,6 +82,27 @@ def test_a_file_that_is_no_design_and_a_missing_certificate_are_named(hsv, tmp_p
     (tmp_path / "alone.yaml").write_text(find_design("baseline").read_text())
     ran = hsv("verify", "alone.yaml")
     assert ran.code == 2 and ran.error.startswith("alone.certificate.json: cannot be read")
+
+
+@pytest.mark.long
+def test_a_design_that_misses_its_required_margin_is_refused_and_not_written(hsv, small, tmp_path):
+    small.write_text(small.read_text() + "[margins]\nelevator = 0.9\n")
+    ran = hsv("design", str(small))
+    assert ran.code == 2 and not (tmp_path / "small.yaml").exists()
+    expected = "margins.elevator = 0.9: the loop has a disk margin of 0.651 at vertex 1, expected at least 0.9"
+    assert ran.err.endswith(f"{expected}\n"), ran.err
+
+
+@pytest.mark.long
+def test_all_corners_are_searched_for_a_smaller_margin_than_the_stated_one(hsv, tmp_path):
+    (tmp_path / "own.yaml").write_text(find_design("robust").read_text())
+    certificate = json.loads(find_certificate("robust").read_text())
+    certificate["margins"]["corners"]["slow"]["unstable"] = 3
+    (tmp_path / "own.certificate.json").write_text(json.dumps(certificate))
+    ran = hsv("verify", "own.yaml", "--quick", "--corners", "--json")
+    claims = [claim for claim in json.loads(ran.out)["claims"] if claim["part"] == "margins at all corners"]
+    assert ran.code == 1 and [claim["ok"] for claim in claims] == [True, True, True, False]
+    assert ran.error.startswith("margins at all corners: check fails: margins.corners.slow.unstable")
 
 
 @pytest.mark.parametrize("name", ["baseline.yaml", "baseline.certificate.json"])

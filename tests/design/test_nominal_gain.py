@@ -4,8 +4,9 @@ from numpy.testing import assert_allclose
 
 from hsv.base.errors import DesignError
 from hsv.control.design_file import find_design, read_design
-from hsv.design.baseline import disturbance_columns, initial_deviation
+from hsv.design.baseline import disturbance_columns, initial_deviation, require_margins
 from hsv.design.feedback import feedback_gain
+from hsv.design.inputs import find_inputs, read_inputs
 from hsv.lmi.nominal_gain import NominalProblem, nested_gains
 
 
@@ -81,3 +82,12 @@ def test_the_gain_comes_out_as_shipped(design, inputs):
     columns = disturbance_columns(inputs)
     again = feedback_gain(A, B, columns, inputs.feedback.state_scale.array(), inputs.feedback.input_scale.array())
     assert_allclose(again.F, design.feedback_gain[:, :5], rtol=1e-6)
+
+
+def test_a_design_below_the_required_margin_is_refused_with_loop_and_vertex():
+    inputs = read_inputs(find_inputs("robust"))
+    require_margins(inputs, read_design(find_design("robust")))
+    with pytest.raises(
+        DesignError, match=r"^margins\.elevator = 0\.8\d*: the loop has a disk margin of 0\.6\d\d at vertex"
+    ):
+        require_margins(inputs, read_design(find_design("baseline")))

@@ -146,7 +146,7 @@ def verify(
     file: DesignArgument,
     quick: Annotated[bool, Option("--quick", help="Omit flights and random sequences.")] = False,
     scenario: Annotated[str, Option(help="Fly this scenario, and check level, disturbances, inputs.")] = "",
-    corners: Annotated[bool, Option("--corners", help="With --scenario: also corners.")] = False,
+    corners: Annotated[bool, Option("--corners", help="Margins at all corners; with --scenario, flights.")] = False,
     exact: Annotated[bool, Option("--exact", help="First prove the inequalities in rational numbers.")] = False,
     seed: Annotated[int | None, Option(min=0, help="Seed of drawn flights and sequences; default: a new one.")] = None,
     flights: Annotated[int | None, Option(min=1, help="Number of flights to draw; default: 192.")] = None,
@@ -159,37 +159,40 @@ def verify(
     measure W are flown again, and others are drawn: the seed is printed, and --seed repeats it. Fields that no check
     recomputes are listed as "not recomputed", and unknown fields are refused. A design for a share of W fails.
 
-    Example: hsv verify offline_design/baseline.yaml --seed 1; hsv verify baseline --scenario case1_qp
+    Example: hsv verify baseline --seed 1; hsv verify robust --quick --corners;
+    hsv verify baseline --scenario case1_qp
     """
     import secrets
 
     from hsv.certificate.checks import STATED, gathered, load_subject
     from hsv.certificate.exact import UNPROVED, exact_checks
+    from hsv.certificate.margin_checks import corner_checks
     from hsv.control.design_file import find_design
     from hsv.flight.scenario import load_scenario
     from hsv.flight.verification import DRAWN, bounding_corners, scenario_checks
     from hsv.flight.verification import verify as recompute
 
-    if corners and not scenario:
-        raise QuantityError("corners: expected with --scenario only")
     quick = quick or bool(scenario)
     for name, value in {"seed": seed, "flights": flights}.items():
         if quick and value is not None:
             raise QuantityError(f"{name}: given, expected without --quick and --scenario, which draw no flights")
     subject = load_subject(find_design(file))
     seed = secrets.randbits(32) if seed is None else seed
-    proofs = []
-    # Each proof is printed at once, so that an interruption leaves those that are finished.
-    for proof in gathered("exact arithmetic", partial(exact_checks, subject)) if exact else ():
-        proofs.append(proof)
-        if not json:
-            _say_check(proof)
+    rows = []
     with output.stages() as progress:
+        long = {"exact arithmetic": partial(exact_checks, subject)} if exact else {}
+        if corners and not scenario:
+            long["margins at all corners"] = partial(corner_checks, subject, progress)
+        # Each of these checks is printed at once, so that an interruption leaves those that are finished.
+        for part, find in long.items():
+            for check in gathered(part, find):
+                rows.append((part, check))
+                if not json:
+                    _say_check(check)
         checks = recompute(subject, quick, progress, seed=seed, flights=flights or DRAWN)
         if scenario:
             over = bounding_corners(subject) if corners else [{}]
             checks["scenario"] = list(scenario_checks(subject, load_scenario(scenario), over, progress))
-    rows = [("exact arithmetic", proof) for proof in proofs]
     rows += [(part, check) for part, made in checks.items() for check in made]
     failing = [(part, check) for part, check in rows if not check.ok]
     unproved = list(UNPROVED) if exact else []
