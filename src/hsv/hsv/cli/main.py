@@ -183,6 +183,14 @@ def run(prog: str, commands: Mapping[str, Command], description: str, moved: Map
         _fail(interrupted, _INTERRUPTED)
     except (KeyboardInterrupt, typer.Abort):
         _fail("interrupted", _INTERRUPTED)
+    except SystemError as error:
+        # numpy goes on with an array of fractions after an interruption, which Python takes for an error of its own.
+        cause: BaseException = error
+        while cause.__cause__:
+            cause = cause.__cause__
+        if not isinstance(cause, KeyboardInterrupt):
+            raise
+        _fail("interrupted", _INTERRUPTED)
     except ModuleNotFoundError as error:
         extra = EXTRAS.get((error.name or "").partition(".")[0])
         if not extra:
