@@ -42,12 +42,15 @@ def test_a_design_is_written_here_and_comes_out_alike_on_another_processor(hsv, 
     certificate = here / "small.certificate.json"
     certificate.write_text("an older one")
     ran = hsv("design", str(small), "--force")
-    assert ran.code == 0 and ran.err.startswith("about 3 min on one processor for a design of the size of baseline"), (
-        ran.err
-    )
+    # The set is for half of W: the files are written, and the exit code says that flights leave it.
+    assert ran.code == 1 and "certified for 0.5 W; 1025 of 1025 measured flights leave it" in ran.err
+    assert ran.err.startswith("about 3 min on one processor for a design of the size of baseline"), ran.err
     assert sorted(path.name for path in here.iterdir()) == ["small.certificate.json", "small.yaml"]
     assert [path.name for path in small.parent.iterdir()] == ["small.toml"]
-    assert all(claim.ok for made in verify(load_subject(here / "small.yaml"), quick=True).values() for claim in made)
+    made = verify(load_subject(here / "small.yaml"), quick=True, seed=1)
+    # A model of four vertices is not accurate enough between them, either.
+    failed = {claim.name for claims in made.values() for claim in claims if not claim.ok}
+    assert {"share of W", "largest level"} < failed and len(failed) == 4, failed
 
     # The shipped file with one entry changed: the check names this entry, and all others agree.
     certificate.rename(small.parent / certificate.name)

@@ -45,7 +45,7 @@ def folder(tmp_path):
 
 
 def holds(path, quick=False):
-    return all(claim.ok for claims in verify(load_subject(path), quick).values() for claim in claims)
+    return all(claim.ok for claims in verify(load_subject(path), quick, seed=1).values() for claim in claims)
 
 
 def designed(monkeypatch, source, target):
@@ -82,7 +82,9 @@ def test_a_design_is_for_the_vehicle_beside_its_inputs_and_its_certificate_is_en
     assert report["inputs"]["vehicle"]["vehicle.mass"] == 4600.0
     report["inputs"]["vehicle"]["vehicle.mass"] = 4700.0
     certificate.write_text(json.dumps(report))
-    failed = {claim.name for part in verify(load_subject(design), True).values() for claim in part if not claim.ok}
+    failed = {
+        claim.name for part in verify(load_subject(design), True, seed=1).values() for claim in part if not claim.ok
+    }
     assert "design.vehicle" in failed
     assert any(name.startswith("model.a from the vehicle") for name in failed)
 
