@@ -44,7 +44,7 @@ EXEMPT = {
     "flight/metrics.py": "metrics are computed after the flight",
     "flight/fingerprint.py": "a digest",
     "control/design.py": "eigenvalues decide whether a design is refused, not how it flies",
-    "certificate/coverage.py": "what is said of a flight; no input depends on it",
+    "certificate/coverage.py": "messages about a flight; no input depends on them",
     "plugins/library.py": "the same",
     "plugins/library_answers.py": "the same",
     "plugins/library_process.py": "the same",

@@ -45,7 +45,7 @@ def test_pause_steps_reset_and_the_whole_flight_again(processes, scenario, pace,
     assert told["step while playing"] == FAILED and told["pause"] == [OK, ALREADY]
     assert told["steps"] == OK and told["to"] == told["from"] + 50
     assert told["entities"] == ["vehicle"] and told["pitch"][0] == pytest.approx(told["pitch"][1], abs=1e-12)
-    assert told["nobody"] == NOT_FOUND
+    assert told["unknown entity"] == NOT_FOUND
     done, canceled = told["action"]
     assert done == [SUCCEEDED, OK, 30] and canceled[:2] == [CANCELED, FAILED]
     assert told["scope"] == UNSUPPORTED and told["reset"] == OK and told["after reset"] == STOPPED

@@ -95,7 +95,7 @@ second = paused_at()
 told["entities"] = list(call(srv.GetEntities).entities)
 [entity] = call(srv.GetEntitiesStates).states
 told["pitch"] = [2.0 * math.asin(-entity.pose.orientation.y), second.pitch_angle]
-told["nobody"] = call(srv.GetEntityState, entity="nobody").result.result
+told["unknown entity"] = call(srv.GetEntityState, entity="glider").result.result
 told["action"] = [act(30, None), act(100_000, 5)]
 told["last"] = paused_at().step
 told["from"], told["to"] = first.step, second.step

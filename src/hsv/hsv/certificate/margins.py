@@ -100,8 +100,8 @@ def grid(period: float, count: int = 540) -> np.ndarray:
 def mu(M: np.ndarray) -> np.ndarray:
     """Return the structured singular value of ``M`` (..., m, m) for m = 1 or 2 independent complex channels.
 
-    For two channels it equals the least largest singular value over all scalings of one channel: these leave the
-    determinant as it is, and the sum of the squared entries is least where both off-diagonal entries are equal.
+    For two channels, mu is the minimum over all scalings of one channel of the largest singular value. A scaling does
+    not change the determinant, and it minimises the sum of the squared entries if both off-diagonal entries are equal.
     """
     if M.shape[-1] == 1:
         return np.abs(M[..., 0, 0])

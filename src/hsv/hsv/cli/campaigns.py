@@ -77,7 +77,7 @@ def fly(
     factor: Annotated[
         list[str] | None, Option(help="Vary a field, e.g. 'fault[0].start=90 s..110 s'; repeatable.")
     ] = None,
-    out: Annotated[Path | None, Option(help="Result file; default: campaigns/<what is flown>.parquet.")] = None,
+    out: Annotated[Path | None, Option(help="Result file; default: campaigns/<scenario>_<method>.parquet.")] = None,
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
     restart: Annotated[bool, Option("--restart", help="Discard existing results.")] = False,
