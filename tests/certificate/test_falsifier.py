@@ -23,8 +23,8 @@ from hsv.control.design import ControlDesign, TubeSet
 from hsv.control.design_file import find_design
 from hsv.flight.assembly import uncovered_of
 from hsv.flight.corners import corners
+from hsv.flight.flown_checks import flight_checks
 from hsv.flight.scenario import load_scenario
-from hsv.flight.verification import flight_checks
 from hsv.model.vehicle import Vehicle
 
 DESIGNS = sorted(path.stem for path in Path(__file__).parents[2].glob("offline_design/*.toml"))

@@ -15,9 +15,9 @@ from hsv.control.design_file import find_certificate, find_design, read_design, 
 from hsv.design.inputs import find_inputs
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
+from hsv.flight.flown_checks import verify
 from hsv.flight.scenario import load_scenario
-from hsv.flight.verification import verify
-from hsv.plugins.export import controller_files, step_bounds
+from hsv.plugins.c_export import controller_files, step_bounds
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import pytest
 from recorded_flight import record_flight
 from waiting import wait_until
 
-from hsv.pages.airframe.export import scene_path
+from hsv.pages.airframe.scene_file import scene_path
 
 
 @pytest.fixture(scope="module")

@@ -21,8 +21,8 @@ from hsv.cli.main import application
 from hsv.control.design_file import find_design
 from hsv.flight.campaign.sample_runner import CAMPAIGN, DIGEST
 from hsv.flight.campaign.store import result_digest
-from hsv.flight.export import exported_vehicle
 from hsv.flight.governed import governed
+from hsv.flight.vehicle_export import exported_vehicle
 from hsv.gym import TrackEnv, TrackVectorEnv
 from hsv.model.vehicle import vehicle_text
 from hsv.plugins import library_process

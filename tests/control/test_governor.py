@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from hsv.base.errors import GovernorError
 from hsv.control.design import PlanBounds
 from hsv.control.design_file import find_design, read_design
-from hsv.control.governor import AT_REST, KEPT_FREE, NOTICE, Beginning, Governor, Leg, command_in_flight, legs_of
+from hsv.control.governor import AT_REST, LEAD_TIME, MARGIN_SHARE, Beginning, Governor, Leg, command_in_flight, legs_of
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.reference_trajectory import Corner, ReferenceTrajectory
 from hsv.model.trim import trim
@@ -86,7 +86,7 @@ def test_a_step_becomes_the_shortest_ramp_whose_plan_is_inside_the_tightened_inp
     assert (column(step, "altitude"), column(step, "velocity")) == tuple(zip(START, TARGET, strict=True))
     room = np.minimum(step.plan.min(axis=0) - LOW, HIGH - step.plan.max(axis=0)) / (HIGH - LOW)
     # Apart from the reserved share of the range, only the effect of one period more or less remains.
-    assert KEPT_FREE <= room.min() < KEPT_FREE + 5e-4
+    assert MARGIN_SHARE <= room.min() < MARGIN_SHARE + 5e-4
 
 
 def test_the_shortest_ramp_is_found_to_the_period(short_step):
@@ -168,7 +168,7 @@ def flying(values=None, design=DESIGN, steps=IN_FLIGHT):
 def test_a_command_in_flight_is_flown_and_forgotten_with_the_run():
     trajectory, command = flying()
     planned = trajectory.reference
-    notice = round(NOTICE / PERIOD)
+    notice = round(LEAD_TIME / PERIOD)
     first, plan = command(NEAR, duration=1.5, blend=SHORT_BLEND)
     assert first == IN_FLIGHT + notice
     # The flight continues during planning.

@@ -9,7 +9,7 @@ from hsv.base.errors import SignalError
 from hsv.control.controller import ControllerInput
 from hsv.control.design import TubeSet
 from hsv.control.design_file import find_design, read_design
-from hsv.control.nominal_law import level
+from hsv.control.nominal_law import ellipsoid_level
 from hsv.control.notch_filter import NotchFilter
 from hsv.control.tube_law import TubeLaw, TubeStatusCode
 
@@ -33,7 +33,7 @@ def test_error_at_the_centre_has_level_zero_and_on_the_boundary_one(design):
     law = TubeLaw(design)
     assert step(law, design, design.tube.centre[:5]).level < 0.03  # the filter's error is zero, but not its centre
     boundary = design.tube.centre + design.tube.half_width * np.eye(7)[0]
-    assert level(design.tube.shape, boundary - design.tube.centre) == pytest.approx(1.0)
+    assert ellipsoid_level(design.tube.shape, boundary - design.tube.centre) == pytest.approx(1.0)
 
 
 def test_an_absurd_altitude_error_is_outside_and_named(design):

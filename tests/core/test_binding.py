@@ -8,7 +8,7 @@ import pytest
 from flights import components
 
 from hsv.base.errors import ParameterError
-from hsv.control.nominal_law import level
+from hsv.control.nominal_law import ellipsoid_level
 from hsv.control.notch_filter import NotchSection, discretise
 from hsv.core import Struct, compare_enumerators, doubles, dtype, ffi, fly, instruction_set, lanes, lib, loop_memory
 from hsv.core.arithmetic import solve
@@ -131,8 +131,8 @@ def test_numbers_of_another_length_are_refused():
         lambda: solve(np.eye(3), np.ones((5, 1))),
         lambda: derivative(two, two, vehicle),
         lambda: jacobian(np.zeros(9), np.zeros(3), vehicle),
-        lambda: level(five, np.zeros(3)),
-        lambda: level(five[:, :2], np.zeros(5)),
+        lambda: ellipsoid_level(five, np.zeros(3)),
+        lambda: ellipsoid_level(five[:, :2], np.zeros(5)),
         lambda: components("case1", duration=1.0).plant.step(np.zeros(1)),
     ):
         with pytest.raises(ValueError, match=r"array of shape .* expected"):

@@ -14,7 +14,7 @@ from hsv.design.baseline import initial_deviation, nominal_problem
 from hsv.design.inputs import read_inputs
 from hsv.design.model import design_model
 from hsv.lmi.nominal_gain import nominal_gain
-from hsv.lmi.semidefinite import BOUND_DIGITS, GAP, Unknown, minimise, outward, rounded
+from hsv.lmi.semidefinite import BOUND_DIGITS, GAP, Unknown, minimise, outward, rounded_to_size
 from hsv.model.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
@@ -100,9 +100,9 @@ def test_nominal_gain_hardly_moves_with_the_rounding_of_vertices(inputs, model):
 
 def test_digits_are_counted_from_the_size_not_the_value():
     values = np.array([12.3456789, 0.00123456, 1e-9, -1e-9])
-    assert rounded(values, 10.0, 4).tolist() == [12.346, 0.001, 0.0, 0.0]
-    assert not np.signbit(rounded(values, 10.0, 4)).any()
-    assert rounded(values, [10.0, 0.001, 1e-9, 1e-9], 1).tolist() == [12.0, 0.0012, 1e-9, -1e-9]
+    assert rounded_to_size(values, 10.0, 4).tolist() == [12.346, 0.001, 0.0, 0.0]
+    assert not np.signbit(rounded_to_size(values, 10.0, 4)).any()
+    assert rounded_to_size(values, [10.0, 0.001, 1e-9, 1e-9], 1).tolist() == [12.0, 0.0012, 1e-9, -1e-9]
 
 
 @given(st.floats(1e-12, 1e12), st.sampled_from([-1.0, 1.0]))

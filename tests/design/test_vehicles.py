@@ -12,8 +12,8 @@ from hsv.control.tube_law import TubeStatusCode
 from hsv.design.inputs import read_inputs
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.blocks import steps
+from hsv.flight.flown_checks import verify
 from hsv.flight.scenario import load_scenario
-from hsv.flight.verification import verify
 from hsv.model.vehicle import load_vehicle
 
 VEHICLE = """extends = "parker"

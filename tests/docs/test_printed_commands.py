@@ -44,7 +44,7 @@ ELSEWHERE = {
     "hsv montecarlo case1 --corners",
     "hsv resilience --controllers case1 --faults elevator_loss",
 }
-"""Long commands. Others like them run in tests/graph/test_names.py, tests/flight/test_verification.py,
+"""Long commands. Others like them run in tests/graph/test_names.py, tests/flight/test_flown_checks.py,
 tests/design/test_agreement.py, tests/docs/test_blocks.py and tests/cli/test_resilience.py."""
 
 SAME = {f"hsv run case1 --bag bags/{name}": f"cp -r bags/case1_readme bags/{name}" for name in ("first", "case1")}

@@ -16,10 +16,10 @@ from hsv.base.errors import ControllerError, HsvError, ParameterError
 from hsv.control.design_file import find_design, read_design
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
-from hsv.flight.export import exported_vehicle
 from hsv.flight.scenario import load_scenario
+from hsv.flight.vehicle_export import exported_vehicle
+from hsv.plugins.c_export import exported_controller
 from hsv.plugins.controllers import class_place, names_code
-from hsv.plugins.export import exported_controller
 from hsv.plugins.fmu_export import write_fmu
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")

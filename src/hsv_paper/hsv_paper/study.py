@@ -103,7 +103,7 @@ def markdown(rows: Rows, right: Sequence[str] | None = None) -> str:
     return "\n".join((head.replace("|  |", "| |"), *body))
 
 
-def rounded(value: float | None, digits: int = 0) -> float | None:
+def rounded_cell(value: float | None, digits: int = 0) -> float | None:
     """Return a number, rounded to ``digits`` decimals, as a cell; None if it is None or not finite."""
     return None if value is None or not np.isfinite(value) else round(float(value), digits)
 

@@ -68,8 +68,8 @@ def test_a_flight_may_start_where_both_ellipsoid_and_star_norms_allow_it():
     found = load_certified(find_design("tight")).invariant_set()
     at_rest = np.zeros(5)
     norms = found.star_norms.level_at_start(found.problem, found.centre)
-    assert verdict._start(found, at_rest) == max(norms, found.level(np.zeros(len(found.centre))))
+    assert verdict._start(found, at_rest) == max(norms, found.levels(np.zeros(len(found.centre))))
     # This pitch-angle error is inside the ellipsoid; for star norms it is too large if one channel causes it.
     error = np.array([0.0, 0.0, 0.0, 0.1 * found.half_width[3], 0.0])
-    assert max(found.level(side * np.append(error, [0.0, 0.0])) for side in (1.0, -1.0)) < 1.0
+    assert max(found.levels(side * np.append(error, [0.0, 0.0])) for side in (1.0, -1.0)) < 1.0
     assert verdict._start(found, error) > 1.0

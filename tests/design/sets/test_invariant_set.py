@@ -31,7 +31,7 @@ def test_boundary_points_stay_inside_under_extreme_disturbances_at_every_vertex(
     signs = rng.choice((0.0, 1.0), size=(2000, 7))
     d = w.lower + signs * (w.upper - w.lower)
     for A, G in zip(system.A, system.G, strict=True):
-        assert found.level(errors @ A.T + d @ G.T).max() <= 1.0
+        assert found.levels(errors @ A.T + d @ G.T).max() <= 1.0
 
 
 def test_half_the_disturbance_gives_half_the_set(found, inputs):

@@ -55,7 +55,7 @@ def test_an_address_that_is_none_is_refused_at_once(monkeypatch, address):
 def test_a_scheduler_that_does_not_answer_is_named_once(monkeypatch, capfd, answer):
     waited, links = [], []
     monkeypatch.setattr("hsv.flight.campaign.executors.ANSWER", 1.5)
-    monkeypatch.setattr("hsv.flight.campaign.executors.NOTICE", 0.1)
+    monkeypatch.setattr("hsv.flight.campaign.executors.QUIET_TIME", 0.1)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         if answer is not None:
@@ -79,7 +79,7 @@ def cluster():
 
 @pytest.mark.long
 def test_a_worker_that_does_not_answer_is_reported_and_refused(monkeypatch, cluster):
-    monkeypatch.setattr("hsv.flight.campaign.executors.NOTICE", 0.5)
+    monkeypatch.setattr("hsv.flight.campaign.executors.QUIET_TIME", 0.5)
     monkeypatch.setattr("hsv.flight.campaign.executors.WORKERS", 2.0)
     waited = []
     cluster.scale(1)
@@ -198,7 +198,7 @@ def test_a_campaign_with_a_long_text_is_interrupted_while_batches_wait(tmp_path)
 
 @pytest.mark.long
 def test_a_stopped_worker_is_reported_and_waited_for(monkeypatch):
-    monkeypatch.setattr("hsv.flight.campaign.executors.NOTICE", 0.5)
+    monkeypatch.setattr("hsv.flight.campaign.executors.QUIET_TIME", 0.5)
     notices = []
 
     def go_on(words):

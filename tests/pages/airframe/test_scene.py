@@ -6,9 +6,9 @@ from bag_readers import by_foxglove
 from mcap.reader import make_reader
 from recorded_flight import record_flight
 
-from hsv.pages.airframe.export import write_scene
 from hsv.pages.airframe.pose import BODY, LEVEL, Sample, transforms
 from hsv.pages.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC
+from hsv.pages.airframe.scene_file import write_scene
 from hsv.pages.airframe.solids import solids
 
 ADDED = {SCENE_TOPIC, TRANSFORMS_TOPIC}

@@ -48,7 +48,7 @@ def watch_flight(client: GraphClient, options: SimpleNamespace) -> None:
             continue
         shown = time.monotonic()
         values = _snapshot(reached, latest[NOMINAL], latest.get(TUBE_STATUS), latest[ACTUATOR])
-        words = _in_words(values, system)
+        words = _values_text(values, system)
         if moves:
             print(_CLEARED + words, end="", flush=True)
         else:
@@ -68,7 +68,7 @@ def _snapshot(state: Any, nominal: Any, status: Any | None, actuator: Any) -> di
     }
 
 
-def _in_words(values: dict[str, Any], system: UnitSystem) -> str:
+def _values_text(values: dict[str, Any], system: UnitSystem) -> str:
     """Return the values of a snapshot as text with columns of fixed width; the active faults come last."""
     altitude, length = in_system(values["altitude"], "m", system)
     error, speed = in_system(values["velocity_error"], "m/s", system)

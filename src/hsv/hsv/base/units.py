@@ -141,7 +141,7 @@ def significant(value: float, digits: int = 3) -> str:
     return f"{value:.0f}" if float(f"1e{digits - 1}") <= abs(value) < 999999.5 else f"{value:.{digits}g}"
 
 
-def in_words(value: float, unit: str, system: UnitSystem) -> str:
+def quantity_text(value: float, unit: str, system: UnitSystem) -> str:
     """Return ``value``, given in the SI ``unit``, as text (:func:`significant`) with its unit in ``system``."""
     number, name = in_system(value, unit, system)
     return significant(number) + ("" if name in ("", "1") else f" {name}")

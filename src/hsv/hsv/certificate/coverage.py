@@ -15,7 +15,7 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.base.parameters import validate
-from hsv.base.units import UnitSystem, in_words
+from hsv.base.units import UnitSystem, quantity_text
 from hsv.control.controller import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
 from hsv.control.hardware import uncovered_hardware
@@ -195,8 +195,8 @@ def uncovered_rates(design: ControlDesign | None, states: np.ndarray) -> list[st
     too_fast = design.tube.too_fast(moved, design.period)
     found = zip(STATE_NAMES, ("m/s", "m/s^2"), moved / design.period, design.tube.rates, too_fast, strict=False)
     return [
-        f"rate of {name}: {in_words(rate, unit, UnitSystem.paper)}; "
-        f"the bounds of the inputs are certified for {in_words(limit, unit, UnitSystem.paper)} at most"
+        f"rate of {name}: {quantity_text(rate, unit, UnitSystem.paper)}; "
+        f"the bounds of the inputs are certified for {quantity_text(limit, unit, UnitSystem.paper)} at most"
         for name, unit, rate, limit, fast in found
         if fast
     ]

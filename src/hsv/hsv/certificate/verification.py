@@ -4,12 +4,12 @@ This module imports no code that computes designs. It shares with that code only
 the discretisation of the notch filter (:mod:`hsv.control.notch_filter`), the reading of the files, and names. The
 numbers in flight (vertices A_i, B_i, gains F and K) come from the design file, the statements about them from the
 certificate. The vertices are recomputed from the parameters of the vehicle, and every inequality from its matrices.
-:mod:`hsv.flight.verification` repeats the flights, and :data:`hsv.certificate.checks.STATED` names the fields that
+:mod:`hsv.flight.flown_checks` repeats the flights, and :data:`hsv.certificate.checks.STATED` names the fields that
 no check covers. The parts follow the paper: model (eq. 10 to 12), gain F (eq. 24), gains K (eq. 31 to 35), error system
 (eq. 22, 23), invariant set (eq. 25 to 28), tightened bounds (eq. 30), adjustable factor (eq. 47 to 54).
 
 The matrix inequalities are checked as bounds on singular values. With Q = L L', a matrix M maps the ellipsoid
-x' Q^-1 x <= 1 into itself if and only if the largest singular value of L^-1 M L is at most 1; see :func:`image`.
+x' Q^-1 x <= 1 into itself if and only if the largest singular value of L^-1 M L is at most 1; see :func:`image_norms`.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ FLOWN_FIELDS = (
 # --- algebra ----------------------------------------------------------------------------------------------------------
 
 
-def image(Q: np.ndarray, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
+def image_norms(Q: np.ndarray, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
     """Return, for each M (..., n, n), the largest singular value of L^-1 [M L, columns] with Q = L L' (n, n).
 
     If it is at most 1, then M x + columns d lies in the ellipsoid {x: x' Q^-1 x <= 1} for all x and d that satisfy
@@ -98,7 +98,7 @@ def image(Q: np.ndarray, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(np.linalg.solve(L, np.concatenate((M @ L, *columns), axis=-1)), 2, axis=(-2, -1)))
 
 
-def level(Q: np.ndarray, x: np.ndarray) -> np.ndarray:
+def ellipsoid_levels(Q: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Return x' Q^-1 x, the level of ``x`` (n) in the ellipsoid of ``Q`` (n, n): 1 on its boundary."""
     return np.asarray(np.sum(np.linalg.solve(np.linalg.cholesky(Q), x.T) ** 2, axis=0))
 
@@ -259,7 +259,7 @@ def feedback_checks(subject: Subject) -> Checks:
     yield symmetric("feedback.N", N)
     rigid = (A + B @ F)[:, :N_RIGID, :N_RIGID]
     # The smallest eigenvalue of [N, (A_c N)'; A_c N, N] with N scaled to the identity.
-    residuals = 1.0 - image(N, rigid)
+    residuals = 1.0 - image_norms(N, rigid)
     yield required(above("(24) smallest eigenvalue", residuals.min(), 0.0))
     yield recomputed(subject, "feedback.lmi_smallest_eigenvalues", residuals, "eigenvalues")
     yield recomputed(subject, "feedback.spectral_radii", radii(rigid), "spectral radii")
@@ -355,12 +355,12 @@ def nominal_checks(subject: Subject) -> Checks:
     yield equal(subject, "nominal.0.nesting_residual", None)
     for i, (outer, inner) in enumerate(pairwise([np.array(one["Q"]) for one in stated]), start=1):
         # In coordinates in which the outer ellipsoid is the unit ball.
-        room = 1.0 - float(image(outer, np.zeros_like(outer), np.linalg.cholesky(inner))) ** 2
+        room = 1.0 - float(image_norms(outer, np.zeros_like(outer), np.linalg.cholesky(inner))) ** 2
         yield recomputed(subject, f"nominal.{i}.nesting_residual", room, "eigenvalues")
         yield above(f"ellipsoid {i} inside the one before", room, 0.0)
         if design.interpolated:
             K = design.nominal_gains[i][:, :N_RIGID]
-            between = 1.0 - image(outer, weights.A + weights.B @ K) ** 2
+            between = 1.0 - image_norms(outer, weights.A + weights.B @ K) ** 2
             yield required(above(f"decrease in ellipsoid {i - 1} under gain {i}", between.min(), 0.0))
             yield recomputed(subject, f"nominal.{i}.between_smallest_eigenvalues", between, "eigenvalues")
     interpolated = bool(inputs.get("interpolated"))
@@ -389,7 +389,7 @@ def _gain_checks(subject: Subject, field: str, weights: NominalWeights, K: np.nd
     yield above(f"{field}: (34) smallest eigenvalue", decrease.min(), -ROUNDING)
     yield recomputed(subject, f"{field}.lmi_smallest_eigenvalues", decrease, "eigenvalues")
     # Eq. 33 (eq. 50 for K'): x_n(0) lies in the ellipsoid.
-    room = 1.0 - float(level(Q, state))
+    room = 1.0 - float(ellipsoid_levels(Q, state))
     yield above(f"{field}: (33) room of the design state", room, -ROUNDING)
     yield recomputed(subject, f"{field}.state_residual", room, "eigenvalues")
     # Eq. 35 (eq. 52 for K'): the largest |K x| over the ellipsoid stays within the bounds.
@@ -577,7 +577,7 @@ class Tube:
         if self.l.min() <= 0.0 or self.l.sum(axis=1).max() > (1.0 - self.lam) * (1.0 + 1e-12):
             raise DesignError("multipliers: expected all above zero and sums of at most 1 - contraction")
         scaled = self.columns / np.sqrt(self.l)[:, None, :]
-        return 1.0 - image(self.Q, self.A / np.sqrt(self.lam), scaled) ** 2
+        return 1.0 - image_norms(self.Q, self.A / np.sqrt(self.lam), scaled) ** 2
 
     def tightened(self, lag: Sequence[Sequence[float]] = ((0.0, 0.0), (0.0, 0.0))) -> np.ndarray:
         """Return the lower and upper bounds (2 each) of u_n + u_r: U minus the range of the feedback (eq. 30).
@@ -620,7 +620,8 @@ class StarNorms(NamedTuple):
             [
                 [
                     1.0
-                    - image(Q[j], tube.A / np.sqrt(lam[j]), columns[:, :, j, None] / np.sqrt(1.0 - lam[j])).max() ** 2
+                    - image_norms(Q[j], tube.A / np.sqrt(lam[j]), columns[:, :, j, None] / np.sqrt(1.0 - lam[j])).max()
+                    ** 2
                     for j in acting
                 ]
                 for Q, lam in zip(self.Q, self.contraction, strict=True)
@@ -629,7 +630,7 @@ class StarNorms(NamedTuple):
 
     def start(self, tube: Tube) -> float:
         """Return the largest level of the parts of the start e = 0 in their ellipsoids; at most 1 inside."""
-        return max(float(level(Q[j], part)) for Q in self.Q for j, part in tube.start_parts().items())
+        return max(float(ellipsoid_levels(Q[j], part)) for Q in self.Q for j, part in tube.start_parts().items())
 
 
 def set_checks(subject: Subject) -> Checks:
@@ -704,7 +705,7 @@ def _tube_checks(subject: Subject, tube: Tube) -> Checks:
     yield replace(required(above(shown, residuals.min(), 0.0)), fields=fields)
     yield recomputed(subject, f"{inside}.certificate.lmi_smallest_eigenvalues", residuals, "eigenvalues")
     # A flight starts at e = 0, which lies in Z (eq. 25). Unlike the paper's, Z has a centre c, as W is not symmetric.
-    at_start = float(level(tube.Q, -tube.c))
+    at_start = float(ellipsoid_levels(tube.Q, -tube.c))
     yield required(at_most(f"{field}: level of e = 0", at_start, 1.0))
     yield recomputed(subject, f"{inside}.certificate.level_of_zero_error", at_start, "eigenvalues")
     yield from _measured_checks(subject, tube)
@@ -727,12 +728,12 @@ def _measured_checks(subject: Subject, tube: Tube) -> Checks:
         if tube.field != "tube":
             yield replace(at_least(f"{field}, {side}", float((sign * bounds).min()), 0.0), fields=fields)
             continue
-        outward = widened(sign * np.array(subject.stated(f"{field}.measured.{side}")), inputs["inflation"])
+        outward = inflated_bounds(sign * np.array(subject.stated(f"{field}.measured.{side}")), inputs["inflation"])
         check = same(f"{field}, {side}", bounds, sign * inputs["share"] * outward, "disturbance bounds")
         yield replace(check, fields=(*fields, *under("inputs.disturbance", ("inflation", "share"))))
 
 
-def widened(bounds: np.ndarray, inflation: float) -> np.ndarray:
+def inflated_bounds(bounds: np.ndarray, inflation: float) -> np.ndarray:
     """Return ``bounds`` times ``inflation``, rounded up to six significant digits; negative bounds become zero."""
     bounds = inflation * np.maximum(bounds, 0.0)
     quantum = 10.0 ** (np.floor(np.log10(np.where(bounds > 0.0, bounds, 1.0))) - 5.0)
@@ -831,7 +832,7 @@ def factor_checks(subject: Subject) -> Checks:
     loops = [error_system(design, subject.vehicle, tau, share).A for tau, share in product(factors(design), shares)]
     N = np.array(stated["lyapunov"]["N"])
     yield symmetric("adjustable.lyapunov.N", N)
-    residuals = 1.0 - image(N, np.concatenate(loops))
+    residuals = 1.0 - image_norms(N, np.concatenate(loops))
     fields = ("adjustable.lyapunov.N",)
     yield replace(required(above("common Lyapunov function, smallest eigenvalue", residuals.min(), 0.0)), fields=fields)
     yield recomputed(subject, "adjustable.lyapunov.lmi_smallest_eigenvalues", residuals, "eigenvalues")

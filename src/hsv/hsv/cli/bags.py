@@ -260,8 +260,8 @@ def export(
         raise ParameterError("format: choose --csv, --parquet, --npz, --scene or --format mat, or a suffix of --out")
     opened = Bag(bag)
     if scene:
-        from hsv.pages.airframe.export import scene_path, write_scene
         from hsv.pages.airframe.geometry import airframe
+        from hsv.pages.airframe.scene_file import scene_path, write_scene
 
         if topic:
             raise ParameterError("topic: expected with a table, --scene holds every topic")

@@ -29,7 +29,7 @@ def export_controller(
     Example: hsv export-controller baseline --out controller
     """
     from hsv.control.design_file import find_design, read_design
-    from hsv.plugins.export import controller_files, exported_controller, step_bounds
+    from hsv.plugins.c_export import controller_files, exported_controller, step_bounds
 
     if out is None and fmu is None:
         raise ParameterError("out, fmu: missing, expected --out FOLDER, --fmu FILE or both")
@@ -71,8 +71,8 @@ def export_vehicle(
 
     Example: hsv export-vehicle case1 --fmu vehicle.fmu
     """
-    from hsv.flight.export import exported_vehicle
     from hsv.flight.scenario import load_scenario
+    from hsv.flight.vehicle_export import exported_vehicle
 
     _write_fmu(fmu, exported_vehicle(load_scenario(scenario)), force)
     output.print_written([fmu], json)

@@ -11,7 +11,7 @@ from rich.text import Text
 from typer import Argument, Option
 
 from hsv.base.errors import DesignError, ParameterError, QuantityError
-from hsv.base.units import UnitSystem, in_words, significant
+from hsv.base.units import UnitSystem, quantity_text, significant
 from hsv.cli import output
 from hsv.cli.options import (
     DesignArgument,
@@ -168,9 +168,9 @@ def verify(
     from hsv.certificate.exact import UNPROVED, exact_checks
     from hsv.certificate.margin_checks import corner_checks
     from hsv.control.design_file import find_design
+    from hsv.flight.flown_checks import DRAWN, bounding_corners, scenario_checks
+    from hsv.flight.flown_checks import verify as recompute
     from hsv.flight.scenario import load_scenario
-    from hsv.flight.verification import DRAWN, bounding_corners, scenario_checks
-    from hsv.flight.verification import verify as recompute
 
     quick = quick or bool(scenario)
     for name, value in {"seed": seed, "flights": flights}.items():
@@ -331,7 +331,7 @@ def govern(
         return
     corners = output.new_table("corner", "altitude", "velocity", right=("altitude", "velocity"))
     for t, h, v, _ in reference.corners:
-        corners.add_row(f"{t:g} s", in_words(h, "m", units), in_words(v, "m/s", units))
+        corners.add_row(f"{t:g} s", quantity_text(h, "m", units), quantity_text(v, "m/s", units))
     output.console.print(corners)
     output.console.print(
         f"corners blended over {reference.blend:g} s on either side; at rest from {reference.end:g} s on"
@@ -339,7 +339,7 @@ def govern(
     heads = ("least", "largest", "lower bound", "upper bound", "largest step in a period")
     table = output.new_table("nominal input", *heads, right=heads)
     for name, unit, values in inputs:
-        table.add_row(name.replace("_", " "), *(in_words(float(value), unit, units) for value in values))
+        table.add_row(name.replace("_", " "), *(quantity_text(float(value), unit, units) for value in values))
     output.console.print(table)
     if out:
         output.say(f"written {out}")

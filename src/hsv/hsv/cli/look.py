@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from hsv.base.units import UnitSystem, in_words, significant
+from hsv.base.units import UnitSystem, quantity_text, significant
 from hsv.cli import output
 from hsv.cli.options import (
     BagArgument,
@@ -114,7 +114,7 @@ def view(
 
     from hsv.bags.reader import Bag
     from hsv.base.errors import RecordingError
-    from hsv.pages.airframe.export import scene_of
+    from hsv.pages.airframe.scene_file import scene_of
     from hsv.pages.viewers import VIEWERS, layout_for
 
     opened = Bag(bag)
@@ -244,7 +244,7 @@ def _intervals(intervals: list[dict[str, Any]] | None, name: Callable[[dict[str,
 def _fault(units: UnitSystem, fault: dict[str, Any]) -> str:
     from hsv.bags.info import parameters_in_words
 
-    parameters = parameters_in_words(fault, lambda value, unit: in_words(value, unit, units))
+    parameters = parameters_in_words(fault, lambda value, unit: quantity_text(value, unit, units))
     return f"{fault['type']} {parameters}{' ' if parameters else ''}of {fault['channel']}, "
 
 
@@ -259,7 +259,9 @@ def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str,
     def line(key: str, form: str) -> str:
         numbers = (equipment or {}).get(key, {}).items()
         ends = ((name, value if isinstance(value, list) else [value]) for name, value in numbers)
-        words = (f"{name} {' to '.join(in_words(v, si.get(name, '1'), units) for v in given)}" for name, given in ends)
+        words = (
+            f"{name} {' to '.join(quantity_text(v, si.get(name, '1'), units) for v in given)}" for name, given in ends
+        )
         return form.format(text) if (text := ", ".join(words)) else ""
 
     lines = {

@@ -16,7 +16,7 @@ from hsv.cli import output
 from hsv.flight.fingerprint import as_published, published_in_words
 from hsv.flight.flight import step_times_in_words
 from hsv.flight.limits import Verdict, in_units, limits_kept, not_judged, verdict_sentence, verdicts
-from hsv.flight.metrics import METRICS, Group, in_words, is_share
+from hsv.flight.metrics import METRICS, Group, is_share, spaced
 from hsv.flight.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ def print_metrics(
                 limit = in_units(name, verdict.limit, units)
                 text = f"{verdict.words} (limit {limit})" if verdict.value is None else f"{verdict.words} {limit}"
                 remark = Text(text, "green" if verdict.within else "red")
-            table.add_row("  " + in_words(name), value, "" if unit == "1" else unit, remark)
+            table.add_row("  " + spaced(name), value, "" if unit == "1" else unit, remark)
     output.console.print(table)
 
 
@@ -202,20 +202,20 @@ def _print_campaign(results: Results, units: UnitSystem) -> None:
             "all corners" if share.interval is None else " to ".join(f"{100.0 * p:.3g} %" for p in share.interval)
         )
         within = f"{share.within} of {share.flights}", f"{100.0 * share.fraction:.3g} %"
-        table.add_row(in_words(share.name), limit, *within, interval)
+        table.add_row(spaced(share.name), limit, *within, interval)
     output.console.print(table)
     numbers = ("least", "median", "95 %", "largest")
     table = output.new_table("metric", *numbers, "unit", right=numbers)
     for d in distributions(results):
         cells = [_outcome(d.name, v, units) for v in (d.minimum, d.median, d.percentile_95, d.maximum)]
-        table.add_row(in_words(d.name), *(number for number, _ in cells), cells[0][1])
+        table.add_row(spaced(d.name), *(number for number, _ in cells), cells[0][1])
     output.console.print(table)
     # Without limits, the worst flights are those that ended early.
     worst = [w for w in worst_flights(results, _LISTED) if w.limit]
     if worst:
         output.console.print("worst flights, by the fraction of their limits that they use:")
     for w in worst:
-        used = w.limit if w.limit in ENDED else f"{100 * w.ratio:.0f} % of {in_words(w.limit)}"
+        used = w.limit if w.limit in ENDED else f"{100 * w.ratio:.0f} % of {spaced(w.limit)}"
         output.say(output.folded(f"{w.flight}: {used}; {sample_words(w.sample, units)}", 4, first=2))
 
 

@@ -29,17 +29,17 @@ from hsv.model.vehicle import Vehicle
 LONGEST = 600.0
 """Maximum duration of a leg, s; a slower one hardly needs less of the inputs."""
 
-AFTERWARDS = 10.0
+SETTLE_TIME = 10.0
 """Time (s) for which a plan is checked after its last blend; x_n has decayed by then."""
 
 USUAL_BLEND = 2.0
 """Default half-width of the blend at a corner, s: half the time in which the rate changes."""
 
-NOTICE = 2.0
+LEAD_TIME = 2.0
 """Simulated time (s) between a command in flight and the first step that it changes. Planning takes 0.1 to 2 s of
 processor time, so that a flight in real time need not wait for it."""
 
-KEPT_FREE = 1e-3
+MARGIN_SHARE = 1e-3
 """Share of U minus F Z that a plan leaves free on every side. The model is scheduled by x_r + x_n in planning, by the
 measured state in flight."""
 
@@ -110,7 +110,7 @@ class Governor:
     ) -> None:
         """Plan with the control ``period`` (s), the ``bounds`` of a design and rate limits ``rate`` (2, per s)."""
         self._nominal, self._rigid, self._period, self._rate = nominal, rigid, period, rate
-        free = KEPT_FREE * (bounds.input_maximum - bounds.input_minimum)
+        free = MARGIN_SHARE * (bounds.input_maximum - bounds.input_minimum)
         self._low, self._high = bounds.input_minimum + free, bounds.input_maximum - free
 
     def govern(self, start: tuple[float, float], legs: Sequence[Leg], blend: float) -> GovernedReference:
@@ -236,7 +236,7 @@ class Governor:
 
     def _planned(self, corners: Sequence[Corner], beginning: Beginning) -> tuple[np.ndarray, np.ndarray, bool]:
         """Return u_r + u_n (k, 2), x_n (k, 9), and whether x_n stays in the ellipsoids of the nominal gains."""
-        rows = self._steps(corners[-1].time + corners[-1].blend + AFTERWARDS) - beginning.step
+        rows = self._steps(corners[-1].time + corners[-1].blend + SETTLE_TIME) - beginning.step
         plan, deviation = np.empty((rows, N_INPUTS)), np.empty((rows, N_STATES))
         reference = self.trajectory(corners).data
         held = lib.hsv_plan(
@@ -275,8 +275,8 @@ def command_in_flight(
         blend: Half-width of the blend at a corner, s; 0: :data:`USUAL_BLEND`.
 
     Returns:
-        The first step that the command changes, at least :data:`NOTICE` ahead, and a function that plans the leg. The
-        function takes 0.1 to 2 s and may run in another thread while the flight goes on up to that step. It returns
+        The first step that the command changes, at least :data:`LEAD_TIME` ahead, and a function that plans the leg.
+        The function takes 0.1 to 2 s and may run in another thread while the flight goes on up to that step. It returns
         the new reference, or raises a GovernorError if none fits.
 
     Raises:
@@ -309,7 +309,7 @@ def command_in_flight(
         )
     blend = blend or USUAL_BLEND
     beginning = Beginning(trajectory.next_step, trajectory.deviation)
-    leg = Leg(beginning.step * design.period + NOTICE, duration, altitude, velocity)
+    leg = Leg(beginning.step * design.period + LEAD_TIME, duration, altitude, velocity)
     rate = actuator_data(values, vehicle.decoupled, design.period).rate_limit
     governor = Governor(trajectory.data, vehicle.decoupled, design.period, design.plan_bounds, rate)
 

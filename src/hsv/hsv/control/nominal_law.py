@@ -41,7 +41,7 @@ class LawResult:
     status: NominalStatus
 
 
-def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
+def ellipsoid_level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
     """Return x' P x for the matrix P = ``ellipsoid`` (s, s) and the first s entries of ``x``; at most 1 inside."""
     n = len(ellipsoid)
     return float(lib.hsv_level(doubles(vector(ellipsoid), n, n), n, doubles(vector(x[:n]), n)))
@@ -127,7 +127,7 @@ class KothareLaw(FamilyLaw):
             if self._pending:
                 self._take(self._pending.result(), deviation)
                 self._pending = None
-            if level(self.data.ellipsoids[-1], deviation) > 1.0:
+            if ellipsoid_level(self.data.ellipsoids[-1], deviation) > 1.0:
                 self._pending = self._worker.submit(self._solve, deviation[:N_RIGID].copy())
         self._step += 1
         if self._gain is None:
@@ -147,7 +147,7 @@ class KothareLaw(FamilyLaw):
 
     def _take(self, solution: tuple[np.ndarray, np.ndarray] | None, deviation: np.ndarray) -> None:
         """Use the gain of ``solution`` if x_n lies in its ellipsoid; else keep the last gain and set the status."""
-        if solution is not None and level(solution[1], deviation) <= 1.0:
+        if solution is not None and ellipsoid_level(solution[1], deviation) <= 1.0:
             self._gain, self._status = solution[0], NominalStatus.OK
             return
         self._status = NominalStatus.SOLVER_FAILED

@@ -30,7 +30,7 @@ from hsv.control.effectiveness import (
     effectiveness_in,
 )
 from hsv.control.hardware import HARDWARE_PARAMETERS, uncovered_hardware
-from hsv.control.nominal_law import level
+from hsv.control.nominal_law import ellipsoid_level
 from hsv.control.notch_filter import FLOWN_NOTCH_PARAMETERS, NotchSection, discretise, flown_sections
 from hsv.core import Struct, doubles, dtype, lib, records
 from hsv.model.dynamics import VehicleParameters
@@ -282,7 +282,7 @@ class TubeLaw(Controller):
         error, tube = (inputs.estimate - inputs.reference - inputs.deviation)[:N_RIGID], None
         if in_loop:
             error, tube = np.concatenate((error, filter_state - planned)), self._tube
-        tube_level = level(tube.shape, error - tube.centre) if tube else math.nan
+        tube_level = ellipsoid_level(tube.shape, error - tube.centre) if tube else math.nan
         valid = math.isfinite(total[0]) and math.isfinite(total[1])
         inside = valid and tube_level <= 1.0
         if not valid:

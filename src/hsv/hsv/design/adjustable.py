@@ -39,7 +39,7 @@ from hsv.design.tightening import TightenedInputs, tighten
 from hsv.design.tube import MeasuredSet, Tube, design_tube, flights_in_tube, flights_report, measured_set
 from hsv.design.tube_problem import bounding_factors, tube_problem
 from hsv.lmi.nominal_gain import nominal_gain
-from hsv.lmi.semidefinite import BOUND_DIGITS, rounded
+from hsv.lmi.semidefinite import BOUND_DIGITS, rounded_to_size
 from hsv.model.signals import N_RIGID
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
@@ -176,7 +176,7 @@ def relaxed_bound(
     for name, room in (("U minus F Z at tau = 1", before), ("U minus F' Z'", after)):
         if not room.min() > 0.0:
             raise DesignError(f"{name}: {room.tolist()} about the trim, expected room above zero")
-    return rounded(bound * after / before, 1.0, BOUND_DIGITS)
+    return rounded_to_size(bound * after / before, 1.0, BOUND_DIGITS)
 
 
 def room_at_one(design: ControlDesign, vehicle: Vehicle, tube: dict[str, Any]) -> np.ndarray:

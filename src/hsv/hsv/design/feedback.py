@@ -27,11 +27,11 @@ from hsv.lmi.semidefinite import (
     GAIN_DIGITS,
     Unknown,
     Whitening,
-    image,
+    ellipsoid_norms,
     lqr_whitening,
     minimise,
-    rounded,
     rounded_matrix,
+    rounded_to_size,
     spectral_radii,
 )
 
@@ -59,7 +59,7 @@ def lyapunov_residuals(closed_loop: np.ndarray, N: np.ndarray, name: str) -> np.
     Raises:
         DesignError: N is not positive definite, or an eigenvalue is not positive.
     """
-    residuals = 1.0 - image(N, f"{name}: N", closed_loop)
+    residuals = 1.0 - ellipsoid_norms(N, f"{name}: N", closed_loop)
     worst = int(np.argmin(residuals))
     if not residuals[worst] > 0.0:
         raise DesignError(
@@ -122,7 +122,7 @@ def feedback_gain(
     white = lqr_whitening(A, B, state_scale, input_scale)
     N_white, M_white, *_ = _SEARCHES[method](*white.dynamics(A, B), white, disturbance, state_scale)
     F = white.gain(np.linalg.solve(N_white, M_white.T).T)
-    F = rounded(F, input_scale[:, None] / state_scale, GAIN_DIGITS)
+    F = rounded_to_size(F, input_scale[:, None] / state_scale, GAIN_DIGITS)
     N = rounded_matrix(white.covariance(N_white))
     residuals = lyapunov_residuals(A + B @ F, N, _NAME)
     return FeedbackGain(F, F @ N, N, residuals, spectral_radii(A + B @ F))

@@ -19,7 +19,7 @@ import numpy as np
 from hsv.base.errors import DesignError
 from hsv.control.notch_filter import NotchSection, continuous, series
 from hsv.design.inputs import ModelInputs
-from hsv.lmi.semidefinite import VERTEX_DIGITS, rounded
+from hsv.lmi.semidefinite import VERTEX_DIGITS, rounded_to_size
 from hsv.model.lpv import polytopic
 from hsv.model.lpv.linearisation import Filter
 from hsv.model.lpv.polytope import Polytope
@@ -82,7 +82,7 @@ def polytopic_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[Notch
         "vertices": [weights.shape[1] for _, weights in found.samples],
         "singular_values": [values[:8].tolist() for values in found.singular_values],
     }
-    polytope = _rounded(found.polytope, scales[0][:N_STATES], scales[1])
+    polytope = _rounded_polytope(found.polytope, scales[0][:N_STATES], scales[1])
     return DesignModel(found, polytope, found.whole if extended else polytope, report)
 
 
@@ -93,8 +93,8 @@ def design_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[NotchSec
     return replace(model, report=model.report | {"accuracy": model.found.accuracy(model.whole, scales)})
 
 
-def _rounded(polytope: Polytope, state_scale: np.ndarray, input_scale: np.ndarray) -> Polytope:
+def _rounded_polytope(polytope: Polytope, state_scale: np.ndarray, input_scale: np.ndarray) -> Polytope:
     """Return ``polytope`` rounded to :data:`VERTEX_DIGITS` digits relative to the scales; rounding noise becomes 0."""
-    A = rounded(polytope.A, state_scale[:, None] / state_scale, VERTEX_DIGITS)
-    B = rounded(polytope.B, state_scale[:, None] / input_scale, VERTEX_DIGITS)
+    A = rounded_to_size(polytope.A, state_scale[:, None] / state_scale, VERTEX_DIGITS)
+    B = rounded_to_size(polytope.B, state_scale[:, None] / input_scale, VERTEX_DIGITS)
     return Polytope(A, B, polytope.altitude, polytope.velocity)

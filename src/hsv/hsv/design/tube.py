@@ -183,7 +183,7 @@ def flight_evidence(flight: Flight, found: InvariantSet, model: ChannelModel) ->
     (errors, _), plan = model.errors(flight), flight.plan
     pitch_acceleration = np.diff(flight.history.deviation[:, PITCH_RATE]) / flight.period
     return FlightEvidence(
-        level=float(found.level(errors).max()),
+        level=float(found.levels(errors).max()),
         membership=found.problem.disturbance.membership(model.signals(flight).channels),
         lowest=np.append(plan.min(axis=0), pitch_acceleration.min()),
         highest=np.append(plan.max(axis=0), pitch_acceleration.max()),

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from hsv.base.units import UnitSystem, in_system, significant
-from hsv.flight.metrics import CRITERIA, METRICS, in_words
+from hsv.flight.metrics import CRITERIA, METRICS, spaced
 from hsv.flight.scenario import Scenario
 
 
@@ -68,7 +68,7 @@ def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float]
 def criteria_not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, float], system: UnitSystem) -> list[str]:
     """Return the paper's criteria that the flight defines and the scenario does not limit, as texts with values."""
     named = [name for name in not_judged(judged, metrics) if name in CRITERIA]
-    return [f"{in_words(name)} ({in_units(name, metrics[name], system)})" for name in named]
+    return [f"{spaced(name)} ({in_units(name, metrics[name], system)})" for name in named]
 
 
 def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem) -> str:
@@ -81,9 +81,9 @@ def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem) -> str:
 
     def broken(name: str, verdict: Verdict) -> str:
         if verdict.value is None:
-            return f"{in_words(name)} {verdict.words}"
+            return f"{spaced(name)} {verdict.words}"
         number, limit = (in_units(name, value, system) for value in (verdict.value, verdict.limit))
-        return f"{in_words(name)} {number} (limit {limit})"
+        return f"{spaced(name)} {number} (limit {limit})"
 
     said = ", ".join(broken(*each) for each in over)
     head = [] if all(verdict.ended for verdict in judged.values()) else ["not flown to the end"]

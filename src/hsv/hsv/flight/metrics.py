@@ -104,7 +104,7 @@ CRITERIA = (
 """The metrics by which the paper judges a flight. A report names those for which the scenario has no limit."""
 
 
-def in_words(name: str) -> str:
+def spaced(name: str) -> str:
     """Return the ``name`` of a metric, or another identifier, as words separated by spaces."""
     return name.replace("_", " ")
 

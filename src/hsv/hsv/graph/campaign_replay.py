@@ -44,7 +44,7 @@ def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
     row, runner = results.row(flight), results.sample_runner
     try:
         flown = runner.fly(flight, runner.sample(flight))
-        repeated = runner.outcome((flown, runner.level(flown)))
+        repeated = runner.outcome((flown, runner.tube_level(flown)))
     except ControllerError as error:
         repeated = runner.outcome(error)
     return ReplayedFlight(flight, _outcome(row), repeated)
@@ -78,7 +78,7 @@ def replay_over_dds(
     # Stamps are rounded to nanoseconds, the campaign's times are not: integrals over time would differ in the last bit.
     data = replace(data, time=np.arange(len(data.time)) * runner.period)
     fingerprint = flight_fingerprint(recorded)
-    repeated = runner.measured(data, runner.level(data), fingerprint)
+    repeated = runner.measured(data, runner.tube_level(data), fingerprint)
     exact = not (
         measurement_errors(joined(recorded, equipment_topics(recorded)))
         or prepared.scenario.settings.get(ESTIMATOR_ENABLED.name)

@@ -30,8 +30,8 @@ from hsv.lmi.semidefinite import (
     Unknown,
     lqr_whitening,
     minimise,
-    rounded,
     rounded_matrix,
+    rounded_to_size,
     smallest_eigenvalues,
     spectral_radii,
 )
@@ -230,7 +230,7 @@ def nominal_gain(
     G = found[0] if found else Q
     # G is not symmetric: K = Y G^-1.
     K = white.gain(np.linalg.solve(G.T, (bound[:, None] * Y).T).T)
-    K = rounded(K, problem.input_scale[:, None] / problem.state_scale, GAIN_DIGITS)
+    K = rounded_to_size(K, problem.input_scale[:, None] / problem.state_scale, GAIN_DIGITS)
     Q_si = rounded_matrix(white.covariance(Q * size**2))
     certified, decrease = certified_cost(problem, K, Q_si, name)
     if not decrease.min() > -1e-9:

@@ -39,7 +39,7 @@ def spectral_radii(matrices: np.ndarray) -> np.ndarray:
     return np.asarray(np.abs(np.linalg.eigvals(matrices)).max(axis=-1))
 
 
-def image(Q: np.ndarray, name: str, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
+def ellipsoid_norms(Q: np.ndarray, name: str, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
     """Return, for each M, the largest singular value of L^-1 [M L, columns] with Q = L L'; shape (...).
 
     If it is at most 1, M maps the ellipsoid x' Q^-1 x <= 1 into itself. Without further columns, the smallest
@@ -82,7 +82,7 @@ BOUND_DIGITS = 6
 """Significant digits to which the bounds of disturbances and inputs are rounded."""
 
 
-def rounded(values: np.ndarray, size: Any, digits: int) -> np.ndarray:
+def rounded_to_size(values: np.ndarray, size: Any, digits: int) -> np.ndarray:
     """Return ``values`` rounded to ``digits`` digits after the leading digit of ``size``, their typical magnitude."""
     values = np.asarray(values, float)
     leading = np.floor(np.log10(np.broadcast_to(np.asarray(size, float), values.shape))).astype(int)
@@ -94,7 +94,7 @@ def rounded(values: np.ndarray, size: Any, digits: int) -> np.ndarray:
 def rounded_matrix(matrix: np.ndarray) -> np.ndarray:
     """Return the positive definite M = ``matrix`` (n, n) made symmetric, M_ij rounded relative to root(M_ii M_jj)."""
     root = np.sqrt(np.diag(matrix))
-    return rounded(0.5 * (matrix + matrix.T), np.outer(root, root), MATRIX_DIGITS)
+    return rounded_to_size(0.5 * (matrix + matrix.T), np.outer(root, root), MATRIX_DIGITS)
 
 
 def outward(values: np.ndarray) -> np.ndarray:
@@ -107,7 +107,7 @@ def outward(values: np.ndarray) -> np.ndarray:
     quantum = 10.0 ** (np.floor(np.log10(size)) - BOUND_DIGITS + 1)
     # The margin keeps a multiple of the quantum, of which the division made slightly more.
     multiples = np.ceil(np.abs(values) / quantum * (1.0 - 1e-12))
-    return rounded(np.sign(values) * multiples * quantum, size, BOUND_DIGITS)
+    return rounded_to_size(np.sign(values) * multiples * quantum, size, BOUND_DIGITS)
 
 
 @dataclass(frozen=True)

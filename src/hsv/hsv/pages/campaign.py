@@ -27,7 +27,7 @@ from hsv.flight.campaign.summary import (
     worst_flights,
 )
 from hsv.flight.flight import Flight
-from hsv.flight.metrics import METRICS, Group, in_words, is_share
+from hsv.flight.metrics import METRICS, Group, is_share, spaced
 from hsv.model.plant import Plant
 from hsv.pages.engine import Numbers, Plot, render, write_page
 from hsv.pages.picture import Picture, picture
@@ -90,7 +90,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
             "runs": [{"label": label, "end": end} for label in flights],
             "metrics": {
                 d.name: {
-                    "title": in_words(d.name),
+                    "title": spaced(d.name),
                     "units": units_of(OUTCOMES[d.name], share=is_share(d.name)),
                     "y": numbers.add(results.column(d.name)[drawn]),
                     "limits": _limits(results, d),
@@ -103,7 +103,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
         units=units,
         sections={name: heading for name, heading in SECTIONS.items() if differing or name != "scatter"},
         sentence=sentence(results),
-        failed=failed and in_words(failed.name),
+        failed=failed and spaced(failed.name),
         sorted=failed and _sorted(results, failed, numbers),
         picture=picture(pictured, numbers, end, shades),
         result=results.path.name,
@@ -132,7 +132,7 @@ def sentence(results: Results) -> str:
     text = f"{within_all(results)} of {ended.flights} flights are within all {len(limited)} limits"
     if failed := most_failed(judged):
         broken = failed.flights - failed.within
-        text += f"; the limit that most flights break is {in_words(failed.name)} ({broken} of {ended.flights})"
+        text += f"; the limit that most flights break is {spaced(failed.name)} ({broken} of {ended.flights})"
     return f"{text}. {ending}."
 
 
@@ -149,7 +149,7 @@ def _sorted(results: Results, failed: Share, numbers: Numbers) -> Picture:
     limit = "bound", None, np.array([0.0, 100.0]), np.full(2, failed.limit)
     lines = (limit, ("actual", 0, across, values))
     curves = [{"kind": kind, "run": run, "x": numbers.add(x), "y": numbers.add(y)} for kind, run, x, y in lines]
-    title = f"{capitalised(in_words(failed.name))}, magnitude"
+    title = f"{capitalised(spaced(failed.name))}, magnitude"
     plot = Plot("sorted", title, OUTCOMES[failed.name], "", curves, share=is_share(failed.name))
     return picture([plot], numbers, 100.0, axis="flights, in order of magnitude [%]")
 
@@ -236,7 +236,7 @@ def _envelopes(results: Results, flights: Mapping[str, Flight], numbers: Numbers
         for run, flight in enumerate(flights.values()):
             y = numbers.add(_curve(flight, windows, index))
             curves.append({"kind": "nominal" if run else "actual", "label": "", "run": run, "x": flight_x, "y": y})
-        found.append(Plot(f"envelope_{name}", capitalised(in_words(name)), unit, "envelopes", curves))
+        found.append(Plot(f"envelope_{name}", capitalised(spaced(name)), unit, "envelopes", curves))
     return found
 
 
@@ -249,7 +249,7 @@ def _histogram(results: Results, shown: Distribution, numbers: Numbers) -> Plot:
     )
     return Plot(
         f"histogram_{shown.name}",
-        capitalised(in_words(shown.name)),
+        capitalised(spaced(shown.name)),
         "1",
         f"distributions_{METRICS[shown.name].group if shown.name in METRICS else RUN}",
         [{"kind": "bars", "label": "flights", "run": None, "x": x, "y": y}],
@@ -265,7 +265,7 @@ def _scatter(results: Results, factor: Factor, drawn: np.ndarray, numbers: Numbe
     """Return the scatter plot of a metric against a factor; the script of the page fills in the chosen metric."""
     x, every = numbers.add(results.column(f"sample_{factor.name}")[drawn]), int(drawn[1]) if len(drawn) > 1 else 1
     curve = {"kind": "dots", "label": "", "run": None, "x": x, "y": x, "every": every}
-    title, share = capitalised(in_words(factor.name)), relative(factor)
+    title, share = capitalised(spaced(factor.name)), relative(factor)
     return Plot(f"scatter_{factor.name}", title, "1", "scatter", [curve], x_unit=factor.unit, x_share=share)
 
 

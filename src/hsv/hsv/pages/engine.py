@@ -18,7 +18,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from hsv.base.errors import HsvError, reason, visible
-from hsv.flight.metrics import in_words
+from hsv.flight.metrics import spaced
 from hsv.pages import text
 from hsv.pages.text import units_of
 
@@ -107,7 +107,7 @@ def render(template: str, *, plots: Sequence[Plot] = (), numbers: Numbers | None
         lstrip_blocks=True,
     )
     environment.policies["json.dumps_kwargs"] = {}  # do not sort the keys
-    environment.filters |= {"number": text.number, "words": in_words, "shell": text.shell, "commit_id": text.commit_id}
+    environment.filters |= {"number": text.number, "words": spaced, "shell": text.shell, "commit_id": text.commit_id}
     environment.globals |= {
         "asset": _asset,
         "library": lambda: compressed(LIBRARY.read_bytes()),

@@ -18,7 +18,7 @@ from hsv.flight.assembly import assemble_flight, flight_parameters
 from hsv.flight.closed_loop import flight_struct, is_ideal
 from hsv.flight.fingerprint import published_fingerprint
 from hsv.flight.history import History
-from hsv.flight.metrics import METRICS, in_words
+from hsv.flight.metrics import METRICS, spaced
 from hsv.flight.scenario import Scenario, load_scenario
 from hsv.flight.side_by_side import TubeLevels
 from hsv.model.dynamics import vehicle_struct
@@ -119,7 +119,7 @@ def _choices(scenario: Scenario, values: Values) -> dict[str, Any]:
         sliders["tau"] = [float(least), 1.0, 0.01, float(design.tau[0])]
     sliders |= {"wind": [*(FIELDS["wind"][3] or ()), 0.0], "seed": [*(FIELDS["seed"][3] or ()), scenario.seed]}
     judged = [
-        [name, in_words(name), limit, *in_system(1.0, METRICS[name].unit, UnitSystem.paper)]
+        [name, spaced(name), limit, *in_system(1.0, METRICS[name].unit, UnitSystem.paper)]
         for name, limit in scenario.limits.items()
     ]
     return {

@@ -18,7 +18,7 @@ from hsv.base.units import UnitSystem
 from hsv.control.design_file import find_design, read_parameters
 from hsv.flight.flight import step_times_in_words
 from hsv.flight.limits import criteria_not_judged, limits_kept, verdict_sentence
-from hsv.flight.metrics import CRITERIA, METRICS, Group, Metric, in_words
+from hsv.flight.metrics import CRITERIA, METRICS, Group, Metric, spaced
 from hsv.flight.scenario import scenario_names
 from hsv.graph.node_parameters import NODE_PARAMETERS
 from hsv.model.faults.injector import NEVER_TIME
@@ -169,7 +169,7 @@ def _faults(run: ReportedRun) -> list[dict[str, Any]]:
     return [
         {
             "channel": fault["channel"],
-            "text": f"{in_words(fault['channel'])}: {in_words(fault['type'])}",
+            "text": f"{spaced(fault['channel'])}: {spaced(fault['type'])}",
             "from": fault["start_s"],
             "to": run.duration if fault["end_s"] is None else fault["end_s"],
         }

@@ -50,7 +50,7 @@ def flight_text(cell: Cell) -> str:
     worst, case = cell.worst, cell.case
     subject, fault = case.subject, TRIED[case.fault]
     table = scenario_table(subject.file(case.moment, worst.vehicle, fault, worst.value), subject.name)
-    words = f"{case.fault.replace('_', ' ')} ({fault.parameter.replace('_', ' ')} {fault.in_words(worst.value)})"
+    words = f"{case.fault.replace('_', ' ')} ({fault.parameter.replace('_', ' ')} {fault.values_text(worst.value)})"
     table["title"] = (
         f"{subject.name} with {words} from {subject.start(case.moment):g} s, {vehicle_words(worst.vehicle)}"
     )

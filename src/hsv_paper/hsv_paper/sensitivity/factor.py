@@ -26,7 +26,7 @@ from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.linear_loop import Corners, largest_growth, stability_limit
 from hsv_paper.plots import BLUE, DEGREES, FEET, GREEN, RED, ZERO, new_figure
-from hsv_paper.study import Outcome, Scope, rounded, vehicles
+from hsv_paper.study import Outcome, Scope, rounded_cell, vehicles
 
 FACTORS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
 """Values of tau for which designs are made and flown."""
@@ -56,7 +56,7 @@ def run(scope: Scope) -> Outcome:
         ):
             along = partial(growth, gains, coupling, over)
             axis.plot(FINE, [along(tau) for tau in FINE.tolist()], color=color, **style)
-            limits[which] = rounded(stability_limit(along, FINE[::-1].tolist()), 2)
+            limits[which] = rounded_cell(stability_limit(along, FINE[::-1].tolist()), 2)
         stable.append({"linear loop": label, **limits})
     axis.axhline(0.0, **ZERO)
     axis.set(xlabel="τ", ylabel="largest real part (1/s)", xlim=(1.02, FINE[0]))
@@ -77,7 +77,7 @@ def run(scope: Scope) -> Outcome:
         f"{vehicles(fraction(load_vehicle().uncertainty))}, a different selection. The paper claims that a smaller "
         "factor is faster but less robust (4.3). After a step, K' may use more of the inputs; on the ramp, the nominal "
         "input is hardly used.",
-        [{name: rounded(value, _DIGITS.get(name, 2)) for name, value in row.items()} for row in rows],
+        [{name: rounded_cell(value, _DIGITS.get(name, 2)) for name, value in row.items()} for row in rows],
     )
 
 

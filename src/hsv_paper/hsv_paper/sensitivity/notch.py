@@ -17,7 +17,7 @@ from hsv_paper.flights import Point
 from hsv_paper.linear_loop import Corners, growths, stability_limit
 from hsv_paper.plots import BLUE, DOTTED_GREY, RED, letter, new_figure, plain_log
 from hsv_paper.sensitivity.sweep import Controller, sweep
-from hsv_paper.study import Outcome, Scope, rounded, vehicles
+from hsv_paper.study import Outcome, Scope, rounded_cell, vehicles
 
 SETS = (Controller("paper-like coupling", "case1", BLUE), Controller("derived coupling", "case1_derived", RED))
 """Both couplings are flown with the baseline's gains and its filter, moved to another centre or depth."""
@@ -54,7 +54,7 @@ def run(scope: Scope) -> Outcome:
             rows.append(
                 {"loop": f"{coupled.label}, {suffix}"}
                 | stable_range(coupled, over, centres, depths)
-                | {"shortest decay, s": rounded(decay[best], 1), "with the centre at, rad/s": float(centres[best])}
+                | {"shortest decay, s": rounded_cell(decay[best], 1), "with the centre at, rad/s": float(centres[best])}
             )
     panels[0].set_ylabel(rf"zero damping $\varepsilon_z$ ({own.pole_damping:g}: no notch)")
     figure.colorbar(shown, ax=panels, label="largest real part (1/s)", aspect=15)

@@ -17,7 +17,7 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.base.processes import Progress
-from hsv.base.units import UnitSystem, in_system, in_words
+from hsv.base.units import UnitSystem, in_system, quantity_text
 from hsv.control.design import ControlDesign
 from hsv.design.certified import CertifiedDesign, Plan
 from hsv.design.disturbance import ChannelModel, widened
@@ -112,7 +112,7 @@ class Verdict:
         if self.start > 1.0:
             return f"flights may start outside the set, at level {self.start:.3g}"
         input, side = np.unravel_index(int(np.argmin(self.shares)), self.room.shape)
-        amount = in_words(abs(float(self.room[input, side])), INPUT_UNITS[input], units)
+        amount = quantity_text(abs(float(self.room[input, side])), INPUT_UNITS[input], units)
         where = f"{INPUT_NAMES[input]}, {('lower', 'upper')[side]} side"
         return f"room of {amount} ({where})" if self.certified else f"the plan lacks {amount} ({where})"
 
@@ -255,7 +255,7 @@ def _start(found: InvariantSet, error: np.ndarray) -> float:
     """Return a bound on the start level of a flight for errors up to ``error``, shape (5,), in the measurement."""
     corners = np.array(list(product((-1.0, 1.0), repeat=N_RIGID))) * error
     errors = np.pad(corners, ((0, 0), (0, len(found.centre) - N_RIGID)))
-    level = float(found.level(errors).max())
+    level = float(found.levels(errors).max())
     if found.star_norms is None:
         return level
     return max(level, *(found.star_norms.level_at_start(found.problem, found.centre, error) for error in errors))

@@ -27,11 +27,11 @@ from hsv.design.tube_problem import TubeProblem
 from hsv.lmi.semidefinite import (
     MATRIX_DIGITS,
     Unknown,
-    image,
+    ellipsoid_norms,
     inverse,
     minimise,
-    rounded,
     rounded_matrix,
+    rounded_to_size,
 )
 from hsv.model.signals import N_RIGID
 
@@ -122,7 +122,7 @@ class InvariantSet:
         rates = self.rated.rates if self.rated else np.empty(0)
         return TubeSet(self.centre[:n], inverse(self.Q[:n, :n]), self.half_width[:n], rates)
 
-    def level(self, error: np.ndarray) -> np.ndarray:
+    def levels(self, error: np.ndarray) -> np.ndarray:
         """Return the level (e - c)' Q^-1 (e - c) of each error (..., n): at most 1 inside the ellipsoid."""
         v = error - self.centre
         return np.asarray(np.einsum("...i,ij,...j->...", v, inverse(self.Q), v))
@@ -134,7 +134,10 @@ class InvariantSet:
         M = L^-1 [A L / sqrt(lam), G / sqrt(l)].
         """
         columns = self.problem.columns(self.centre) / np.sqrt(self.multipliers)[:, None, :]
-        return 1.0 - image(self.Q, "ellipsoid: Q", self.problem.system.A / np.sqrt(self.contraction), columns) ** 2
+        return (
+            1.0
+            - ellipsoid_norms(self.Q, "ellipsoid: Q", self.problem.system.A / np.sqrt(self.contraction), columns) ** 2
+        )
 
     def certify(self) -> dict[str, Any]:
         """Recompute that the set is invariant at every vertex and return the evidence, for JSON.
@@ -145,7 +148,7 @@ class InvariantSet:
         sums = self.multipliers.sum(axis=1).max()
         if not (self.multipliers.min() > 0.0 and sums <= (1.0 - self.contraction) * (1.0 + 1e-12)):
             raise DesignError("ellipsoid: multipliers: expected all above zero, sums of at most 1 - contraction")
-        residuals, origin = self.residuals(), float(self.level(np.zeros(len(self.Q))))
+        residuals, origin = self.residuals(), float(self.levels(np.zeros(len(self.Q))))
         worst = int(np.argmin(residuals))
         if not residuals[worst] > 0.0:
             raise DesignError(f"ellipsoid: inequality at vertex {worst} = {residuals[worst]:.3g}, expected above zero")
@@ -257,6 +260,6 @@ def _solve(problem: TubeProblem, weight: np.ndarray, contraction: float) -> Inva
         f"ellipsoid, contraction {contraction}",
     )
     Q_si = rounded_matrix(_INFLATION * T @ Q @ T.T)
-    centre = rounded(guess + T @ shift[:, 0], np.sqrt(np.diag(Q_si)), MATRIX_DIGITS)
-    multipliers = rounded(multipliers, 1.0 - contraction, MATRIX_DIGITS)
+    centre = rounded_to_size(guess + T @ shift[:, 0], np.sqrt(np.diag(Q_si)), MATRIX_DIGITS)
+    multipliers = rounded_to_size(multipliers, 1.0 - contraction, MATRIX_DIGITS)
     return InvariantSet(problem, centre, Q_si, contraction, multipliers)

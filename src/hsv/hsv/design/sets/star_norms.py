@@ -23,7 +23,7 @@ from scipy.linalg import cholesky
 
 from hsv.base.errors import DesignError
 from hsv.design.tube_problem import TubeProblem
-from hsv.lmi.semidefinite import Unknown, image, minimise, rounded_matrix, spectral_radii
+from hsv.lmi.semidefinite import Unknown, ellipsoid_norms, minimise, rounded_matrix, spectral_radii
 
 _INFLATION = 1.002
 """Factor on Q that keeps the ellipsoid invariant after rounding."""
@@ -73,7 +73,7 @@ class StarNorms:
         for (row, channel), lam in np.ndenumerate(self.contraction):
             g = G[:, :, channel, None] / np.sqrt(1.0 - lam)
             if g.any():
-                reach = image(self.Q[row, channel], f"star norms: Q[{row}, {channel}]", A / np.sqrt(lam), g)
+                reach = ellipsoid_norms(self.Q[row, channel], f"star norms: Q[{row}, {channel}]", A / np.sqrt(lam), g)
                 residuals[row, channel] = 1.0 - reach.max() ** 2
         return residuals
 

@@ -32,7 +32,7 @@ Job = Callable[[str, int], bytes]
 Notice = Callable[[str], None]
 """A function that shows the user a message about what the campaign waits for."""
 
-NOTICE = 10.0
+QUIET_TIME = 10.0
 """Seconds without a result after which the user is told what the campaign waits for."""
 
 ANSWER, WORKERS = 60.0, 300.0
@@ -69,7 +69,7 @@ class Executor:
 
 
 class _PoolExecutor(Executor, ABC):
-    """Flies batches in a pool of workers; after :data:`NOTICE` s without a result, calls ``notice`` once per cause."""
+    """Flies batches in a pool of workers. After :data:`QUIET_TIME` without a result, calls ``notice`` once a cause."""
 
     def __init__(self, notice: Notice) -> None:
         self._notice = notice
@@ -113,7 +113,7 @@ class _PoolExecutor(Executor, ABC):
 
     def _first(self, flying: dict[Future[bytes], int], label: Callable[[int], str]) -> Collection[Future[bytes]]:
         """Wait until at least one batch is finished, and return the futures of the finished batches."""
-        due = time.monotonic() + NOTICE
+        due = time.monotonic() + QUIET_TIME
         while not (done := wait(flying, _LOOK, FIRST_COMPLETED).done):
             obstacle = self._obstacle()
             if time.monotonic() > due and obstacle not in self._noticed:
@@ -339,7 +339,7 @@ def _connected(address: str, notice: Notice) -> Iterator[Any]:
 async def _answers(address: str, waiting: Callable[[], None]) -> bool:
     """Return whether a Dask scheduler answers within :data:`ANSWER` seconds.
 
-    After :data:`NOTICE` seconds without an answer, ``waiting`` is called once. Dask's own client is not used here,
+    After :data:`QUIET_TIME` seconds without an answer, ``waiting`` is called once. Dask's own client is not used here,
     because Ctrl-C does not interrupt it while it waits.
     """
     import asyncio
@@ -350,9 +350,9 @@ async def _answers(address: str, waiting: Callable[[], None]) -> bool:
     arguments = Security().get_connection_args("client")
     async with rpc(address, timeout=ANSWER, connection_args=arguments) as scheduler:
         identity = asyncio.ensure_future(scheduler.identity())
-        if not (await asyncio.wait([identity], timeout=NOTICE))[0]:
+        if not (await asyncio.wait([identity], timeout=QUIET_TIME))[0]:
             waiting()
-            await asyncio.wait([identity], timeout=ANSWER - NOTICE)
+            await asyncio.wait([identity], timeout=ANSWER - QUIET_TIME)
         if not identity.done():
             identity.cancel()
             return False
@@ -377,9 +377,9 @@ def _check_workers(client: Any, address: str, notice: Notice) -> None:
     pool = ThreadPoolExecutor(1)
     answers = pool.submit(client.run, worker_program, on_error="return")
     pool.shutdown(wait=False)
-    if not wait([answers], NOTICE).done:
+    if not wait([answers], QUIET_TIME).done:
         notice("waiting for the answers of all workers")
-    if not wait([answers], WORKERS - NOTICE).done:
+    if not wait([answers], WORKERS - QUIET_TIME).done:
         raise CampaignError(f"scheduler = {address!r}: a worker does not answer, expected {program()} on each")
     for worker, answer in sorted(answers.result().items()):
         if answer == program():

@@ -99,7 +99,7 @@ class SampleRunner:
         """Fly the scenario from which the samples deviate, with the mean in place of every distribution."""
         return fly(self._variants.unchanged)
 
-    def level(self, flight: FlightData) -> float | None:
+    def tube_level(self, flight: FlightData) -> float | None:
         """Return the largest tube level of a flight, None if no invariant set applies to it."""
         return self._levels.worst(flight)
 
@@ -143,7 +143,7 @@ class SampleRunner:
             flight = fly(components)
         except ControllerError as error:
             return error
-        return flight, self.level(flight)
+        return flight, self.tube_level(flight)
 
     def _components(self, flight: int, sample: Sequence[float]) -> Components:
         if names := self.campaign.perturbed:

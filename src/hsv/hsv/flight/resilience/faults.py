@@ -90,7 +90,7 @@ class TriedFault:
             return {**own, "stop": written(rounded(start + value), self.unit)}
         return {**own, self.parameter: written(value, self.unit)}
 
-    def in_words(self, *values: float) -> str:
+    def values_text(self, *values: float) -> str:
         """Return ``values`` of the parameter as a text with their unit."""
         return f"{', '.join(f'{value:.3g}' for value in values)}{'' if self.unit == '1' else ' ' + self.unit}"
 

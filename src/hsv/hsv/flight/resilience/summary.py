@@ -165,19 +165,19 @@ class ResilienceResults:
 def boundaries_in_words(fault: TriedFault, boundaries: Mapping[Moment, Boundary]) -> list[str]:
     """Return texts on the severities that the nominal vehicle survives: one per moment, or one if they are equal."""
 
-    def in_words(boundary: Boundary) -> str:
+    def boundary_text(boundary: Boundary) -> str:
         if boundary.survived is None:
-            return f"lost at {fault.in_words(fault.harmless)}"
+            return f"lost at {fault.values_text(fault.harmless)}"
         if boundary.lost is None:
-            return f"all, to {fault.in_words(fault.worst)}"
-        return f"to {fault.in_words(fault.value(boundary.survived))}"
+            return f"all, to {fault.values_text(fault.worst)}"
+        return f"to {fault.values_text(fault.value(boundary.survived))}"
 
-    return list(dict.fromkeys(in_words(boundaries[moment]) for moment in Moment))
+    return list(dict.fromkeys(boundary_text(boundaries[moment]) for moment in Moment))
 
 
 def parameter_words(name: str) -> str:
     """Return a text on the fault ``name``: severity parameter, its three values and range, fixed parameters."""
     fault = TRIED[name]
     fixed = "".join(f", {key.replace('_', ' ')} {value}" for key, value in fault.fixed.items())
-    tried = f"{fault.in_words(*fault.values)} ({fault.harmless:g} to {fault.in_words(fault.worst)}){fixed}"
+    tried = f"{fault.values_text(*fault.values)} ({fault.harmless:g} to {fault.values_text(fault.worst)}){fixed}"
     return f"{fault.parameter.replace('_', ' ')} {tried}"

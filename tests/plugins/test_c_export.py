@@ -19,7 +19,7 @@ from hsv.control.design_file import find_design, read_design
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario
-from hsv.plugins.export import NUMBERS, SOURCE, controller_files, design_header, step_bounds
+from hsv.plugins.c_export import NUMBERS, SOURCE, controller_files, design_header, step_bounds
 from hsv.plugins.library import load_block
 
 ROOT = Path(__file__).parents[2]

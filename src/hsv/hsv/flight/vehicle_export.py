@@ -10,7 +10,7 @@ from hsv.flight.scenario import Scenario
 from hsv.model.faults.table import COMMAND as COMMAND_SIDE
 from hsv.model.plant import plant_faults
 from hsv.model.signals import COMMAND, numbers_of
-from hsv.plugins.export import HEADER, constant, constant_array, core_headers
+from hsv.plugins.c_export import HEADER, constant, constant_array, core_headers
 from hsv.plugins.fmu_export import ExportedBlock
 from hsv.plugins.library import include_folder
 

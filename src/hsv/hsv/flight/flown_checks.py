@@ -37,9 +37,9 @@ from hsv.certificate.verification import (
     Part,
     Tube,
     acceleration_channels,
+    ellipsoid_levels,
+    inflated_bounds,
     lag_feedback,
-    level,
-    widened,
 )
 from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import discretise
@@ -168,7 +168,7 @@ def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
     plan = flight.plan
     turning = np.diff(h.deviation[:, PITCH_RATE]) / flight.period
     return Evidence(
-        float(level(tube.Q, found.error - tube.c).max()),
+        float(ellipsoid_levels(tube.Q, found.error - tube.c).max()),
         float(ratios[step, channel]),
         CHANNELS[channel].name,
         int(step),
@@ -279,7 +279,7 @@ def _measured(subject: Subject, flown: Sequence[Evidence]) -> Checks:
         yield replace(check, name=f"{field}.{side}_flight", fields=(f"{field}.{side}_flight",))
         if subject.design.actuators:
             sign, inflation = 2.0 * k - 1.0, subject.stated("inputs.disturbance.inflation")
-            worst = sign * widened(sign * extreme([f.lag[k] for f in flown], axis=0), inflation)
+            worst = sign * inflated_bounds(sign * extreme([f.lag[k] for f in flown], axis=0), inflation)
             yield recomputed(subject, f"tube.tightening.lag_feedback.{side}", worst, "flights")
 
 

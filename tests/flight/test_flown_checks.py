@@ -15,9 +15,7 @@ from hsv.design.disturbance import ChannelModel
 from hsv.design.region import Region
 from hsv.flight.closed_loop import fly
 from hsv.flight.corners import drawn_flights
-from hsv.flight.random_sequences import random_sequences
-from hsv.flight.scenario import load_scenario, parse_scenario, scenario_text
-from hsv.flight.verification import (
+from hsv.flight.flown_checks import (
     bounding_corners,
     disturbances,
     flight_checks,
@@ -26,6 +24,8 @@ from hsv.flight.verification import (
     share_of,
     verify,
 )
+from hsv.flight.random_sequences import random_sequences
+from hsv.flight.scenario import load_scenario, parse_scenario, scenario_text
 
 DESIGNS = sorted(path.stem for path in Path(__file__).parents[2].glob("offline_design/*.toml"))
 
