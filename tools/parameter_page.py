@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from hsv.bags.description import CARRIED
+from hsv.bags.description import TOPIC_FIELDS
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.base.parameters import Parameter
 from hsv.control.design import DESIGN_PARAMETERS
@@ -75,7 +75,7 @@ def _loop() -> str:
 def _signals() -> str:
     rows = []
     for signal in (signal for block in LOOP for signal in block.outputs):
-        topics = ", ".join(f"`{topic}`" for topic, carried in CARRIED.items() if signal in carried)
+        topics = ", ".join(f"`{topic}`" for topic, carried in TOPIC_FIELDS.items() if signal in carried)
         size = "" if signal.size == VARYING else signal.size
         rows.append((signal.name, signal.meaning, size, signal.unit, topics))
     return _table("signal, meaning, numbers, unit, topics", rows)

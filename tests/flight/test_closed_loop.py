@@ -3,7 +3,7 @@ from flights import components, step_by_step
 from marking import long
 from numpy.testing import assert_array_equal
 
-from hsv.bags.description import CARRIED, CLOCK, TOPICS, graph
+from hsv.bags.description import CLOCK, TOPIC_FIELDS, TOPICS, graph
 from hsv.flight.blocks import LOOP
 from hsv.flight.closed_loop import fly
 from hsv.model.signals import SignalType
@@ -57,9 +57,11 @@ def test_every_signal_of_the_loop_has_one_source_and_follows_it_within_a_step():
 
 
 def test_every_signal_of_the_loop_travels_on_a_topic_that_its_reader_subscribes_to():
-    assert {signal for carried in CARRIED.values() for signal in carried} == {s for each in LOOP for s in each.outputs}
-    assert CARRIED.keys() == TOPICS.keys() - {CLOCK}
+    assert {signal for carried in TOPIC_FIELDS.values() for signal in carried} == {
+        s for each in LOOP for s in each.outputs
+    }
+    assert TOPIC_FIELDS.keys() == TOPICS.keys() - {CLOCK}
     for node in graph():
         if node.block:
-            received = {signal for topic in node.subscribes for signal in CARRIED.get(topic, {})}
+            received = {signal for topic in node.subscribes for signal in TOPIC_FIELDS.get(topic, {})}
             assert received.issuperset(node.block.inputs), node.name

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from hsv.bags.definitions import fields_of, installed_types
-from hsv.bags.description import CARRIED, TOPICS, TUBE_STATUS
+from hsv.bags.description import TOPIC_FIELDS, TOPICS, TUBE_STATUS
 from hsv.control.controller import CONTROLLER_INPUTS
 from hsv.core import lib
 from hsv.flight import history
@@ -24,17 +24,17 @@ def listed(store, kind, prefix=""):
     return paths
 
 
-@pytest.mark.parametrize("topic", CARRIED)
+@pytest.mark.parametrize("topic", TOPIC_FIELDS)
 def test_every_field_of_a_message_belongs_to_one_signal_of_the_table(topic):
     kind = TOPICS[topic]
     store = installed_types(kind)
     paths = [path for path in listed(store, kind) if path.split(".")[0] not in FRONT]
     sizes = DIAGNOSED | {"u_reference": N_INPUTS} if topic == TUBE_STATUS else {}
-    carried = {field: 1 if s.sequence or s.name == "saturated" else s.size for s, field in CARRIED[topic].items()}
+    carried = {field: 1 if s.sequence or s.name == "saturated" else s.size for s, field in TOPIC_FIELDS[topic].items()}
     for first, size in (sizes or carried).items():
         at = next(i for i, path in enumerate(paths) if path == first or path.startswith(f"{first}."))
         taken, paths = paths[at : at + (1 if size == VARYING else size)], paths[:at] + paths[at + abs(size) :]
-        signal = next((s for s, field in CARRIED[topic].items() if field == first), None)
+        signal = next((s for s, field in TOPIC_FIELDS[topic].items() if field == first), None)
         if signal and signal.components and not signal.sequence:
             assert [path.rpartition(".")[2] for path in taken] == [*signal.components], signal.name
     assert paths == (["since"] if topic == "hsv/actuator" else [])

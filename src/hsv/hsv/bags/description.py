@@ -66,15 +66,15 @@ TOPICS = {
 """Message types of the step topics, by role, in order of recording. A step topic has exactly one message per step. Not
 every controller publishes the tube status, see :func:`step_topics`."""
 
-CARRIED: dict[str, dict[SignalType, str]] = {topic: {} for topic in TOPICS if topic != CLOCK}
+TOPIC_FIELDS: dict[str, dict[SignalType, str]] = {topic: {} for topic in TOPICS if topic != CLOCK}
 """The signals in the messages of each topic, with the field at which each signal begins, see
 :class:`hsv.model.signals.SignalType`."""
 
 for _signal in SIGNALS.values():
     for _topic, _, _field in (place.partition(".") for place in _signal.fields):
-        CARRIED[f"hsv/{_topic}"][_signal] = _field
+        TOPIC_FIELDS[f"hsv/{_topic}"][_signal] = _field
 
-TOPIC_OF = {signal.name: topic for topic, carried in CARRIED.items() for signal in carried}
+TOPIC_OF = {signal.name: topic for topic, carried in TOPIC_FIELDS.items() for signal in carried}
 """The topic that contains each signal, by the signal's name; the last topic if several contain it."""
 
 LATCHED_TOPICS = {RUN: "hsv_msgs/msg/Run", READY: "hsv_msgs/msg/Ready", REFERENCE: "hsv_msgs/msg/Reference"}

@@ -5,7 +5,7 @@ then have the same layout, which follows from the message definition: one numpy 
 Nodes, replay and reader view the bytes of a message with this type instead of converting it field by field. Only a list
 of messages, such as the active faults, is converted by rosbags, and only when its bytes change.
 
-:data:`hsv.bags.description.CARRIED` declares the fields that contain the signals.
+:data:`hsv.bags.description.TOPIC_FIELDS` declares the fields that contain the signals.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
 from hsv.bags.definitions import blank, deserialized, fields_of, installed_types
-from hsv.bags.description import CARRIED, CLOCK, TOPICS, TUBE_STATUS, WIRE_ALIGNMENT
+from hsv.bags.description import CLOCK, TOPIC_FIELDS, TOPICS, TUBE_STATUS, WIRE_ALIGNMENT
 from hsv.base.errors import ParameterError, RunError, SignalError
 from hsv.flight.blocks import LOOP
 from hsv.model import signals as types
@@ -190,7 +190,7 @@ class StepMessages:
         """Choose the topic by its role, e.g. ``hsv/state``, and its message definitions; None: the installed ones."""
         self.type = TOPICS[topic]
         self._store = store or installed_types(self.type)
-        carried = CARRIED.get(topic, {})
+        carried = TOPIC_FIELDS.get(topic, {})
         self._has_faults = types.ACTIVE_FAULTS in carried
         numbers = {signal: field for signal, field in carried.items() if signal is not types.ACTIVE_FAULTS}
         self._sequences = {signal: field for signal, field in numbers.items() if signal.sequence}
