@@ -59,8 +59,6 @@ def test_every_signal_of_the_loop_has_one_source_and_follows_it_within_a_step():
 def test_every_signal_of_the_loop_travels_on_a_topic_that_its_reader_subscribes_to():
     carried = {signal for fields in TOPIC_FIELDS.values() for signal in fields}
     assert carried == {s for each in LOOP for s in each.outputs}
-        s for each in LOOP for s in each.outputs
-    }
     assert TOPIC_FIELDS.keys() == TOPICS.keys() - {CLOCK}
     for node in graph():
         if node.block:
