@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from hsv.base.units import UnitSystem
 from hsv.flight.closed_loop import fly
 from hsv.flight.history import History
-from hsv.flight.limits import Verdict, verdict_sentence, verdicts
+from hsv.flight.limits import Verdict, limits_kept, verdict_sentence, verdicts
 from hsv.flight.metrics import METRICS, FlightData
 from hsv.flight.scenario import load_scenario
 
@@ -122,7 +122,7 @@ def test_a_flight_that_ended_in_numbers_that_are_none_still_has_metrics():
 
     m = flight(fault=50.0, altitude=gone, velocity=gone, alpha=gone, rate_1=gone, rate_2=gone).metrics
     assert math.isnan(m["altitude_end_error"])
-    assert m["elastic_rate_1_decay_time"] == pytest.approx(50.0)
+    assert "elastic_rate_1_decay_time" not in m
 
 
 def test_order_and_names_are_those_of_the_table():
@@ -149,7 +149,7 @@ def test_a_flight_that_was_recorded_has_the_same_metrics_in_every_bit(scenario, 
         (-2.0, True, "within"),
         (2.1, True, "over"),
         (math.nan, True, "over"),
-        (None, True, "not reached"),
+        (None, True, "not within"),
         (0.0, False, "not flown to the end"),
         (-3.0, False, "over"),
     ],
@@ -157,7 +157,7 @@ def test_a_flight_that_was_recorded_has_the_same_metrics_in_every_bit(scenario, 
 def test_a_limit_is_kept_only_by_a_flight_that_came_to_its_end(value, ended, words):
     verdict = Verdict(2.0, value, ended)
     assert verdict.words == words
-    assert verdict.within == (words == "within")
+    assert verdict.kept == (words == "within")
 
 
 DECAY = {"elastic_decay_time": 67.1, "altitude_overshoot": 0.04}
@@ -169,11 +169,31 @@ DECAY = {"elastic_decay_time": 67.1, "altitude_overshoot": 0.04}
         ({"saturated_steps": 0.0}, True, "within its limit"),
         ({"saturated_steps": 0.0, **DECAY}, True, "within its limit; not judged: elastic decay time (67.1 s), 1 other"),
         ({"saturated_steps": 3.0}, True, "1 of 1 limits not kept: saturated steps 3 (limit 0)"),
-        ({}, True, "1 of 1 limits not kept: saturated steps not reached"),
+        ({}, True, "1 of 1 limits not kept: saturated steps not within"),
         ({"saturated_steps": 0.0}, False, "not flown to the end"),
         ({"saturated_steps": 3.0}, False, "not flown to the end; 1 of 1 limits not kept: saturated steps 3 (limit 0)"),
     ],
 )
 def test_the_verdict_is_one_sentence(metrics, ended, sentence):
-    judged = verdicts(load_scenario("case1_rmpc"), metrics, ended=ended)
+    judged = verdicts(load_scenario("case1_rmpc"), metrics, {}, ended=ended)
     assert verdict_sentence(judged, metrics, UnitSystem.metric) == sentence
+
+
+def test_what_a_healthy_flight_lacks_does_not_apply_and_breaks_no_limit():
+    healthy = flight(altitude=lambda t: 100.0 * np.exp(-t / 5.0))
+    assert healthy.missing["velocity_overshoot"] == "no velocity step"
+    assert {why for name, why in healthy.missing.items() if "fault" in name or "decay" in name} == {"no fault"}
+    case1 = load_scenario("case1")
+    judged = verdicts(case1, {**healthy.metrics, "altitude_end_error": 0.0}, healthy.missing, ended=True)
+    assert limits_kept(judged, UnitSystem.metric) == "within all 3 limits; 3 do not apply: no fault"
+    lost = verdicts(case1, healthy.metrics, healthy.missing, ended=False)
+    assert not any(verdict.kept for verdict in lost.values())
+    assert not lost["elastic_decay_time"].words.startswith("does not apply")
+
+
+def test_a_time_that_was_not_reached_has_no_number_and_breaks_its_limit():
+    ringing = flight(fault=50.0, altitude=lambda t: 100.0 + 0 * t, rate_1=lambda t: np.cos(15.0 * t))
+    for name, why in (("altitude_rise_time", "not within 50 s"), ("elastic_decay_time", "not within 50 s")):
+        assert name not in ringing.metrics and ringing.missing[name] == why
+    verdict = verdicts(load_scenario("case1"), ringing.metrics, ringing.missing, ended=True)["elastic_decay_time"]
+    assert (verdict.words, verdict.kept) == ("not within 50 s", False)

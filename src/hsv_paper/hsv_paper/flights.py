@@ -93,7 +93,7 @@ def flight_measures(flight: FlightData) -> dict[str, float]:
         values[f"elastic_rate_{mode}_ringing"] = float(np.ptp(state[ringing, column + 1]))
     values["attitude_settling_time"] = _settling_time(since[after], state[after, 2:4])
     values["pitch_rate_settling_time"] = _settling_time(since[after], state[after, 4:5])
-    decay = values["elastic_decay_time"]
+    decay = values.get("elastic_decay_time", np.inf)
     values["elastic_settling_time"] = decay if decay < since[-1] - LAST else np.inf
     return values
 

@@ -4,7 +4,9 @@ from itertools import accumulate
 import numpy as np
 import pytest
 from flights import components
+from pyarrow import parquet
 
+from hsv.base.errors import CampaignError
 from hsv.flight.campaign.campaign import plan
 from hsv.flight.campaign.envelope import Envelope, signals, window_starts
 from hsv.flight.campaign.executors import Executor
@@ -12,7 +14,7 @@ from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.store import ResultStore
 from hsv.flight.campaign.summary import Results, clopper_pearson, distributions, shares, worst_flights
 from hsv.flight.closed_loop import fly
-from hsv.pages.campaign import campaign_page
+from hsv.pages.campaign import campaign_page, sentence
 
 
 def test_clopper_pearson_of_the_textbook():
@@ -48,7 +50,62 @@ def test_flights_that_diverge_are_within_no_limit_and_come_first(lost):
     worst = worst_flights(lost)
     assert worst[0].limit == "diverged"
     assert lost.column("end_time")[worst[0].flight] == lost.column("end_time").min()
-    assert "∞" in campaign_page(lost)
+    assert "lost</td>" in campaign_page(lost)
+
+
+DEEP = """
+extends = "case1"
+duration = "40 s"
+fault = [{channel = "elevator_deflection", type = "loss_of_effectiveness", effectiveness = 0.9, start = "20 s"}]
+"""
+
+
+@pytest.fixture(scope="module")
+def partly(tmp_path_factory):
+    """Return a campaign in which some flights are lost after the fault."""
+    folder = tmp_path_factory.mktemp("partly")
+    (folder / "deep.toml").write_text(DEEP)
+    factors = {"fault[0].effectiveness": (0.2, 0.9)}
+    campaign = plan(str(folder / "deep.toml"), samples=32, commit="test", factors=factors)
+    run_campaign(campaign, ResultStore(folder / "deep.parquet", campaign), Executor())
+    return Results(folder / "deep.parquet")
+
+
+def test_lost_flights_are_counted_apart_and_are_in_no_statistic(partly):
+    ended, *limited = shares(partly)
+    finished = partly.finished
+    assert (ended.within, ended.flights) == (np.count_nonzero(finished), 32) and 0 < ended.within < 32
+    assert all(share.flights == ended.within for share in limited)
+    decay = next(share for share in limited if share.name == "elastic_decay_time")
+    assert decay.within == np.count_nonzero(partly.column("elastic_decay_time")[finished] <= decay.limit) > 0
+    found = {d.name: d for d in distributions(partly)}
+    assert all(d.flights == ended.within for d in found.values())
+    assert found["altitude_end_error"].maximum == np.abs(partly.column("altitude_end_error")[finished]).max()
+    assert found["velocity_end_error"].title == "|velocity end error|"
+    assert partly.envelope.count.max() == ended.within
+    assert f"{32 - ended.within} of 32 flights are lost" in sentence(partly)
+    assert f"{decay.within} of {ended.within}" in campaign_page(partly)
+
+
+def test_a_time_that_was_not_reached_is_null_and_counts_as_longer_than_every_other(partly):
+    late = partly.not_reached("velocity_rise_time")
+    assert late[partly.finished].all() and np.isnan(partly.column("velocity_rise_time")[late]).all()
+    rise = next(d for d in distributions(partly) if d.name == "velocity_rise_time")
+    assert (rise.not_reached, rise.minimum) == (np.count_nonzero(partly.finished), math.inf)
+    assert worst_flights(partly)[0].limit == "diverged"
+
+
+def test_a_file_of_the_first_format_is_read_and_one_of_a_later_format_is_refused(partly, tmp_path):
+    table, old = parquet.read_table(partly.path), tmp_path / "old.parquet"
+    own = (b"hsv.campaign", b"hsv.envelope", b"hsv.digest")
+    kept = {key: parquet.read_metadata(partly.path).metadata[key] for key in own}
+    parquet.write_table(table.drop_columns(["not_reached"]).replace_schema_metadata(kept), old)
+    first = Results(old)
+    assert first.format == 1 and not first.not_reached("velocity_rise_time").any()
+    assert "The file has the format 1" in campaign_page(first)
+    parquet.write_table(table.replace_schema_metadata(kept | {b"hsv.format": b"3"}), old)
+    with pytest.raises(CampaignError, match="format '3', expected 1 to 2"):
+        Results(old)
 
 
 def test_an_envelope_has_the_extremes_and_the_mean_values_of_each_window():

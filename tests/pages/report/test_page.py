@@ -46,7 +46,7 @@ def test_every_link_has_its_section(page):
 def test_verdict_limits_and_metrics_are_those_of_the_run(quiet):
     (run,) = reported_runs([quiet])
     seen = words(report_page([run]))
-    over = sum(not verdict.within for verdict in run.verdicts.values())
+    over = sum(not verdict.kept for verdict in run.verdicts.values())
     assert over, "20 s are too short to reach the end error that is asked for"
     assert f"✗ {over} of {len(run.scenario.limits)} limits not kept" in seen
     for name in run.metrics:

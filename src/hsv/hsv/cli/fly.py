@@ -177,6 +177,7 @@ def simulate(
     flown = FlightSummary(
         loaded,
         flight.metrics,
+        flight.missing,
         fingerprint=flight.fingerprint,
         design_hash=design.digest if design else digest({}),
         ending="diverged" if flight.status is FlightStatus.DIVERGED else "finished",
@@ -305,6 +306,7 @@ def _conclude(
     flown = FlightSummary(
         parse_scenario(recorded.text("scenario.toml"), recorded.custom_data.get("scenario", "")),
         data.metrics,
+        data.missing,
         fingerprint=description["fingerprint"],
         design_hash=recorded.custom_data.get("design_hash", ""),
         ending=description["ending"],

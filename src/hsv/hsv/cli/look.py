@@ -184,9 +184,11 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
     problem, remark = None, ""
     lacking = [opened.name_of(topic) for topic in MEASURED if topic not in opened.roles]
     metrics: dict[str, float] = {}
+    missing: dict[str, str] = {}
     try:
         if not lacking:
-            metrics, remark = flight_data(opened).metrics, completeness(opened)
+            flown = flight_data(opened)
+            metrics, missing, remark = flown.metrics, flown.missing, completeness(opened)
     except RecordingError as error:
         # The other contents help to see what is wrong with the bag.
         problem = error
@@ -196,7 +198,7 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
         if lacking:
             output.say(f"no metrics: they need {', '.join(lacking)}")
         elif not problem:
-            print_metrics(f"Metrics of an incomplete bag: {remark}" if remark else "Metrics", metrics, units)
+            print_metrics(f"Metrics of an incomplete bag: {remark}" if remark else "Metrics", metrics, missing, units)
     if not problem:
         output.print_bag_warnings(opened)
     measured = {"metrics_complete": not remark, "metrics": output.to_json(quantities, units)}

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from rich.text import Text
 
 from hsv.base.errors import RunError
@@ -16,7 +17,7 @@ from hsv.cli import output
 from hsv.flight.fingerprint import as_published, published_in_words
 from hsv.flight.flight import step_times_in_words
 from hsv.flight.limits import Verdict, in_units, limits_kept, not_judged, verdict_sentence, verdicts
-from hsv.flight.metrics import METRICS, Group, is_share, spaced
+from hsv.flight.metrics import METRICS, NOT_REACHED, Group, is_share, spaced
 from hsv.flight.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ class FlightSummary:
     scenario: Scenario
     metrics: Mapping[str, float]
     """Metrics by name, in SI units."""
+    missing: Mapping[str, str]
+    """The reason for each metric that the flight does not define, by name."""
     fingerprint: str | None
     """Fingerprint of the flight; None if the recording is not complete."""
     design_hash: str
@@ -61,8 +64,8 @@ def report_flight(
     """
     scenario, time, wall_time = flight.scenario, flight.simulated_time, flight.wall_time
     finished = flight.ending == "finished"
-    judged = verdicts(scenario, flight.metrics, ended=finished)
-    kept = finished and all(verdict.within for verdict in judged.values())
+    judged = verdicts(scenario, flight.metrics, flight.missing, ended=finished)
+    kept = finished and all(verdict.kept for verdict in judged.values())
     margin_kept, margin_words = None, ""
     if scenario.disk_margin is not None:
         from hsv.flight.margins import margin_verdict
@@ -80,6 +83,7 @@ def report_flight(
                 "not_judged": not_judged(judged, flight.metrics),
                 **({"disk_margin": {"kept": margin_kept, "words": margin_words}} if margin_words else {}),
                 "metrics": output.to_json({name: (v, METRICS[name].unit) for name, v in flight.metrics.items()}, units),
+                "missing": flight.missing,
                 "fingerprint": flight.fingerprint,
                 "as_published": same,
                 "wall_time_s": wall_time,
@@ -99,7 +103,7 @@ def report_flight(
             # The fingerprint is almost as wide as a terminal, so it has a line of its own.
             "fingerprint": f"{published_in_words(flight.fingerprint, same)}\n{flight.fingerprint or ''}".rstrip(),
         }
-        print_metrics(scenario.title, flight.metrics, units, judged, every)
+        print_metrics(scenario.title, flight.metrics, flight.missing, units, judged, every)
         output.print_section("run", run)
         words = verdict_sentence(judged, flight.metrics, units) if every else limits_kept(judged, units)
         words = "; ".join(filter(None, (words, margin_words)))
@@ -116,34 +120,41 @@ def report_flight(
 def print_metrics(
     title: str,
     metrics: Mapping[str, float],
+    missing: Mapping[str, str],
     units: UnitSystem,
     judged: Mapping[str, Verdict] | None = None,
     every: bool = False,
 ) -> None:
     """Print metrics (SI) in groups with their units and, where ``judged`` is given, with their verdicts.
 
-    With ``every``, metrics without a limit are marked as not judged.
+    Times that were not reached have a row with the reason; a line below names the metrics that do not apply. With
+    ``every``, metrics without a limit are marked as not judged.
     """
     table = output.new_table("metric", "value", "unit", "verdict", title=title, right=["value"], head=False)
     table.columns[2].no_wrap = True
-    known = [*metrics, *(name for name in judged or () if name not in metrics)]
+    late = [name for name, why in missing.items() if why.startswith(NOT_REACHED)]
+    known = [*metrics, *late, *(name for name in judged or () if name not in metrics)]
     for group in Group:
         names = [name for name in METRICS if name in known and METRICS[name].group is group]
         if names:
             table.add_row(Text(group, "bold"))
         for name in names:
             metric, verdict = METRICS[name], (judged or {}).get(name)
-            number, unit = in_system(metrics.get(name, nan), metric.unit, units, share=metric.share)
+            number, unit = in_system(metrics.get(name, math.nan), metric.unit, units, share=metric.share)
             value = significant(number) if name in metrics else "-"
-            remark = Text("not judged" if every and judged is not None else "", "dim")
+            remark = Text("not judged" if every and judged is not None else missing.get(name, ""), "dim")
             if verdict and verdict.words == "not flown to the end":
                 remark = Text(verdict.words, "red")
             elif verdict:
                 limit = in_units(name, verdict.limit, units)
                 text = f"{verdict.words} (limit {limit})" if verdict.value is None else f"{verdict.words} {limit}"
-                remark = Text(text, "green" if verdict.within else "red")
+                text = text if verdict.applies else verdict.words
+                remark = Text(text, "green" if verdict.words == "within" else "dim" if verdict.kept else "red")
             table.add_row("  " + spaced(name), value, "" if unit == "1" else unit, remark)
     output.console.print(table)
+    for reason in dict.fromkeys(why for name, why in missing.items() if name not in late):
+        words = ", ".join(spaced(name) for name, why in missing.items() if why == reason)
+        output.say(output.folded(f"{reason}, so these do not apply: {words}"))
 
 
 def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, flown: int | None = None) -> None:
@@ -160,6 +171,7 @@ def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, f
                 "scenario": results.campaign.scenario_name,
                 "method": results.campaign.method,
                 "flights": results.campaign.samples,
+                "lost": int(np.sum(~results.finished)),
                 "flown_now": flown,
                 "confidence": CONFIDENCE,
                 "limits": [
@@ -173,6 +185,7 @@ def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, f
                         for statistic in ("minimum", "median", "percentile_95", "maximum", "mean")
                     }
                     | {"unit": unit_in(output.json_system(units), d.unit), "flights": d.flights}
+                    | {"not_reached": d.not_reached, "magnitude": d.title.startswith("|")}
                     for d in distributions(results)
                 },
                 "worst_flights": [
@@ -194,28 +207,30 @@ def _print_campaign(results: Results, units: UnitSystem) -> None:
     from hsv.flight.campaign.summary import ENDED, distributions, shares, worst_flights
 
     headings = ("limit", "", "within", "share", "95 % interval")
-    title = f"{results.campaign.scenario.title}: {results.campaign.samples} flights"
+    ended = f"{lost} lost, limits are those of the others" if (lost := np.sum(~results.finished)) else "none lost"
+    title = f"{results.campaign.scenario.title}: {results.campaign.samples} flights, {ended}"
     table = output.new_table(*headings, title=title, right=headings[1:])
     for share in shares(results):
         limit = "" if share.limit is None else " ".join(_outcome(share.name, share.limit, units)).strip()
-        interval = (
-            "all corners" if share.interval is None else " to ".join(f"{100.0 * p:.3g} %" for p in share.interval)
-        )
+        every = "all corners" if share.flights else "does not apply"
+        interval = every if share.interval is None else " to ".join(f"{100.0 * p:.3g} %" for p in share.interval)
         within = f"{share.within} of {share.flights}", f"{100.0 * share.fraction:.3g} %"
+        within = within if share.flights else ("-", "-")
         table.add_row(spaced(share.name), limit, *within, interval)
     output.console.print(table)
     numbers = ("least", "median", "95 %", "largest")
     table = output.new_table("metric", *numbers, "unit", right=numbers)
     for d in distributions(results):
         cells = [_outcome(d.name, v, units) for v in (d.minimum, d.median, d.percentile_95, d.maximum)]
-        table.add_row(spaced(d.name), *(number for number, _ in cells), cells[0][1])
+        table.add_row(d.title, *(number for number, _ in cells), cells[0][1])
     output.console.print(table)
     # Without limits, the worst flights are those that ended early.
     worst = [w for w in worst_flights(results, _LISTED) if w.limit]
     if worst:
-        output.console.print("worst flights, by the fraction of their limits that they use:")
+        output.console.print("worst flights:")
     for w in worst:
-        used = w.limit if w.limit in ENDED else f"{100 * w.ratio:.0f} % of {spaced(w.limit)}"
+        used = "not reached" if math.isinf(w.ratio) else f"at {100 * w.ratio:.0f} % of its limit"
+        used = w.limit if w.limit in ENDED else f"{spaced(w.limit)} {used}"
         output.say(output.folded(f"{w.flight}: {used}; {sample_words(w.sample, units)}", 4, first=2))
 
 
@@ -233,4 +248,6 @@ def _outcome(name: str, value: float, units: UnitSystem) -> tuple[str, str]:
     from hsv.flight.campaign.sample_runner import OUTCOMES
 
     number, unit = in_system(value, OUTCOMES.get(name, "1"), units, share=is_share(name))
+    if math.isinf(value):
+        return "not reached", ""
     return significant(number), "" if unit == "1" else unit

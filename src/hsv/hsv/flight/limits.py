@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from hsv.base.units import UnitSystem, in_system, significant
-from hsv.flight.metrics import CRITERIA, METRICS, spaced
+from hsv.flight.metrics import CRITERIA, METRICS, NOT_REACHED, spaced
 from hsv.flight.scenario import Scenario
 
 
@@ -18,25 +19,42 @@ class Verdict:
     value: float | None
     ended: bool = True
     """Whether the flight reached its end; a flight that did not may exceed a limit but never keeps one"""
+    missing: str = NOT_REACHED
+    """The reason if there is no value, as in :attr:`hsv.flight.metrics.FlightData.missing`"""
 
     @property
-    def within(self) -> bool:
-        """Whether the flight reached its end and the magnitude of the metric stayed within the limit."""
-        return self.words == "within"
+    def applies(self) -> bool:
+        """Whether the metric applies to the flight; otherwise, the limit is not judged."""
+        return self.value is not None or self.missing.startswith(NOT_REACHED) or not self.ended
+
+    @property
+    def kept(self) -> bool:
+        """Whether the flight reached its end and did not exceed the limit."""
+        return not self.applies or self.words == "within"
 
     @property
     def words(self) -> str:
-        """The verdict: ``within``, ``over``, ``not reached`` or ``not flown to the end``."""
+        """The verdict: ``within``, ``over``, ``not flown to the end``, or why there is no value."""
         if self.value is not None and not abs(self.value) <= self.limit:
             return "over"
         if not self.ended:
             return "not flown to the end"
-        return "not reached" if self.value is None else "within"
+        if self.value is not None:
+            return "within"
+        return self.missing if self.applies else f"does not apply: {self.missing}"
 
 
-def verdicts(scenario: Scenario, metrics: Mapping[str, float], *, ended: bool) -> dict[str, Verdict]:
-    """Return the verdict for each metric that ``scenario`` limits, by name; ``ended``: the flight reached its end."""
-    return {name: Verdict(limit, metrics.get(name), ended) for name, limit in scenario.limits.items()}
+def verdicts(
+    scenario: Scenario, metrics: Mapping[str, float], missing: Mapping[str, str], *, ended: bool
+) -> dict[str, Verdict]:
+    """Return the verdict for each metric that ``scenario`` limits, by name.
+
+    ``metrics`` and ``missing`` are those of the flight; ``ended``: it reached its end.
+    """
+    return {
+        name: Verdict(limit, metrics.get(name), ended, missing.get(name, NOT_REACHED))
+        for name, limit in scenario.limits.items()
+    }
 
 
 def in_units(name: str, value: float, system: UnitSystem) -> str:
@@ -75,9 +93,13 @@ def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem) -> str:
     """Return in words whether a flight kept its limits, and which limits it did not keep."""
     if not judged:
         return "not judged: the scenario has no limits"
-    if all(verdict.within for verdict in judged.values()):
-        return f"within {'its limit' if len(judged) == 1 else f'all {len(judged)} limits'}"
-    over = [(name, v) for name, v in judged.items() if not v.within and (v.ended or v.words == "over")]
+    others = Counter(verdict.missing for verdict in judged.values() if not verdict.applies)
+    count = len(judged) - others.total()
+    free = [f"{n} {'does' if n == 1 else 'do'} not apply: {why}" for why, n in others.items()]
+    if all(verdict.kept for verdict in judged.values()):
+        kept = f"within {'its limit' if count == 1 else f'all {count} limits'}" if count else "not judged"
+        return "; ".join([kept, *free])
+    over = [(name, v) for name, v in judged.items() if not v.kept and (v.ended or v.words == "over")]
 
     def broken(name: str, verdict: Verdict) -> str:
         if verdict.value is None:
@@ -87,4 +109,4 @@ def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem) -> str:
 
     said = ", ".join(broken(*each) for each in over)
     head = [] if all(verdict.ended for verdict in judged.values()) else ["not flown to the end"]
-    return "; ".join([*head, *([f"{len(over)} of {len(judged)} limits not kept: {said}"] if over else [])])
+    return "; ".join([*head, *([f"{len(over)} of {count} limits not kept: {said}"] if over else []), *free])

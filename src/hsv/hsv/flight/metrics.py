@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from hsv.base.units import significant
 from hsv.core import doubles, ffi, lib, vector
 from hsv.flight.history import History
 from hsv.model.signals import N_INPUTS
@@ -20,6 +21,12 @@ DECAY_LEVEL = 0.05
 
 PRE_FAULT_WINDOW = 5.0
 """Length of the window before the fault over which the mean attitude is taken, s."""
+
+NOT_REACHED = "not within"
+"""Beginning of the reason why a metric is missing that applies to a flight: a time that the flight did not reach."""
+
+NO_FAULT = "no fault"
+"""Reason why the metrics of the time after a fault do not apply to a flight."""
 
 
 class Group(StrEnum):
@@ -42,6 +49,8 @@ class Metric:
     """Whether the metric is a share, displayed in percent"""
     counted: bool = False
     """Whether the metric is a number of steps"""
+    signed: bool = False
+    """Whether the metric is an error with a sign, which is judged and ranked by its magnitude"""
 
 
 def _tracking(axis: str, symbol: str, unit: str, integral: str) -> dict[str, Metric]:
@@ -58,7 +67,7 @@ def _tracking(axis: str, symbol: str, unit: str, integral: str) -> dict[str, Met
         f"{axis}_overshoot": Metric("1", over, Group.tracking, share=True),
         f"{axis}_integral_absolute_error": Metric(integral, f"integral of |{error}|", Group.tracking),
         f"{axis}_error_maximum": Metric(unit, f"largest |{error}|", Group.tracking),
-        f"{axis}_end_error": Metric(unit, f"{error} at the end", Group.tracking),
+        f"{axis}_end_error": Metric(unit, f"{error} at the end", Group.tracking, signed=True),
     }
 
 
@@ -161,23 +170,33 @@ class FlightData:
         return self._evaluated[1]
 
     @cached_property
-    def metrics(self) -> dict[str, float]:
-        """The metrics that the flight defines, SI, by their names in :data:`METRICS`."""
+    def _measured(self) -> dict[str, float | str]:
         return _metrics(self)
 
+    @cached_property
+    def metrics(self) -> dict[str, float]:
+        """The metrics that the flight defines, SI, by their names in :data:`METRICS`."""
+        return {name: value for name, value in self._measured.items() if not isinstance(value, str)}
 
-def _metrics(flight: FlightData) -> dict[str, float]:
-    """Return the metrics of a flight, SI, by name, in the order of :data:`METRICS`.
+    @cached_property
+    def missing(self) -> dict[str, str]:
+        """The reason for each metric that the flight does not define: it does not apply, or :data:`NOT_REACHED`."""
+        return {name: value for name, value in self._measured.items() if isinstance(value, str)}
 
-    Metrics that the flight does not define are omitted, such as those of a fault, unless one starts after step 0.
+
+def _metrics(flight: FlightData) -> dict[str, float | str]:
+    """Return all metrics of a flight, SI, by name, in the order of :data:`METRICS`: a value, or why there is none.
+
+    The metrics of a fault apply if one starts after step 0.
     """
-    values: dict[str, float] = {}
+    values: dict[str, float | str] = dict.fromkeys(METRICS, NO_FAULT)
     time, curves = flight.time, flight.curves
     faultless = len(time) if flight.fault_start is None else int(np.searchsorted(time, flight.fault_start - 1e-9))
     before, after = slice(faultless), slice(faultless, None)
     steps = np.diff(time)
     for axis, error in zip(("altitude", "velocity"), curves[:2], strict=True):
-        values |= {f"{axis}_{name}": value for name, value in _step_metrics(time[before], error[before]).items()}
+        for name, value in _step_metrics(time[before], error[before]).items():
+            values[f"{axis}_{name}"] = f"no {axis} step" if value == "" else value
         magnitude = np.abs(error)
         integrals = 0.5 * (magnitude[1:] + magnitude[:-1]) * steps
         values[f"{axis}_integral_absolute_error"] = float(np.sum(integrals))
@@ -191,28 +210,33 @@ def _metrics(flight: FlightData) -> dict[str, float]:
         if window.start < faultless:  # a recording with a gap before the fault has no mean
             mean = np.ascontiguousarray(curves[2:4, window].T).mean(axis=0)  # summed row by row, in a fixed order
             values["post_fault_attitude_deviation"] = float(np.max(np.abs(curves[2:4, after] - mean[:, None])))
+        else:
+            values["post_fault_attitude_deviation"] = "no step before the fault"
         values["post_fault_attitude_from_nominal"] = float(np.max(tube_error[:, after]))
-        if curves[4:6].any():  # a rigid vehicle has no elastic states
-            first, second = (_decay_time(time[after], np.abs(rate[after])) for rate in curves[4:6])
-            values["elastic_rate_1_decay_time"], values["elastic_rate_2_decay_time"] = first, second
-            values["elastic_decay_time"] = max(first, second)
+        decays: list[float | str] = ["rigid vehicle"] * 2
+        if curves[4:6].any():
+            decays = [_decay_time(time[after], np.abs(rate[after])) for rate in curves[4:6]]
+        values["elastic_rate_1_decay_time"], values["elastic_rate_2_decay_time"] = decays
+        late = [each for each in decays if isinstance(each, str)]
+        values["elastic_decay_time"] = late[0] if late else max(map(float, decays))
     for name, command in zip(("fuel_equivalence_ratio", "elevator_deflection"), curves[6:8], strict=True):
         values[f"{name}_minimum"] = float(np.min(command))
         values[f"{name}_maximum"] = float(np.max(command))
     values["saturated_steps"] = float(np.count_nonzero(flight.saturated[:, 0] | flight.saturated[:, 1]))
-    return {name: values[name] for name in METRICS if name in values}
+    return values
 
 
-def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
+def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float | str]:
     """Return rise time (s), settling time (s) and overshoot (share of the step) of a step response, by name.
 
-    ``time`` (s) and ``error``, the tracking error, have shape (n,); the first error is the size of the step. A time is
-    omitted if the response does not rise or settle. Without a step, or if n < 2, the result is empty.
+    ``time`` (s) and ``error``, the tracking error, have shape (n,); the first error is the size of the step. If the
+    response does not rise or settle, the reason is in place of the time. Without a step, or if n < 2, all are "".
     """
     if len(time) < 2 or abs(error[0]) < 1e-6:
-        return {}
-    done = 1.0 - error / error[0]
-    values = {"overshoot": max(0.0, float(np.max(done)) - 1.0)}
+        return dict.fromkeys(("overshoot", "rise_time", "settling_time"), "")
+    done, late = 1.0 - error / error[0], _not_within(time)
+    values: dict[str, float | str] = {"overshoot": max(0.0, float(np.max(done)) - 1.0)}
+    values |= {"rise_time": late, "settling_time": late}
     if (risen := done >= 0.9).any():
         values["rise_time"] = float(time[np.argmax(risen)] - time[np.argmax(done >= 0.1)])
     settled = np.flatnonzero(np.abs(done - 1.0) > SETTLING_BAND)[-1] + 1  # the first sample is outside the band
@@ -221,10 +245,16 @@ def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
     return values
 
 
-def _decay_time(time: np.ndarray, magnitude: np.ndarray) -> float:
+def _decay_time(time: np.ndarray, magnitude: np.ndarray) -> float | str:
     """Return the time (s) after ``time[0]`` at which ``magnitude`` last exceeds :data:`DECAY_LEVEL` times its peak.
 
-    A magnitude that is NaN counts as above the level.
+    A magnitude that is NaN counts as above the level. If the last magnitude is above it, return that as the reason.
     """
     above = np.nonzero(~(magnitude <= DECAY_LEVEL * np.max(magnitude)))[0]
-    return float(time[above[-1]] - time[0]) if len(above) else 0.0
+    if not len(above):
+        return 0.0
+    return _not_within(time) if above[-1] == len(time) - 1 else float(time[above[-1]] - time[0])
+
+
+def _not_within(time: np.ndarray) -> str:
+    return f"{NOT_REACHED} {significant(time[-1] - time[0])} s"

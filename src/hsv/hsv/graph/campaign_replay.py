@@ -108,7 +108,7 @@ def require_design(results: Results) -> None:
 
 
 def _outcome(row: dict[str, Any]) -> Outcome:
-    return {name: row[name] for name in ("diverged", "crashed", *OUTCOMES, "fingerprint")}
+    return {name: row[name] for name in ("diverged", "crashed", *OUTCOMES, "not_reached", "fingerprint") if name in row}
 
 
 def _same(a: float | bool | str | None, b: float | bool | str | None) -> bool:

@@ -70,6 +70,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
     worst, shown, judged = worst_flights(results), distributions(results), shares(results)
     flights = _repeated(results, worst[0].flight)
     differing = [d for d in shown if d.minimum < d.maximum]
+    lost = results.campaign.samples - int(results.finished.sum())
     grouped = _grouped(differing)
     numbers = Numbers()
     drawn = np.arange(0, results.campaign.samples, -(-results.campaign.samples // POINTS))
@@ -92,7 +93,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
                 d.name: {
                     "title": spaced(d.name),
                     "units": units_of(OUTCOMES[d.name], share=is_share(d.name)),
-                    "y": numbers.add(results.column(d.name)[drawn]),
+                    "y": numbers.add(np.where(results.finished, results.column(d.name), np.nan)[drawn]),
                     "limits": _limits(results, d),
                 }
                 for d in differing
@@ -104,6 +105,8 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
         sections={name: heading for name, heading in SECTIONS.items() if differing or name != "scatter"},
         sentence=sentence(results),
         failed=failed and spaced(failed.name),
+        lost=lost,
+        old=results.format == 1,
         sorted=failed and _sorted(results, failed, numbers),
         picture=picture(pictured, numbers, end, shades),
         result=results.path.name,
@@ -123,28 +126,31 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
 
 
 def sentence(results: Results) -> str:
-    """Return the verdict: how many flights keep all limits, which limit is violated most often, how many are lost."""
+    """Return the verdict: how many flights keep all limits, which limit most of them break, how many are lost."""
     ended, *limited = judged = shares(results)
     lost = ended.flights - ended.within
-    ending = f"{lost} of {ended.flights} flights did not reach the end" if lost else "All flights reached the end"
+    ending = f"{lost} of {ended.flights} flights are lost" if lost else "All flights reached the end"
+    limited = [share for share in limited if share.flights]
     if not limited:
         return f"{ending}; there are no limits to judge them by."
     text = f"{within_all(results)} of {ended.flights} flights are within all {len(limited)} limits"
     if failed := most_failed(judged):
-        broken = failed.flights - failed.within
-        text += f"; the limit that most flights break is {spaced(failed.name)} ({broken} of {ended.flights})"
+        broken = f"{failed.flights - failed.within} of {failed.flights}{' that reached the end' if lost else ''}"
+        text += f"; the limit that most flights break is {spaced(failed.name)} ({broken})"
     return f"{text}. {ending}."
 
 
 def most_failed(judged: Sequence[Share]) -> Share | None:
-    """Return the limit that the fewest flights keep, or None if every flight keeps every limit there is."""
-    over = min((share for share in judged if share.limit is not None), key=lambda share: share.within, default=None)
+    """Return the limit that most of the judged flights break, or None if no finished flight breaks any."""
+    limited = (share for share in judged if share.limit is not None)
+    over = max(limited, key=lambda share: share.flights - share.within, default=None)
     return over if over is not None and over.within < over.flights else None
 
 
 def _sorted(results: Results, failed: Share, numbers: Numbers) -> Picture:
-    """Return the picture of the ``failed`` limit: the limit, and the sorted magnitudes of its metric in all flights."""
-    values = np.sort(np.abs(results.column(failed.name)))  # flights that do not define the metric come last, as NaN
+    """Return the picture of the ``failed`` limit: the limit, and the sorted magnitudes of its metric in its flights."""
+    values = np.abs(results.column(failed.name)[results.finished])
+    values = np.sort(values)[: failed.flights]  # times that were not reached come last, as NaN
     across = 100.0 * (np.arange(len(values)) + 0.5) / len(values)
     limit = "bound", None, np.array([0.0, 100.0]), np.full(2, failed.limit)
     lines = (limit, ("actual", 0, across, values))
@@ -164,6 +170,8 @@ def _grouped(shown: Sequence[Distribution]) -> dict[str, list[Distribution]]:
 
 def _outcome(name: str, value: float, digits: int = 3) -> Markup:
     """Return the ``value`` (SI) of the metric, end time or tube level ``name`` as HTML in all systems of units."""
+    if math.isinf(value):
+        return Markup("not reached")
     return quantity(value, OUTCOMES[name], digits, share=is_share(name))
 
 
@@ -242,10 +250,12 @@ def _envelopes(results: Results, flights: Mapping[str, Flight], numbers: Numbers
 
 def _histogram(results: Results, shown: Distribution, numbers: Numbers) -> Plot:
     """Return the histogram of a metric, end time or tube level, with the limits inside the range of the data."""
-    counts, edges = histogram(results.column(shown.name))
+    values = results.column(shown.name)[results.finished]
+    counts, edges = histogram(values)
     x, y = numbers.add(0.5 * (edges[:-1] + edges[1:])), numbers.add(counts)
-    note = Markup("median {}, 95 % below {}, largest {}").format(
-        *(_outcome(shown.name, value) for value in (shown.median, shown.percentile_95, shown.maximum))
+    note = Markup("{}median {}, 95 % below {}, largest {}").format(
+        "magnitude: " if shown.title.startswith("|") else "",
+        *(_outcome(shown.name, value) for value in (shown.median, shown.percentile_95, shown.maximum)),
     )
     return Plot(
         f"histogram_{shown.name}",
@@ -254,7 +264,7 @@ def _histogram(results: Results, shown: Distribution, numbers: Numbers) -> Plot:
         f"distributions_{METRICS[shown.name].group if shown.name in METRICS else RUN}",
         [{"kind": "bars", "label": "flights", "run": None, "x": x, "y": y}],
         limits=_limits(results, shown),
-        notes=[note],
+        notes=[note, *([Markup(f"not reached in {shown.not_reached} flights")] if shown.not_reached else [])],
         x_unit=OUTCOMES[shown.name],
         x_share=is_share(shown.name),
         limits_on="x",
@@ -272,7 +282,9 @@ def _scatter(results: Results, factor: Factor, drawn: np.ndarray, numbers: Numbe
 def _limits(results: Results, shown: Distribution) -> list[float]:
     """Return minus and plus the limit (SI) of a metric, each only if it lies within the range of the data."""
     limit = limits(results).get(shown.name)
-    return [] if limit is None else [end for end in (-limit, limit) if shown.minimum <= end <= shown.maximum]
+    values = results.column(shown.name)[results.finished]
+    low, high = np.nanmin(values, initial=np.inf), np.nanmax(values, initial=-np.inf)
+    return [] if limit is None else [end for end in (-limit, limit) if low <= end <= high]
 
 
 def _curve(flight: Flight, windows: np.ndarray, index: int) -> np.ndarray:

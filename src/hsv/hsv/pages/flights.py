@@ -68,6 +68,8 @@ class ReportedRun:
     """Scenario of the flight; None if the bag has no readable one, for the reason in :attr:`remark`."""
     remark: str
     metrics: dict[str, float]
+    missing: dict[str, str]
+    """The reason for each metric that the flight does not define, by name."""
     verdicts: dict[str, Verdict]
     curves: FlightCurves
     events: list[Event]
@@ -94,7 +96,7 @@ class ReportedRun:
     @property
     def good(self) -> bool:
         """Whether the flight is completely recorded and finished within every limit."""
-        return not self.failure and not self.incomplete and all(verdict.within for verdict in self.verdicts.values())
+        return not self.failure and not self.incomplete and all(verdict.kept for verdict in self.verdicts.values())
 
     @property
     def input_limits(self) -> dict[str, tuple[float, float]]:
@@ -112,7 +114,7 @@ def reported_runs(bags: Sequence[Bag]) -> list[ReportedRun]:
 def _reported_run(bag: Bag, label: str) -> ReportedRun:
     curves = flight_curves(bag)
     description = describe(bag)
-    metrics = flight_data(bag).metrics
+    data, finished = flight_data(bag), description["ending"] == "finished"
     names = ("scenario.toml", "scenario.yaml", "design.yaml", "certificate.json")
     texts = {name: bag.attachments.get(name, b"").decode(errors="replace") for name in names}
     scenario, remark = _scenario(texts["scenario.toml"], bag.custom_data.get("scenario", label))
@@ -122,8 +124,9 @@ def _reported_run(bag: Bag, label: str) -> ReportedRun:
         texts=texts,
         scenario=scenario,
         remark=remark,
-        metrics=metrics,
-        verdicts=verdicts(scenario, metrics, ended=description["ending"] == "finished") if scenario else {},
+        metrics=data.metrics,
+        missing=data.missing,
+        verdicts=verdicts(scenario, data.metrics, data.missing, ended=finished) if scenario else {},
         curves=curves,
         events=flight_events(bag, description),
         parameters={

@@ -204,8 +204,8 @@ def _picture(runs: Sequence[ReportedRun], plots: Sequence[Plot], numbers: Number
 
 
 def _grouped(runs: Sequence[ReportedRun]) -> dict[Group, dict[str, Metric]]:
-    """Return the metrics that have a value or a verdict in any run, by group and name."""
-    known = {name for run in runs for name in (*run.metrics, *run.verdicts)}
+    """Return the metrics that have a value, a verdict or a reason in any run, by group and name."""
+    known = {name for run in runs for name in (*run.metrics, *run.verdicts, *run.missing)}
     groups = {
         group: {name: metric for name, metric in METRICS.items() if metric.group is group and name in known}
         for group in Group

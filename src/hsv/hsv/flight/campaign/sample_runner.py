@@ -20,13 +20,19 @@ from hsv.flight.campaign.envelope import Envelope
 from hsv.flight.campaign.variants import FlightVariants
 from hsv.flight.closed_loop import Components, fly, watched
 from hsv.flight.flight import Flight
-from hsv.flight.metrics import METRICS, FlightData
+from hsv.flight.metrics import METRICS, NOT_REACHED, FlightData
 from hsv.flight.side_by_side import FlightGroup, TubeLevels
 from hsv.model.dynamics import in_model_range
 from hsv.plugins.library import LibraryController
 
 CAMPAIGN, ENVELOPE, DIGEST = b"hsv.campaign", b"hsv.envelope", b"hsv.digest"
 """Keys in the metadata of a result file: the campaign, the envelope, and the digest of both."""
+
+FORMAT = b"hsv.format"
+"""Key of the number of the file's format; a file without it has format 1."""
+
+LATEST = 2
+"""Number of this version's format. Format 1 has no column ``not_reached``, and lost flights are in its envelope."""
 
 OUTCOMES = {"end_time": "s", "tube_level": "1", **{name: metric.unit for name, metric in METRICS.items()}}
 """Names of the numbers that are recorded of every flight, with their SI units; a number may be undefined (null)."""
@@ -118,6 +124,7 @@ class SampleRunner:
             "end_time": float(flight.time[-1]),
             "tube_level": level,
             **flight.metrics,
+            "not_reached": " ".join(n for n, why in flight.missing.items() if why.startswith(NOT_REACHED)) or None,
             "crashed": None,
             "fingerprint": fingerprint,
         }
@@ -127,14 +134,14 @@ class SampleRunner:
         flights, envelope, outcomes = self.campaign.flights(batch), Envelope.empty(), []
         samples, seeds = self.campaign.draw(flights)
         for flown in self.fly_all(flights, samples):
-            if not isinstance(flown, ControllerError):
-                envelope.add(flown[0], self.steps)
             outcomes.append(self.outcome(flown))
+            if not isinstance(flown, ControllerError) and not outcomes[-1]["diverged"]:
+                envelope.add(flown[0], self.steps)
         drawn = zip((f"sample_{factor.name}" for factor in self.campaign.factors), samples.T, strict=True)
         columns = {"flight": flights, "seed": seeds, **dict(drawn)}
         columns |= {
             name: [outcome.get(name) for outcome in outcomes]
-            for name in ("diverged", "crashed", *OUTCOMES, "fingerprint")
+            for name in ("diverged", "crashed", *OUTCOMES, "not_reached", "fingerprint")
         }
         return encode(self.campaign, columns, envelope)
 
@@ -158,12 +165,16 @@ class SampleRunner:
 
 
 def schema(campaign: Campaign) -> pa.Schema:
-    """Return the columns of the results: flight number, seed, sample, how and when it ended, metrics, fingerprint."""
+    """Return the columns of the results: flight number, seed, sample, how and when it ended, metrics, fingerprint.
+
+    ``not_reached`` has the names of the times that the flight did not reach, separated by spaces, or null.
+    """
     samples = [_number(f"sample_{factor.name}", factor.unit) for factor in campaign.factors]
     outcomes = [_number(name, unit) for name, unit in OUTCOMES.items()]
     fixed = [pa.field("flight", pa.int64(), False), pa.field("seed", pa.uint64(), False)]
     ended = [pa.field("diverged", pa.bool_(), False), pa.field("crashed", pa.string())]
-    return pa.schema([*fixed, *samples, *ended, *outcomes, pa.field("fingerprint", pa.string())])
+    texts = [pa.field(name, pa.string()) for name in ("not_reached", "fingerprint")]
+    return pa.schema([*fixed, *samples, *ended, *outcomes, *texts])
 
 
 def _number(name: str, unit: str) -> pa.Field:

@@ -18,6 +18,7 @@ from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
 from hsv.flight.campaign.sample_runner import OUTCOMES, SampleRunner
 from hsv.flight.campaign.store import read_result
+from hsv.flight.metrics import METRICS, spaced
 from hsv.plugins.controllers import names_code
 
 if TYPE_CHECKING:
@@ -30,33 +31,41 @@ CRASHED, DIVERGED = ENDED = ("crashed", "diverged")
 
 _NAN = pa.Array.from_buffers(pa.float64(), 1, [None, pa.py_buffer(np.array([math.nan]))])[0]
 
+_NEVER, _LATE = 1e200, 1e100
+"""A number in place of a time that was not reached, and the number above which a statistic is made of it."""
+
 TUBE_LIMIT = 1.0
 """Tube level on the boundary of the invariant set."""
 
 
 @dataclass(frozen=True)
 class Share:
-    """``within`` of ``flights`` flights finish and keep ``limit`` (SI); if ``limit`` is None, they just finish."""
+    """How many of the finished flights to which a limit applies keep it; with the limit None, how many flights finish.
+
+    Lost flights, and those to which the limit does not apply, are in no share but the one without a limit.
+    """
 
     name: str
     limit: float | None
+    """The limit, SI"""
     within: int
     flights: int
+    """Number of the flights that are judged"""
     interval: tuple[float, float] | None
-    """Clopper-Pearson interval, from 0 to 1; None for corners, which are not a random sample."""
+    """Clopper-Pearson interval, from 0 to 1; None for corners, which are not a random sample, and without flights."""
 
     @property
     def fraction(self) -> float:
-        """Share of the flights within the limit, from 0 to 1."""
-        return self.within / self.flights
+        """Share of the judged flights within the limit, from 0 to 1; NaN without flights."""
+        return self.within / self.flights if self.flights else math.nan
 
 
 @dataclass(frozen=True)
 class WorstFlight:
     """One of the worst flights: ``ratio`` is the largest ratio of a metric to its limit, ``limit`` names this metric.
 
-    If the flight did not finish, ``limit`` is ``crashed`` or ``diverged``, and ``ratio`` is infinite, as for an
-    undefined metric. Limits of 0 are ignored; if there are no others, ``ratio`` is 0 and ``limit`` is empty.
+    If the flight did not finish, ``limit`` is ``crashed`` or ``diverged``, and ``ratio`` is infinite, as for a time
+    that was not reached. Limits of 0 are ignored; if there are no others, ``ratio`` is 0 and ``limit`` is empty.
     ``sample`` is in SI units, by factor.
     """
 
@@ -75,8 +84,8 @@ class Results:
         self.trust = trust
         self.campaign: Campaign
         self.envelope: Envelope
-        """The envelope of all flights whose controller did not crash."""
-        self.campaign, self.envelope = read_result(path)
+        """The envelope of the flights that finished; in format 1, of all whose controller did not crash."""
+        self.campaign, self.envelope, self.format = read_result(path)
 
     @property
     def flyable(self) -> bool:
@@ -108,6 +117,18 @@ class Results:
     def crashed(self) -> np.ndarray:
         """Whether each flight ended because the controller failed, shape (flights,)."""
         return _values(self._table["crashed"].is_valid())
+
+    @cached_property
+    def finished(self) -> np.ndarray:
+        """Whether each flight reached its end, shape (flights,); the others are lost."""
+        return ~(self.column("diverged") | self.crashed)
+
+    def not_reached(self, name: str) -> np.ndarray:
+        """Whether each flight did not reach the time ``name``, shape (flights,); unknown, hence false, in format 1."""
+        if self.format == 1:
+            return np.zeros(self.campaign.samples, bool)
+        names = self._table["not_reached"].to_pylist()
+        return np.array([name in each.split() if each else False for each in names])
 
     @property
     def samples(self) -> np.ndarray:
@@ -162,30 +183,34 @@ def limits(results: Results) -> dict[str, float]:
     return stated
 
 
-def _within(results: Results) -> dict[str, tuple[float | None, np.ndarray]]:
-    """Return by metric its limit (SI) and whether each flight finishes within this limit, shape (flights,).
+def _judged(results: Results) -> dict[str, tuple[float | None, np.ndarray, np.ndarray]]:
+    """Return by metric its limit (SI), and of each flight whether it is judged and whether it keeps the limit.
 
-    The first entry, ``flown_to_the_end``, has no limit (None) and tells whether each flight finishes.
+    The masks have shape (flights,). The first entry, ``flown_to_the_end``, has no limit (None) and judges every flight.
     """
-    finished = ~(results.column("diverged") | results.crashed)
-    # A comparison with NaN is false: an undefined metric is not within its limit.
-    return {"flown_to_the_end": (None, finished)} | {
-        name: (limit, finished & (np.abs(results.column(name)) <= limit)) for name, limit in limits(results).items()
-    }
+    finished = results.finished
+    found: dict[str, tuple[float | None, np.ndarray, np.ndarray]] = {}
+    found["flown_to_the_end"] = None, np.ones_like(finished), finished
+    for name, limit in limits(results).items():
+        values = np.abs(results.column(name))
+        applies = finished & (~np.isnan(values) | results.not_reached(name))
+        found[name] = limit, applies, applies & (values <= limit)  # a comparison with NaN is false
+    return found
 
 
 def within_all(results: Results) -> int:
-    """Return the number of flights that finish within every limit."""
-    return int(np.count_nonzero(np.logical_and.reduce([mask for _, mask in _within(results).values()])))
+    """Return the number of flights that finish within every limit that applies to them."""
+    kept_each = [kept | ~judged for _, judged, kept in _judged(results).values()]
+    return int(np.count_nonzero(np.logical_and.reduce(kept_each)))
 
 
 def shares(results: Results) -> list[Share]:
     """Return the share of the flights that finish, then for each limit the share of those that finish within it."""
     every = results.campaign.method == "corners"
     found = []
-    for name, (limit, mask) in _within(results).items():
-        count, n = int(np.count_nonzero(mask)), len(mask)
-        found.append(Share(name, limit, count, n, None if every else clopper_pearson(count, n)))
+    for name, (limit, judged, kept) in _judged(results).items():
+        count, n = int(np.count_nonzero(kept)), int(np.count_nonzero(judged))
+        found.append(Share(name, limit, count, n, None if every or not n else clopper_pearson(count, n)))
     return found
 
 
@@ -204,7 +229,7 @@ def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
     ratios = np.zeros((len(diverged), len(stated) or 1))
     for index, (name, limit) in enumerate(stated.items()):
         ratio = np.abs(results.column(name)) / limit
-        ratios[:, index] = np.where(np.isnan(ratio), np.inf, ratio)
+        ratios[:, index] = np.where(np.isnan(ratio), np.where(results.not_reached(name), np.inf, 0.0), ratio)
     largest = np.where(diverged | crashed, np.inf, ratios.max(axis=1))
     ended = np.where(crashed, -1.0, np.where(diverged, end, math.inf))
     order = np.lexsort((np.arange(len(end)), ended, -largest))[:number]
@@ -220,25 +245,39 @@ def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
 
 @dataclass(frozen=True)
 class Distribution:
-    """Statistics (SI) of one of :data:`OUTCOMES`; ``flights`` is the number of flights in which it is finite."""
+    """Statistics (SI) of one of :data:`OUTCOMES` in the finished flights to which it applies.
+
+    Errors with a sign count by their magnitude. A time that was not reached counts as infinite.
+    """
 
     name: str
     unit: str
     flights: int
+    """Number of the flights"""
+    not_reached: int
+    """Number of those that did not reach the time"""
     minimum: float
     median: float
     percentile_95: float
     maximum: float
     mean: float
 
+    @property
+    def title(self) -> str:
+        """The name in words, between bars if the statistics are those of the magnitude."""
+        signed = self.name in METRICS and METRICS[self.name].signed
+        return f"|{spaced(self.name)}|" if signed else spaced(self.name)
+
 
 def distributions(results: Results) -> list[Distribution]:
-    """Return the statistics of every outcome that is defined in at least one flight."""
+    """Return the statistics of every outcome that applies to at least one finished flight."""
     found = []
     for name, unit in OUTCOMES.items():
-        values = results.column(name)
-        values = values[np.isfinite(values)]
+        late = int(np.count_nonzero(results.finished & results.not_reached(name)))
+        values = results.column(name)[results.finished]
+        values = np.sort(np.abs(values) if name in METRICS and METRICS[name].signed else values)
+        values = np.append(values[np.isfinite(values)], np.full(late, _NEVER))
         if len(values):
-            least, middle, high, most = np.percentile(values, (0.0, 50.0, 95.0, 100.0)).tolist()
-            found.append(Distribution(name, unit, len(values), least, middle, high, most, float(values.mean())))
+            numbers = [*np.percentile(values, (0.0, 50.0, 95.0, 100.0)).tolist(), float(values.mean())]
+            found.append(Distribution(name, unit, len(values), late, *(math.inf if n > _LATE else n for n in numbers)))
     return found

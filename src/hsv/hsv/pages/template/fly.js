@@ -245,12 +245,12 @@ class Page {
   }
 
   judge(flown) {
-    const found = this.core.metrics(flown);
+    const found = this.core.metrics(flown), missing = found.post_fault_attitude_from_nominal === undefined ? "does not apply: no fault" : "not reached";
     document.querySelector(".judged tbody").replaceChildren(...flown.flight.judged.map(([name, words, limit, factor, unit]) => {
       const value = found[name], text = (number) => `${Number((number * factor).toPrecision(3))} ${unit === "1" ? "" : unit}`;
-      const over = value !== undefined && !(Math.abs(value) <= limit), verdict = over ? "✗ over" : flown.lost ? "✗ not flown to the end" : value === undefined ? "not reached" : "✓ within";
+      const over = value !== undefined && !(Math.abs(value) <= limit), verdict = over ? "✗ over" : flown.lost ? "✗ not flown to the end" : value === undefined ? missing : "✓ within";
       return element("tr", {}, element("th", { scope: "row", textContent: words }), element("td", { className: "number", textContent: value === undefined ? "–" : text(value) }),
-        element("td", { className: "number", textContent: text(limit) }), element("td", { className: over || flown.lost ? "bad" : "good", textContent: verdict }));
+        element("td", { className: "number", textContent: text(limit) }), element("td", { className: over || flown.lost || verdict === "not reached" ? "bad" : value === undefined ? "" : "good", textContent: verdict }));
     }));
   }
 }

@@ -172,10 +172,12 @@ class Core {
       return size(angle.subarray(start).map((value) => value - mean));
     }));
     found.post_fault_attitude_from_nominal = greatest([8, 9].map((index) => greatest(curve(index).subarray(start))));
-    if (curve(4).some(Boolean)) found.elastic_decay_time = greatest([4, 5].map((index) => {
+    if (!curve(4).some(Boolean)) return found;
+    const last = greatest([4, 5].map((index) => {
       const rate = curve(index).subarray(start).map(Math.abs), level = 0.05 * greatest(rate);
-      return period * Math.max(0, rate.findLastIndex((value) => !(value <= level)));
+      return Math.max(0, rate.findLastIndex((value) => !(value <= level)));
     }));
+    if (last < steps - start - 1) found.elastic_decay_time = period * last;
     return found;
   }
 
