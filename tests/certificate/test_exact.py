@@ -15,7 +15,6 @@ from marking import long
 
 from hsv.certificate.checks import Subject
 from hsv.certificate.exact import exact_checks, positive_definite, rational, roots_at_most
-from hsv.certificate.verification import acceleration_channels
 from hsv.control.design_file import find_design
 from hsv.control.notch_filter import discretise, series
 from hsv.design.certified import load_certified
@@ -23,6 +22,7 @@ from hsv.design.disturbance import DisturbanceSet
 from hsv.design.sets.invariant_set import InvariantSet
 from hsv.design.tightening import tighten
 from hsv.design.tube_problem import tube_problem
+from hsv.model.lpv.linearisation import acceleration_channels
 from hsv.model.signals import CHANNELS
 
 DESIGNS = sorted(path.stem for path in find_design("baseline").parent.glob("*.toml"))

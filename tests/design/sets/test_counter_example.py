@@ -8,10 +8,10 @@ import pytest
 import yaml
 from marking import long
 
-from hsv.certificate.verification import acceleration_channels
 from hsv.control.design_file import certificate_path, find_design
 from hsv.design.certified import load_certified
 from hsv.design.sets.counter_example import worst_sequence
+from hsv.model.lpv.linearisation import acceleration_channels
 from hsv.model.signals import CHANNELS
 from hsv.model.vehicle import load_vehicle
 

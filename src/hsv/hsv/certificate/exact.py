@@ -18,7 +18,7 @@ from math import isqrt, lcm
 import numpy as np
 
 from hsv.certificate.checks import Check, Checks, Subject
-from hsv.certificate.verification import Tube, error_system, factors, lag_feedback
+from hsv.certificate.verification import Tube, error_system, extreme_factors, lag_feedback
 from hsv.control.design import ControlDesign
 from hsv.model.signals import INPUT_NAMES, N_RIGID, STATE_NAMES
 
@@ -113,7 +113,7 @@ def exact_checks(subject: Subject) -> Checks:
     if "adjustable" not in subject.certificate:
         return
     effectiveness = subject.stated("inputs.disturbance.elevator_effectiveness")
-    extremes = product(factors(design), (1.0, effectiveness))
+    extremes = product(extreme_factors(design), (1.0, effectiveness))
     loops = [error_system(design, subject.vehicle, tau, share, rational).A for tau, share in extremes]
     N = rational(subject.stated("adjustable.lyapunov.N"))
     yield _proof("adjustable.lyapunov.N: symmetric and positive definite", [positive_definite(N)])

@@ -48,14 +48,13 @@ from hsv.control.notch_filter import continuous, discretise, series
 from hsv.model.lpv.actuated import actuator_names, sampled_actuators
 from hsv.model.lpv.linearisation import (
     Filter,
+    acceleration_channels,
     extended_jacobian,
     extended_state,
     from_true_rate,
-    linearise,
     zero_order_hold,
 )
 from hsv.model.signals import (
-    ACCELERATED,
     CHANNELS,
     INPUT_NAMES,
     N_INPUTS,
@@ -408,17 +407,6 @@ def symmetric(name: str, Q: np.ndarray) -> Check:
 # --- error system, eq. 22, eq. 23 -------------------------------------------------------------------------------------
 
 
-def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
-    """Return the changes (5, 3) of the rigid states by each of the first three channels of W, held at 1 for a period.
-
-    The vehicle is linearised at mid-envelope; ``period`` is in s.
-    """
-    A, _ = linearise(vehicle.decoupled, *vehicle.centre)
-    unit = np.zeros((N_RIGID, 3))
-    unit[ACCELERATED, [0, 1, 2]] = 1.0
-    return zero_order_hold(A[:N_RIGID, :N_RIGID], unit, period)[1]
-
-
 class ErrorSystem(NamedTuple):
     """The error system e(k+1) = A_i e(k) + G_i d(k) in closed loop with the feedback F e + F_d d.
 
@@ -478,7 +466,7 @@ def error_system(
     return ErrorSystem(A + B @ F, G, F, F_d, names)
 
 
-def factors(design: ControlDesign) -> list[np.ndarray]:
+def extreme_factors(design: ControlDesign) -> list[np.ndarray]:
     """Return the extreme factors tau (5 each): ``tau_minimum`` and all ones; the latter alone if they are equal.
 
     A set that is invariant under both extremes is invariant under any variation of tau on the line between them.
@@ -495,7 +483,7 @@ class Tube:
 
     Its set is the ellipsoid (e - c)' Q^-1 (e - c) <= 1 with ``c`` (n) and ``Q`` (n, n). The disturbance set W is a box
     with mid-point ``middle`` (7) and half-widths ``half`` (7). The r closed loops are those of all vertices, at each
-    of the extreme :func:`factors` tau; the F of the first, the smallest, is that of ``rows`` and of the bounds.
+    of the extreme :func:`extreme_factors` tau; the F of the first, the smallest, is that of ``rows`` and of the bounds.
     """
 
     def __init__(
@@ -510,7 +498,7 @@ class Tube:
         ``number`` converts all numbers, see :func:`error_system`.
         """
         self.field, self.design = field, design
-        systems = [error_system(design, subject.vehicle, tau, number=number) for tau in factors(design)]
+        systems = [error_system(design, subject.vehicle, tau, number=number) for tau in extreme_factors(design)]
         self.system = systems[0]
         self.A, self.G = (np.concatenate([getattr(s, name) for s in systems]) for name in ("A", "G"))
         stated = subject.stated(f"{field}.invariant_set")
@@ -829,7 +817,8 @@ def factor_checks(subject: Subject) -> Checks:
         return
     # e' N^-1 e of eq. 24 decreases at both extreme factors, with full and with reduced elevator effectiveness.
     shares = 1.0, subject.stated("inputs.disturbance.elevator_effectiveness")
-    loops = [error_system(design, subject.vehicle, tau, share).A for tau, share in product(factors(design), shares)]
+    corners = product(extreme_factors(design), shares)
+    loops = [error_system(design, subject.vehicle, tau, share).A for tau, share in corners]
     N = np.array(stated["lyapunov"]["N"])
     yield symmetric("adjustable.lyapunov.N", N)
     residuals = 1.0 - image_norms(N, np.concatenate(loops))

@@ -17,6 +17,7 @@ import numpy as np
 from hsv.base.errors import DesignError
 from hsv.base.processes import Progress
 from hsv.certificate.margin_checks import margins_report
+from hsv.certificate.verification import extreme_factors
 from hsv.control.design import ControlDesign
 from hsv.design.baseline import (
     DesignResult,
@@ -37,7 +38,7 @@ from hsv.design.region import Region, incomplete_share
 from hsv.design.sets.invariant_set import InvariantSet
 from hsv.design.tightening import TightenedInputs, tighten
 from hsv.design.tube import MeasuredSet, Tube, design_tube, flights_in_tube, flights_report, measured_set
-from hsv.design.tube_problem import bounding_factors, tube_problem
+from hsv.design.tube_problem import tube_problem
 from hsv.lmi.nominal_gain import nominal_gain
 from hsv.lmi.semidefinite import BOUND_DIGITS, rounded_to_size
 from hsv.model.signals import N_RIGID
@@ -158,7 +159,7 @@ def certified_loops(design: ControlDesign, vehicle: Vehicle, effectiveness: floa
         gain = design.feedback_gain[:, :N_RIGID] * factor
         return error_system(polytope.A, polytope.B * np.array([1.0, share]), gain, model.notch, model.columns).A
 
-    return np.concatenate([loop(f, share) for f in bounding_factors(design) for share in (1.0, effectiveness)])
+    return np.concatenate([loop(f, share) for f in extreme_factors(design) for share in (1.0, effectiveness)])
 
 
 def relaxed_bound(

@@ -16,7 +16,6 @@ from hsv.control.design import ControlDesign
 from hsv.design.disturbance import (
     ChannelModel,
     DisturbanceSet,
-    acceleration_channels,
     scheduled,
     widened,
 )
@@ -26,6 +25,7 @@ from hsv.design.sets.invariant_set import InvariantSet
 from hsv.design.tube_problem import tube_problem
 from hsv.flight.flight import Flight
 from hsv.model.lpv.actuated import respond, sampled_actuators
+from hsv.model.lpv.linearisation import acceleration_channels
 from hsv.model.signals import ACCELERATED, CHANNELS, N_RIGID, REMAINING
 
 

@@ -34,21 +34,13 @@ from hsv.flight.flight import Flight
 from hsv.flight.responses import along_filter, lag_response
 from hsv.lmi.semidefinite import outward
 from hsv.model.lpv.actuated import respond, sampled_actuators
-from hsv.model.lpv.linearisation import linearise, zero_order_hold
+from hsv.model.lpv.linearisation import acceleration_channels
 from hsv.model.lpv.polytope import Polytope
 from hsv.model.signals import ACCELERATED, CHANNELS, N_INPUTS, N_RIGID, N_STATES, PITCH_RATE, REMAINING
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
 
 _FILTERED_NOMINAL = 4
-
-
-def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
-    """Return the change (5, 3) of the rigid states by each unit acceleration held for ``period`` (s), mid-envelope."""
-    A, _ = linearise(vehicle.decoupled, *vehicle.centre)
-    unit = np.zeros((N_RIGID, 3))
-    unit[ACCELERATED, [0, 1, 2]] = 1.0
-    return zero_order_hold(A[:N_RIGID, :N_RIGID], unit, period)[1]
 
 
 class Signals(NamedTuple):

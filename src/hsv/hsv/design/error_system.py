@@ -72,7 +72,7 @@ def error_system(
         B: (r, 9, 2) or (r, 5, 2) input matrices of the vertices.
         F: (2, 9) or (2, 5) feedback gain.
         notch: The notch filter in discrete time.
-        channels: (5, 3) from :func:`hsv.design.disturbance.acceleration_channels`.
+        channels: (5, 3) from :func:`hsv.model.lpv.linearisation.acceleration_channels`.
         actuators: Actuators of the design; their states come last, and F does not act on them.
         period: Sampling period (s); used for actuators only.
     """

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hsv.certificate.verification import extreme_factors
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import ChannelModel, DisturbanceSet
 from hsv.design.error_system import ErrorSystem, error_system, union
@@ -43,18 +44,8 @@ class TubeProblem:
         return np.vstack((np.eye(N_RIGID, len(self.system.names)), self.system.F))
 
 
-def bounding_factors(design: ControlDesign) -> list[np.ndarray]:
-    """Return the ends of the certified range of tube factors, shape (5,) each: the smallest (if not 1), then 1.
-
-    The closed loop for factors between the ends is a convex combination of the closed loops at the ends. A set that is
-    invariant for both is therefore invariant however the factor varies between them.
-    """
-    one = np.ones(N_RIGID)
-    return [one] if np.array_equal(design.tau_minimum, one) else [design.tau_minimum, one]
-
-
 def tube_problem(design: ControlDesign, vehicle: Vehicle, disturbance: DisturbanceSet) -> TubeProblem:
-    """Return the error system of ``design`` under ``disturbance``, with the vertices for all :func:`bounding_factors`.
+    """Return the error system of ``design`` under ``disturbance``, with the vertices for all :func:`extreme_factors`.
 
     Its F is that for the smallest factor.
     """
@@ -64,6 +55,6 @@ def tube_problem(design: ControlDesign, vehicle: Vehicle, disturbance: Disturban
         error_system(
             polytope.A, polytope.B, gain * factor, model.notch, model.columns, design.actuator_sets, design.period
         )
-        for factor in bounding_factors(design)
+        for factor in extreme_factors(design)
     ]
     return TubeProblem(union(*systems), disturbance)

@@ -36,7 +36,6 @@ from hsv.certificate.verification import (
     RECOMPUTED,
     Part,
     Tube,
-    acceleration_channels,
     ellipsoid_levels,
     inflated_bounds,
     lag_feedback,
@@ -55,6 +54,7 @@ from hsv.model.faults.injector import FaultInjector
 from hsv.model.faults.schedule import ScheduledFault
 from hsv.model.faults.table import Fault
 from hsv.model.lpv.actuated import respond, sampled_actuators
+from hsv.model.lpv.linearisation import acceleration_channels
 from hsv.model.lpv.polytope import evaluate
 from hsv.model.plant import FlightStatus
 from hsv.model.signals import ACCELERATED, CHANNELS, N_INPUTS, N_RIGID, N_STATES, PITCH_RATE, REMAINING

@@ -12,6 +12,8 @@ import time
 HUNG_AFTER = 5.0
 """Time (s) without any progress after which a process counts as hung."""
 
+_C_LIBRARY = ctypes.CDLL(None)
+
 _LONGEST_GAP = 1.0
 """Maximum time (s) that counts between two looks; after a longer gap, this process itself had to wait."""
 
@@ -40,7 +42,7 @@ def processor_time(pid: int) -> float | None:
     The resolution of 1 ns tells a node that only waits, which uses about 10 µs at each wake-up, from a stopped one.
     """
     clock = ctypes.c_int()
-    if ctypes.CDLL(None).clock_getcpuclockid(pid, ctypes.byref(clock)):
+    if _C_LIBRARY.clock_getcpuclockid(pid, ctypes.byref(clock)):
         return None
     try:
         return time.clock_gettime(clock.value)

@@ -11,8 +11,9 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.model.dynamics import VehicleParameters, derivative, jacobian
-from hsv.model.signals import N_INPUTS, N_STATES, PITCH_RATE
+from hsv.model.signals import ACCELERATED, N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
 from hsv.model.trim import trim
+from hsv.model.vehicle import Vehicle
 
 
 def zero_order_hold(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
@@ -125,6 +126,14 @@ def linearise(vehicle: VehicleParameters, altitude: float, velocity: float) -> t
     rigid = vehicle.decoupled()
     equilibrium = trim(rigid, altitude, velocity)
     return jacobian(equilibrium.state, equilibrium.input, rigid)
+
+
+def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
+    """Return the change (5, 3) of the rigid states by each unit acceleration held for ``period`` (s), mid-envelope."""
+    A, _ = linearise(vehicle.decoupled, *vehicle.centre)
+    unit = np.zeros((N_RIGID, 3))
+    unit[ACCELERATED, [0, 1, 2]] = 1.0
+    return zero_order_hold(A[:N_RIGID, :N_RIGID], unit, period)[1]
 
 
 def linearise_extended(
