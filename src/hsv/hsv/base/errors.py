@@ -73,6 +73,34 @@ class ParameterError(HsvError, ValueError):
     """A parameter of a node or component with a wrong name, type, size or value."""
 
 
+class Mistakes:
+    """Collects the errors of independent checks of one file, to report them together: ``with mistakes:`` a check."""
+
+    def __init__(self) -> None:
+        self.found: list[HsvError] = []
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, _: object, error: object, __: object) -> bool:
+        """Keep an ``HsvError`` instead of passing it on."""
+        if isinstance(error, HsvError):
+            self.found.append(error)
+        return isinstance(error, HsvError)
+
+    def report(self) -> None:
+        """Raise the first error; the messages of all others become its notes."""
+        if self.found:
+            first, *others = self.found
+            for words in (words for error in others for words in messages(error)):
+                first.add_note(words)
+            raise first
+
+
+def messages(error: object) -> list[str]:
+    """Return the message of an error and those of its notes, the further mistakes in the same file."""
+    return [str(error), *getattr(error, "__notes__", ())]
+
+
 def require(argument: str, value: object, kinds: type | tuple[type, ...], expected: str) -> None:
     """Raise a ParameterError that names an ``argument`` of a function whose value is of none of the ``kinds``."""
     if not isinstance(value, kinds) or isinstance(value, bool):

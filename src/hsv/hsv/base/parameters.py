@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
-from hsv.base.errors import ParameterError, did_you_mean, one_of
+from hsv.base.errors import Mistakes, ParameterError, did_you_mean, one_of
 from hsv.base.units import in_unit_of, is_finite, parse_quantity
 
 Value = bool | int | float | str | list[float] | list[str] | list[int]
@@ -185,10 +185,12 @@ def table_values(
 
     Raises:
         ParameterError, QuantityError: A table, key or value is not admissible, and the message names it; or a parameter
-            is set without the one that it needs.
+            is set without the one that it needs. Further mistakes are notes of the error.
     """
     known = {parameter.name: parameter for parameter in parameters}
-    values = _flat_values(known, tables, read)
+    mistakes = Mistakes()
+    values = _flat_values(known, tables, read, mistakes)
+    mistakes.report()
     for name in values:
         if (needed := known[name].needs) and needed not in values:
             raise ParameterError(f"{name}: has no effect without {needed}, expected both")
@@ -196,34 +198,38 @@ def table_values(
 
 
 def _flat_values(
-    known: Mapping[str, Parameter], tables: Mapping[str, Any], read: Callable[..., float]
+    known: Mapping[str, Parameter], tables: Mapping[str, Any], read: Callable[..., float], mistakes: Mistakes
 ) -> dict[str, Any]:
     """Return the values in nested ``tables`` by the names of the ``known`` parameters, see :func:`table_values`."""
     values: dict[str, Any] = {}
     for name, entry in tables.items():
-        parameter = known.get(name)
-        if parameter is None:
-            entries = _entries_of(name, entry, known)
-            values |= _flat_values(known, {f"{name}.{key}": entries[key] for key in entries}, read)
-        elif parameter.kind.startswith("double"):
-            several = isinstance(entry, list)
-            if several and parameter.kind == "double":
-                raise ParameterError(f"{name} = {_shown(entry)}: expected one value, not a list")
-            if entry == []:
-                raise ParameterError(f"{name} = []: expected one value at least")
-            numbers = [
-                read(parameter, number, f"{name}[{i}]" if several else name)
-                for i, number in enumerate(entry if several else [entry])
-            ]
-            values[name] = numbers if parameter.kind == "double_array" else numbers[0]
-        else:
-            several = parameter.kind.endswith("_array") and not isinstance(entry, list)
-            try:
-                values[name] = parameter.check([entry] if several else entry)
-            except ParameterError as error:
-                hint = did_you_mean(entry, parameter.choices) if isinstance(entry, str) else ""
-                raise ParameterError(str(error).removeprefix("parameter ") + hint) from error
+        with mistakes:
+            parameter = known.get(name)
+            if parameter is None:
+                entries = _entries_of(name, entry, known)
+                values |= _flat_values(known, {f"{name}.{key}": entries[key] for key in entries}, read, mistakes)
+            else:
+                values[name] = _parameter_value(parameter, name, entry, read)
     return values
+
+
+def _parameter_value(parameter: Parameter, name: str, entry: object, read: Callable[..., float]) -> Any:
+    """Return the value (SI) of a ``parameter`` that a file gives as ``entry``, see :func:`table_values`."""
+    if not parameter.kind.startswith("double"):
+        several = parameter.kind.endswith("_array") and not isinstance(entry, list)
+        try:
+            return parameter.check([entry] if several else entry)
+        except ParameterError as error:
+            hint = did_you_mean(entry, parameter.choices) if isinstance(entry, str) else ""
+            raise ParameterError(str(error).removeprefix("parameter ") + hint) from error
+    if not isinstance(entry, list):
+        number = read(parameter, entry, name)
+        return [number] if parameter.kind == "double_array" else number
+    if parameter.kind == "double":
+        raise ParameterError(f"{name} = {_shown(entry)}: expected one value, not a list")
+    if not entry:
+        raise ParameterError(f"{name} = []: expected one value at least")
+    return [read(parameter, number, f"{name}[{i}]") for i, number in enumerate(entry)]
 
 
 def _entries_of(name: str, entry: object, known: Iterable[str]) -> Mapping[str, Any]:

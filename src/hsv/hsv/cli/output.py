@@ -17,7 +17,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from hsv.base.errors import visible
+from hsv.base.errors import messages, visible
 from hsv.base.files import json_text
 from hsv.base.units import UnitSystem, duration_in_words, in_system, significant, unit_in
 
@@ -31,6 +31,9 @@ Quantity = tuple[float, str]
 
 MAX_ERROR = 1_900
 """Maximum length (characters) of an error message, so that a line with it has at most 2,000"""
+
+_MISTAKES = 10
+"""Number of mistakes in a file that are printed"""
 
 _COLUMN = 12
 """Width (characters) of a column of a matrix, including the gap."""
@@ -124,11 +127,13 @@ def print_estimate(seconds: float, as_json: bool, remark: str = "") -> None:
 
 
 def report_error(problem: object) -> None:
-    """Print an error on standard error, on one line if ``problem`` is one; the middle of a long one is left out."""
-    text = str(problem)
-    if len(text) > MAX_ERROR:
-        text = f"{text[: MAX_ERROR // 2]} [...] {text[-(MAX_ERROR // 2 - 20) :]}"
-    report_line("hsv: error", text, "bold red")
+    """Print an error and its notes on standard error, a line each; the middle of a long one is left out."""
+    texts = messages(problem)
+    more = [f"and {len(texts) - _MISTAKES} more"] if len(texts) > _MISTAKES else []
+    for text in texts[:_MISTAKES] + more:
+        if len(text) > MAX_ERROR:
+            text = f"{text[: MAX_ERROR // 2]} [...] {text[-(MAX_ERROR // 2 - 20) :]}"
+        report_line("hsv: error", text, "bold red")
 
 
 def report_line(source: str, text: object, style: str = "dim") -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, StrictInt, ValidationError
 
-from hsv.base.errors import DocumentError, HsvError, ParameterError, ScenarioError, one_of, require
+from hsv.base.errors import DocumentError, HsvError, Mistakes, ParameterError, ScenarioError, messages, one_of, require
 from hsv.base.files import follow_extends, is_path, parse_toml, read_text
 from hsv.base.parameters import Parameter, table_values
 from hsv.control.controller import SHIPPED_CONTROLLERS
@@ -145,6 +145,9 @@ _LIMITS = tuple(
 
 _DISK_MARGIN = Parameter("limits.disk_margin", 0.0, "smallest disk margin of the elevator loop", "", 0.0, 2.0)
 
+_FAULT = FaultTable.model_fields.keys() - {"parameters"}
+"""Keys of every fault in a file, whatever its type."""
+
 _NO_KEYS = ("name", "own", "settings", "disk_margin")
 """Fields of a scenario that are not keys of its file."""
 
@@ -210,8 +213,12 @@ def _with_definition(table: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def _refused(name: str, why: object) -> ScenarioError:
-    """Return the error for the scenario ``name`` (or path) with the reason ``why``."""
-    return ScenarioError(f"scenario {(Path(name).stem if is_path(name) else name)!r}: {why}")
+    """Return the error for the scenario ``name`` (or path) with the reason ``why``, an error perhaps with notes."""
+    first, *others = (f"scenario {(Path(name).stem if is_path(name) else name)!r}: {words}" for words in messages(why))
+    error = ScenarioError(first)
+    for words in others:
+        error.add_note(words)
+    return error
 
 
 def _own_text(name: str) -> str:
@@ -317,36 +324,47 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
     own = _custom_tables(table)
     table = {key: value for key, value in _with_definition(table, name).items() if key not in (own | settings)}
     vehicle = {"coupling": "", **table.get("vehicle", {})}
+    mistakes = Mistakes()
     try:
         reading = Reading(VehicleTable.model_construct(**vehicle).described)
-        limits = table_values((*_LIMITS, _DISK_MARGIN), {"limits": table.get("limits", {})})
-        required = limits.pop(_DISK_MARGIN.name, None)
-        faults = table.get("fault", ())
-        given = {
-            **table,
-            "name": name,
-            "own": {
+        given = {**table, "name": name, "own": {}, "settings": {}, "limits": {}, "vehicle": vehicle}
+        with mistakes:
+            limits = table_values((*_LIMITS, _DISK_MARGIN), {"limits": table.get("limits", {})})
+            given["disk_margin"] = limits.pop(_DISK_MARGIN.name, None)
+            given["limits"] = {name.removeprefix("limits."): value for name, value in limits.items()}
+        with mistakes:
+            given["own"] = {
                 key: {k: reading.custom_value(f"{key}.{k}", value) for k, value in entries.items()}
                 for key, entries in own.items()
-            },
-            "settings": table_values(_PARAMETERS, settings, reading.number),
-            "fault": [
-                reading.fault(f"fault[{i}]", row) if isinstance(row, dict) else row for i, row in enumerate(faults)
-            ]
-            if isinstance(faults, list | tuple)
-            else faults,
-            "limits": {name.removeprefix("limits."): value for name, value in limits.items()},
-            "disk_margin": required,
-            "vehicle": vehicle,
-        }
-        scenario = Scenario.model_validate(given, context=reading)
+            }
+        with mistakes:
+            given["settings"] = table_values(_PARAMETERS, settings, reading.number)
+        if isinstance(rows := table.get("fault"), list | tuple):
+            given["fault"] = [*rows]
+            for index, row in enumerate(rows):
+                if isinstance(row, dict):
+                    given["fault"][index] = {key: row[key] for key in row if key in _FAULT}
+                    with mistakes:
+                        given["fault"][index] = reading.fault(f"fault[{index}]", row)
+        with mistakes:
+            scenario = _validated(given, reading)
+        mistakes.report()
         _check(scenario, complete)
-    except ValidationError as error:
-        raise _refused(name, _first_problem(error)) from error
     except HsvError as error:
         raise _refused(name, error) from error
     drawn = reading.drawn
     return scenario, {field: drawn[id(place)] for field, place in tables_in(complete) if id(place) in drawn}
+
+
+def _validated(given: dict[str, Any], reading: Reading) -> Scenario:
+    """Return the scenario with the ``given`` fields; the ScenarioError of the first wrong one has notes on the others."""
+    try:
+        return Scenario.model_validate(given, context=reading)
+    except ValidationError as error:
+        mistakes = Mistakes()
+        mistakes.found += (ScenarioError(_in_words(problem)) for problem in error.errors())
+        mistakes.report()
+        raise
 
 
 def _shipped() -> Any:
@@ -366,36 +384,43 @@ def _check(scenario: Scenario, tables: Collection[str]) -> None:
 
     ``tables`` are the top-level keys of its complete text, inherited ones included.
     """
+    mistakes = Mistakes()
+    mistakes.found += map(ScenarioError, (*_contradictions(scenario, tables), *_wrong_times(scenario)))
+    for index, change in enumerate(scenario.tube.change):
+        field = f"tube.change[{index}].tau"
+        with mistakes, renamed("parameter ", ""):
+            rigid_factors(replace(TAU, name=field).check(change.tau), field)
+    for index, fault in enumerate(scenario.fault):
+        with mistakes, renamed("fault.", f"fault[{index}]."):
+            Fault.of(fault.channel, fault.type, fault.parameters)
+    if scenario.settings:
+        with mistakes, renamed("parameter ", ""):
+            check_equipment(scenario.settings, scenario.vehicle.described.decoupled, PERIOD)
+    with mistakes:
+        check_envelope(scenario.commands, scenario.command, scenario.vehicle.described)
+    mistakes.report()
+
+
+def _contradictions(scenario: Scenario, tables: Collection[str]) -> Iterator[str]:
+    """Yield what in a ``scenario`` does not fit its controller or vehicle; ``tables`` as in :func:`_check`."""
     if not scenario.design and scenario.controller in SHIPPED_CONTROLLERS:
-        raise ScenarioError(f"design = '': expected one, {scenario.controller} flies with its gains")
+        yield f"design = '': expected one, {scenario.controller} flies with its gains"
     for name, value in scenario.vehicle.perturbation.items():
         if name not in scenario.vehicle.described.uncertainty:
             expected = one_of(scenario.vehicle.described.uncertainty, name)
-            raise ScenarioError(f"vehicle.perturbation.{name} = {value}: no such parameter, expected {expected}")
+            yield f"vehicle.perturbation.{name} = {value}: no such parameter, expected {expected}"
     for table, controller in _CONTROLLER_TABLES.items():
         if table in tables and scenario.controller != controller:
-            raise ScenarioError(f"{table}: {scenario.controller} does not read it, expected controller {controller}")
+            yield f"{table}: {scenario.controller} does not read it, expected controller {controller}"
     if "nominal" in tables and scenario.controller == "robust_mpc":
-        raise ScenarioError("nominal: robust_mpc does not read it, expected one that follows the nominal state")
+        yield "nominal: robust_mpc does not read it, expected one that follows the nominal state"
     for index, command in enumerate(scenario.command):
         if not {"altitude_change", "velocity_change"} & command.model_fields_set:
-            raise ScenarioError(f"command[{index}]: changes nothing, expected altitude_change or velocity_change")
-    for index, change in enumerate(scenario.tube.change):
-        field = f"tube.change[{index}].tau"
-        with renamed("parameter ", ""):
-            rigid_factors(replace(TAU, name=field).check(change.tau), field)
-    for index, fault in enumerate(scenario.fault):
-        with renamed("fault.", f"fault[{index}]."):
-            Fault.of(fault.channel, fault.type, fault.parameters)
-    if scenario.settings:
-        with renamed("parameter ", ""):
-            check_equipment(scenario.settings, scenario.vehicle.described.decoupled, PERIOD)
-    check_envelope(scenario.commands, scenario.command, scenario.vehicle.described)
-    _check_starts(scenario)
+            yield f"command[{index}]: changes nothing, expected altitude_change or velocity_change"
 
 
-def _check_starts(scenario: Scenario) -> None:
-    """Refuse events that start too late, simultaneous changes of tau, and faults that stop at or before their start.
+def _wrong_times(scenario: Scenario) -> Iterator[str]:
+    """Yield events that start too late, simultaneous changes of tau, and faults that stop at or before their start.
 
     Commands, changes of tau, faults and gusts must start before the flight's end, but may last beyond it. A start at
     0 s is always accepted.
@@ -411,14 +436,14 @@ def _check_starts(scenario: Scenario) -> None:
         for index, start in enumerate(times):
             if start > 0.0 and start >= scenario.duration:
                 end = f"the flight's end, {scenario.duration:g} s"
-                raise ScenarioError(f"{field.format(index)} = {start:g} s: expected a time before {end}")
+                yield f"{field.format(index)} = {start:g} s: expected a time before {end}"
     for index, start in enumerate(changes):
         if start in changes[:index]:
-            raise ScenarioError(f"tube.change[{index}].start = {start:g} s: expected one change at a time")
+            yield f"tube.change[{index}].start = {start:g} s: expected one change at a time"
     for index, fault in enumerate(scenario.fault):
         if fault.stop is not None and fault.stop <= fault.start:
             given = f"fault[{index}].stop = {fault.stop:g} s"
-            raise ScenarioError(f"{given}: expected a time after its start, {fault.start:g} s")
+            yield f"{given}: expected a time after its start, {fault.start:g} s"
 
 
 _DUE = {
@@ -433,8 +458,8 @@ _DUE = {
 """Expected values in words, by pydantic's type of error; for other types, pydantic's own message is used."""
 
 
-def _first_problem(error: ValidationError) -> str:
-    problem = error.errors()[0]
+def _in_words(problem: Mapping[str, Any]) -> str:
+    """Return one of pydantic's errors as text."""
     field = _dotted(problem["loc"])
     if problem["type"] == "extra_forbidden":
         return f"{field}: unknown key, expected {one_of(_siblings(problem['loc']), str(problem['loc'][-1]))}"
