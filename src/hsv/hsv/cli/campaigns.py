@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 from enum import StrEnum
 from itertools import chain
 from pathlib import Path
@@ -18,6 +19,7 @@ from hsv.cli import output
 from hsv.cli.options import (
     JsonOption,
     ScenarioArgument,
+    SetOption,
     TrustOption,
     UnitsOption,
     check_folder,
@@ -77,6 +79,7 @@ def fly(
     factor: Annotated[
         list[str] | None, Option(help="Vary a field, e.g. 'fault[0].start=90 s..110 s'; repeatable.")
     ] = None,
+    changes: SetOption = None,
     out: Annotated[Path | None, Option(help="Result file; default: campaigns/<scenario>_<method>.parquet.")] = None,
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
@@ -98,6 +101,7 @@ def fly(
     from hsv.flight.campaign.run import run_campaign
     from hsv.flight.campaign.store import ResultStore
     from hsv.flight.campaign.summary import Results
+    from hsv.flight.tables import read_changes
     from hsv.graph.preparation import commit
 
     for name, value in {"sampling": sampling, "samples": samples}.items():
@@ -114,7 +118,9 @@ def fly(
             raise CampaignError(f"factor = {text!r}: a field is given twice, expected once")
         factors[field] = low.strip(), high.strip()
     count = _SAMPLES if samples is None else samples
-    campaign = plan(scenario, method=method, samples=count, seed=seed, scale=scale, commit=commit(), factors=factors)
+    changed = read_changes(changes or ())
+    campaign = plan(scenario, method=method, samples=count, seed=seed, scale=scale, factors=factors, changes=changed)
+    campaign = replace(campaign, commit=commit())
     if out is None:
         counted = "" if corners else f"_{campaign.samples}_seed{seed}"
         out = Path("campaigns", f"{campaign.scenario_name}_{method}{counted}.parquet")

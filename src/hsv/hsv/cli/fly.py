@@ -19,6 +19,7 @@ from hsv.cli.options import (
     BagArgument,
     JsonOption,
     ScenarioArgument,
+    SetOption,
     UnitsOption,
     check_folder,
     check_target,
@@ -56,6 +57,7 @@ class GraphFlight:
     """A flight of the graph as the command line describes it, for hsv run and hsv prepare."""
 
     scenario: ScenarioArgument = "case1"
+    changes: SetOption = None
     live: LiveOption = False
     live_port: LivePortOption = None
     real_time_factor: RealTimeFactorOption = None
@@ -74,7 +76,7 @@ class GraphFlight:
             raise ParameterError(f"live-port = {self.live_port}: expected with --live only")
         port = (8765 if self.live_port is None else self.live_port) if self.live else None
         options = RunOptions(self.real_time_factor, self.step_timeout, self.composed, self.external, port, self.paused)
-        return prepare(self.scenario, options, bag=self.bag, folder=folder)
+        return prepare(self.scenario, options, changes=self.changes or (), bag=self.bag, folder=folder)
 
 
 def _with_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -139,6 +141,7 @@ def run(
 
 def simulate(
     scenario: ScenarioArgument = "case1",
+    changes: SetOption = None,
     units: UnitsOption = UnitSystem.metric,
     out: Annotated[Path | None, Option(help="Also save the time histories to this .npz file (SI).")] = None,
     strict: StrictOption = False,
@@ -159,11 +162,12 @@ def simulate(
     from hsv.flight.closed_loop import fly
     from hsv.flight.flight import step_statistics
     from hsv.flight.scenario import load_scenario
+    from hsv.flight.tables import read_changes
     from hsv.model.plant import FlightStatus
 
     if out:
         check_target(out, "out", ".npz")
-    loaded = load_scenario(scenario)
+    loaded = load_scenario(scenario, read_changes(changes or ()))
     with blamed_on(loaded):
         design = read_design(find_design(loaded.design)) if loaded.design else None
     components = assemble_flight(loaded, design)

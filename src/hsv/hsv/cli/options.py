@@ -24,6 +24,9 @@ ForceOption = Annotated[bool, Option("--force", help="Overwrite existing files."
 GraphNamespaceOption = Annotated[str, Option("--namespace", help="Namespace of the graph, such as /veh1.")]
 JsonOption = Annotated[bool, Option("--json", help="Print JSON, with the unit in every key.")]
 ListJsonOption = Annotated[bool, Option("--json", help="Print JSON, with a unit for every number.")]
+SetOption = Annotated[
+    list[str] | None, Option("--set", help="Change a field, e.g. 'fault[0].effectiveness=0.7'; repeatable.")
+]
 SuppliedDesignOption = Annotated[Path | None, Option("--design", help="Design of a bag without attachments.")]
 SuppliedScenarioOption = Annotated[str | None, Option("--scenario", help="Scenario of a bag without attachments.")]
 TrustOption = Annotated[bool, Option("--trust", help="Run code that the file names, such as controllers.")]

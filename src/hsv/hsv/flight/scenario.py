@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -12,8 +11,8 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, StrictInt, ValidationError
 
-from hsv.base.errors import DocumentError, HsvError, Mistakes, ParameterError, ScenarioError, messages, one_of, require
-from hsv.base.files import follow_extends, is_path, parse_toml, read_text
+from hsv.base.errors import DocumentError, HsvError, Mistakes, ParameterError, ScenarioError, one_of, require
+from hsv.base.files import EXTENDS, follow_extends, is_path, parse_toml, read_text
 from hsv.base.parameters import Parameter, table_values
 from hsv.control.controller import SHIPPED_CONTROLLERS
 from hsv.control.design import TAU, rigid_factors
@@ -38,7 +37,10 @@ from hsv.flight.tables import (
     VehicleTable,
     breakpoints,
     check_envelope,
+    dotted,
+    refused,
     renamed,
+    set_field,
     tables_in,
 )
 from hsv.model.faults.injector import NEVER_TIME, written_parameters
@@ -163,20 +165,35 @@ def scenario_names() -> list[str]:
     return sorted(Path(entry.name).stem for entry in _shipped().iterdir() if entry.name.endswith(".toml"))
 
 
-def scenario_text(name: str) -> str:
-    """Return the complete TOML text of a scenario, given by name or path.
+def scenario_text(name: str, changes: Mapping[str, object] | None = None) -> str:
+    """Return the complete TOML text of a scenario, given by name or path, with ``changes`` of its fields.
 
-    The text includes the extended scenarios, and the vehicle unless it is shipped. Paths of libraries are absolute.
+    The text includes the extended scenarios, and the vehicle unless it is shipped. Paths of libraries are absolute. A
+    file that extends another one without a title of its own, and a changed scenario, say so in the title.
 
     Raises:
-        ScenarioError: A scenario or vehicle cannot be found or read, or a library lies outside the scenario's folder.
+        ScenarioError: A scenario or vehicle cannot be found or read, a library lies outside the scenario's folder, or
+            there is no such field.
     """
     require("scenario", name, str, "a name, or a path as text")
+    require("changes", changes or {}, Mapping, 'values by field, such as {"fault[0].start": "90 s"}')
     text = _own_text(name)
     own = scenario_table(text, name)
     whole = follow_extends(
-        name, lambda other: _located(scenario_table(_own_text(other), other), other), _refused, REPLACED, KINDS
+        name, lambda other: _located(scenario_table(_own_text(other), other), other), refused, REPLACED, KINDS
     )
+    if EXTENDS in own and "title" not in own:
+        whole["title"] = f"{Path(name).stem} (from {Path(own[EXTENDS]).stem})"
+    for field, value in (changes or {}).items():
+        set_field(whole, field, value, name)
+        whole = _with_named_vehicle(whole, name)
+        if field == "vehicle.name":
+            whole["vehicle"].pop("definition", None)
+    if changes and changes.keys() & {"controller", "vehicle", "vehicle.name"}:
+        whole = _located(whole, name)
+    if changes and "title" not in changes:
+        words = ", ".join(f"{field} = {value}" for field, value in changes.items())
+        whole["title"] = f"{whole.get('title', name)}, with {words}"
     whole = _with_definition(whole, name)
     return text if whole == own else tomli_w.dumps(whole)
 
@@ -196,7 +213,7 @@ def _located(table: dict[str, Any], name: str) -> dict[str, Any]:
         try:
             located["controller"] = inside(controller, folder)
         except ParameterError as error:
-            raise _refused(name, error) from error
+            raise refused(name, error) from error
     return located
 
 
@@ -208,17 +225,8 @@ def _with_definition(table: dict[str, Any], name: str) -> dict[str, Any]:
         try:
             vehicle |= {"name": vehicle_label(place), "definition": vehicle_tables(place)}
         except HsvError as error:
-            raise _refused(name, error) from error
+            raise refused(name, error) from error
     return {**table, "vehicle": vehicle} if vehicle else table
-
-
-def _refused(name: str, why: object) -> ScenarioError:
-    """Return the error for the scenario ``name`` (or path) with the reason ``why``, an error perhaps with notes."""
-    first, *others = (f"scenario {(Path(name).stem if is_path(name) else name)!r}: {words}" for words in messages(why))
-    error = ScenarioError(first)
-    for words in others:
-        error.add_note(words)
-    return error
 
 
 def _own_text(name: str) -> str:
@@ -237,9 +245,9 @@ def scenario_table(text: str, name: str) -> dict[str, Any]:
     try:
         table = parse_toml(text)
     except DocumentError as error:
-        raise _refused(name, error) from error
+        raise refused(name, error) from error
     if not isinstance(controller := table.get("controller", ""), str):
-        raise _refused(name, f"controller = {controller!r}: expected a name or a path")
+        raise refused(name, f"controller = {controller!r}: expected a name or a path")
     return _with_named_vehicle(table, name)
 
 
@@ -249,11 +257,11 @@ def _with_named_vehicle(table: dict[str, Any], name: str) -> dict[str, Any]:
     if isinstance(vehicle, str):
         vehicle = {"name": vehicle}
     if not isinstance(vehicle, dict):
-        raise _refused(name, f"vehicle = {vehicle!r}: expected a name, a path, or a table")
+        raise refused(name, f"vehicle = {vehicle!r}: expected a name, a path, or a table")
     if not isinstance(vehicle.get("name", ""), str):
-        raise _refused(name, f"vehicle.name = {vehicle['name']!r}: expected a name or a path")
+        raise refused(name, f"vehicle.name = {vehicle['name']!r}: expected a name or a path")
     if not isinstance(vehicle.get("definition", {}), dict):
-        raise _refused(name, f"vehicle.definition = {vehicle['definition']!r}: expected the tables of a vehicle file")
+        raise refused(name, f"vehicle.definition = {vehicle['definition']!r}: expected the tables of a vehicle file")
     return {**table, "vehicle": vehicle} if vehicle else table
 
 
@@ -263,35 +271,7 @@ def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Sce
     Raises:
         ScenarioError: There is no such scenario, or a field is wrong; the message has field, value and expectation.
     """
-    text = scenario_text(name)
-    if changes:
-        require("changes", changes, Mapping, 'values by field, such as {"fault[0].start": "90 s"}')
-        table = scenario_table(text, name)
-        for field, value in changes.items():
-            set_field(table, field, value, name)
-            table = _with_named_vehicle(table, name)
-            if field == "vehicle.name":
-                table["vehicle"].pop("definition", None)
-        if changes.keys() & {"controller", "vehicle", "vehicle.name"}:
-            table = _with_definition(_located(table, name), name)
-        text = tomli_w.dumps(table)
-    return parse_scenario(text, Path(name).stem)
-
-
-def set_field(table: dict[str, Any], field: str, value: object, name: str) -> None:
-    """Set a ``field`` such as ``fault[0].start`` in the ``table`` of a scenario to a ``value`` as written in a file."""
-    *path, key = (int(part) if part.isdecimal() else part for part in re.findall(r"[^.\[\]]+", field) or [""])
-    place: Any = table
-    for part in path:
-        if isinstance(place, dict) and isinstance(part, str):
-            place = place.setdefault(part, {})
-        elif isinstance(place, list) and isinstance(part, int) and part < len(place):
-            place = place[part]
-        else:
-            raise _refused(name, f"{field}: no such field, expected one such as fault[0].start")
-    if not (isinstance(place, dict) and key if isinstance(key, str) else isinstance(place, list) and key < len(place)):
-        raise _refused(name, f"{field}: no such field, expected one such as fault[0].start")
-    place[key] = value
+    return parse_scenario(scenario_text(name, changes), Path(name).stem)
 
 
 def with_controller(text: str, controller: str, name: str) -> str:
@@ -306,7 +286,7 @@ def parse_scenario(text: str, name: str) -> Scenario:
     scenario, drawn = scenario_at_means(scenario_table(text, name), name)
     if drawn:
         field = next(iter(drawn))
-        raise _refused(name, f"{field}: a distribution, which hsv montecarlo draws; expected a number")
+        raise refused(name, f"{field}: a distribution, which hsv montecarlo draws; expected a number")
     return scenario
 
 
@@ -315,11 +295,11 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
     complete = table
     vehicle = table.get("vehicle", {})
     if is_path(vehicle.get("name", "")) and "definition" not in vehicle:
-        raise _refused(name, f"vehicle.name = {vehicle['name']!r}: expected a registered name, or a definition")
+        raise refused(name, f"vehicle.name = {vehicle['name']!r}: expected a registered name, or a definition")
     for key in _NO_KEYS:
         if key in table:
             why = ", a scenario is called by its file" if key == "name" else ""
-            raise _refused(name, f"{key}: unknown key{why}")
+            raise refused(name, f"{key}: unknown key{why}")
     settings = {key: value for key, value in table.items() if key in SETTINGS}
     own = _custom_tables(table)
     table = {key: value for key, value in _with_definition(table, name).items() if key not in (own | settings)}
@@ -351,7 +331,7 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
         mistakes.report()
         _check(scenario, complete)
     except HsvError as error:
-        raise _refused(name, error) from error
+        raise refused(name, error) from error
     drawn = reading.drawn
     return scenario, {field: drawn[id(place)] for field, place in tables_in(complete) if id(place) in drawn}
 
@@ -460,7 +440,7 @@ _DUE = {
 
 def _in_words(problem: Mapping[str, Any]) -> str:
     """Return one of pydantic's errors as text."""
-    field = _dotted(problem["loc"])
+    field = dotted(problem["loc"])
     if problem["type"] == "extra_forbidden":
         return f"{field}: unknown key, expected {one_of(_siblings(problem['loc']), str(problem['loc'][-1]))}"
     if problem["type"] == "missing":
@@ -471,13 +451,6 @@ def _in_words(problem: Mapping[str, Any]) -> str:
         return f"{field}{equals}{rest}"
     due = _DUE.get(problem["type"]) or problem["msg"].removeprefix("Input should be ")
     return f"{field} = {problem['input']!r}: expected {due.format(**problem.get('ctx', {}))}"
-
-
-def _dotted(location: Iterable[int | str]) -> str:
-    text = ""
-    for part in location:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
-    return text
 
 
 def _siblings(location: tuple[int | str, ...]) -> list[str]:

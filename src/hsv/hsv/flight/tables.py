@@ -7,20 +7,72 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator
 
-from hsv.base.errors import ParameterError, QuantityError, ScenarioError, one_of
+from hsv.base.errors import DocumentError, ParameterError, QuantityError, ScenarioError, messages, one_of
+from hsv.base.files import is_path, parse_toml
 from hsv.base.parameters import Parameter, limits_in_words, read_number
 from hsv.base.units import has_unit, parse_quantity, rounded, si_unit_of, to_paper, written
 from hsv.flight.distribution import Distribution, read_distribution
 from hsv.model.faults.table import fault_parameters
 from hsv.model.vehicle import DEFAULT_VEHICLE, Vehicle, load_vehicle, parse_vehicle
+
+
+def refused(name: str, why: object) -> ScenarioError:
+    """Return the error for the scenario ``name`` (or path) with the reason ``why``, an error perhaps with notes."""
+    first, *others = (f"scenario {(Path(name).stem if is_path(name) else name)!r}: {words}" for words in messages(why))
+    error = ScenarioError(first)
+    for words in others:
+        error.add_note(words)
+    return error
+
+
+def dotted(location: Iterable[int | str]) -> str:
+    """Return the name of a field, such as ``fault[0].start``, from its parts."""
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def set_field(table: dict[str, Any], field: str, value: object, name: str) -> None:
+    """Set a ``field`` such as ``fault[0].start`` in the ``table`` of a scenario to a ``value`` as written in a file."""
+    parts = [int(part) if part.isdecimal() else part for part in re.findall(r"[^.\[\]]+", field) or [""]]
+    place: Any = table
+    for index, part in enumerate(parts):
+        there, listed = dotted(parts[:index]), isinstance(place, list)
+        if not (isinstance(part, int) and part < len(place) if listed else isinstance(place, dict) and part):
+            known = ", ".join(f"{there}[{entry}]" for entry in range(len(place))) if listed else ""
+            raise refused(name, f"{field}: no such field, expected {known or 'one such as fault[0].start'}")
+        if index == len(parts) - 1:
+            place[part] = value
+        else:
+            place = place[part] if listed else place.setdefault(part, {})
+
+
+def read_changes(texts: Iterable[str]) -> dict[str, object]:
+    """Return the changes of a scenario in ``texts`` such as ``duration=50 s``, by field, with values as in a file.
+
+    Raises:
+        ScenarioError: A text lacks the field, or two texts name the same.
+    """
+    changes: dict[str, object] = {}
+    for text in texts:
+        field, equals, value = (part.strip() for part in text.partition("="))
+        if not (field and equals) or field in changes:
+            raise ScenarioError(f"set = {text!r}: expected FIELD=VALUE, such as 'duration=50 s', each field once")
+        changes[field] = value
+        with suppress(DocumentError):  # a text needs no quotes
+            changes[field] = parse_toml(f"value = {value}")["value"]
+    return changes
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import fcntl
+import json
 import os
 import shutil
 import subprocess
@@ -24,6 +25,7 @@ from hsv.control.design import DESIGN_PARAMETERS, NO_DESIGN, digest
 from hsv.control.design_file import attached_certificate, design_files, find_certificate, find_design, read_design
 from hsv.flight.assembly import assemble_flight, blamed_on, own_parameters
 from hsv.flight.scenario import Scenario, parse_scenario, scenario_text, with_controller
+from hsv.flight.tables import read_changes
 from hsv.graph.exclusive import ports
 from hsv.graph.launcher import executable
 from hsv.plugins.controllers import library_record
@@ -104,6 +106,7 @@ def prepare(
     options: RunOptions = RunOptions(),
     *,
     text: str = "",
+    changes: Sequence[str] = (),
     bags: Path = Path("bags"),
     bag: Path | None = None,
     folder: Path | None = None,
@@ -116,6 +119,7 @@ def prepare(
         scenario_name: Name or path of the scenario.
         options: Options of the execution.
         text: The scenario, as :func:`hsv.flight.scenario.scenario_text` returns it; empty: read by its name.
+        changes: Changes of its fields, such as ``duration=50 s``; without ``text`` only.
         bags: Folder for a new bag, named by scenario and time, if ``bag`` is not given.
         bag: Bag to record to, a new directory.
         folder: Directory for the parameter files; if not given, a temporary one that is removed with the result.
@@ -129,7 +133,7 @@ def prepare(
     real_time_factor = options.real_time_factor
     if real_time_factor is None:
         real_time_factor = 1.0 if live_ports else 0.0
-    text = text or scenario_text(scenario_name)
+    text = text or scenario_text(scenario_name, read_changes(changes))
     name = Path(scenario_name).stem
     if options.external:
         # The bag gets the changed scenario, which is not the published one.
@@ -162,6 +166,8 @@ def prepare(
     bag = _new_directory([bag] if bag else [bags / default, *(bags / f"{default}_{n}" for n in range(2, 100))])
     design_hash = design.digest if design else digest({})
     custom_data = {"scenario": scenario.name, "title": scenario.title}
+    if changes:
+        custom_data["set"] = json.dumps(list(changes))
     custom_data |= provenance(scenario.controller, scenario.design, design_hash, scenario.seed)
     run = {
         "real_time_factor": float(real_time_factor),

@@ -13,7 +13,8 @@ from markupsafe import Markup, escape
 
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.bags.reader import Bag
-from hsv.base.errors import DesignError, RecordingError
+from hsv.base.errors import DesignError, DocumentError, RecordingError
+from hsv.base.files import parse_json
 from hsv.base.units import UnitSystem
 from hsv.control.design_file import find_design, read_parameters
 from hsv.flight.flight import step_times_in_words
@@ -30,7 +31,7 @@ from hsv.pages.fly import SITE, fragment
 from hsv.pages.panels import GROUPS, Kind, Panel
 from hsv.pages.picture import DRAWN, Picture, picture
 from hsv.pages.side_view import geometry
-from hsv.pages.text import capitalised, number, quantity, switched
+from hsv.pages.text import capitalised, number, quantity, shell, switched
 
 DECLARED = {p.name: p for table in (LOCKSTEP_PARAMETERS, *NODE_PARAMETERS.values()) for p in table}
 """Declarations of all parameters of the nodes by name."""
@@ -85,6 +86,7 @@ def report_page(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.m
         differing={name for name in METRICS if len({run.metrics.get(name) for run in runs}) > 1},
         parameters={part: list(_parameters(part, runs)) for part in ("scenario", "design")},
         shipped_scenarios=scenario_names(),
+        set_options=_set_options,
         fragment=fragment,
         site=SITE,
         events_shown=EVENTS_SHOWN,
@@ -236,6 +238,14 @@ def _defaults(values: Mapping[str, Any]) -> dict[str, Any]:
         with suppress(DesignError):
             defaults |= read_parameters(find_design(design))
     return defaults
+
+
+def _set_options(run: ReportedRun) -> str:
+    """Return the options of a command that change the scenario's file as for this run, with a space before each."""
+    with suppress(DocumentError):
+        changes = parse_json(run.custom.get("set", "[]"))
+        return "".join(f" --set {shell(change)}" for change in changes) if isinstance(changes, list) else ""
+    return ""
 
 
 def _value(name: str, value: Any) -> Markup:

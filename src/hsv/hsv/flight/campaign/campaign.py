@@ -22,7 +22,8 @@ from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.assembly import assemble_flight, blamed_on, design_parameters, without_code
 from hsv.flight.campaign.run import Batch
 from hsv.flight.distribution import KINDS, Distribution
-from hsv.flight.scenario import Scenario, scenario_at_means, scenario_table, scenario_text, set_field
+from hsv.flight.scenario import Scenario, scenario_at_means, scenario_table, scenario_text
+from hsv.flight.tables import set_field
 from hsv.model.dynamics import COEFFICIENT_UNITS
 from hsv.plugins.library import library_digest
 
@@ -82,7 +83,7 @@ class Campaign:
     """Number of flights."""
     seed: int
     factors: tuple[Factor, ...]
-    commit: str
+    commit: str = "unknown"
     """Git commit of the program; results of different commits are not mixed."""
     library: str = ""
     """SHA-256 of the controller's shared library, empty without one; results of different builds are not mixed."""
@@ -109,7 +110,8 @@ class Campaign:
 
     def file(self, flight: int, sample: Sequence[float], **replaced: str) -> str:
         """Return the text of the scenario file of a flight with its sample; ``replaced`` overrides top-level keys."""
-        return tomli_w.dumps(self._flown_table(flight, sample) | replaced)
+        title = {"title": f"{self.scenario_name}, flight {flight}"}
+        return tomli_w.dumps(self._flown_table(flight, sample) | title | replaced)
 
     def flight_seed(self, flight: int) -> int:
         """Return the seed for the random numbers within a flight, from the campaign's seed and the flight number."""
@@ -226,8 +228,8 @@ def plan(
     samples: int = 1000,
     seed: int = 1,
     scale: float = 1.0,
-    commit: str = "unknown",
     factors: Mapping[str, tuple[object, object]] | None = None,
+    changes: Mapping[str, object] | None = None,
     with_code: bool = True,
 ) -> Campaign:
     """Return the campaign that varies the vehicle's uncertain parameters, the scenario's distributions and ``factors``.
@@ -238,8 +240,8 @@ def plan(
         samples: Number of flights, a power of two for ``sobol``; ignored for corners.
         seed: Seed from which samples, except corners, are drawn; the seeds of the flights depend on it, too.
         scale: Factor on the vehicle's bounds of uncertain parameters (section 5.1 of the paper), not on distributions.
-        commit: Git commit of the program.
         factors: Least and largest value, as in a scenario file, of fields or uncertain parameters, by name.
+        changes: Changes of the scenario's fields in all flights.
         with_code: Whether a custom controller flies, whose code is then loaded to check its parameters.
 
     Raises:
@@ -248,7 +250,7 @@ def plan(
     for argument, value, kind in (("samples", samples, Integral), ("seed", seed, Integral), ("scale", scale, Real)):
         require(argument, value, kind, "an integer" if kind is Integral else "a number")
     require("factors", {} if factors is None else factors, Mapping, "least and largest values by field")
-    text = scenario_text(scenario_name)
+    text = scenario_text(scenario_name, changes)
     name = Path(scenario_name).stem
     table = scenario_table(text, name)
     if factors:
@@ -271,7 +273,7 @@ def plan(
         raise CampaignError(f"seed = {seed}: expected 0 to 2^63 - 1")
     with blamed_on(scenario):
         design, library = design_parameters(scenario), library_digest(scenario.controller)
-    campaign = Campaign(name, text, design, method, samples, seed, found, commit, library)
+    campaign = Campaign(name, text, design, method, samples, seed, found, library=library)
     _check_ends(campaign, with_code)
     return campaign
 
