@@ -131,7 +131,7 @@ def test_the_status_tells_of_rates():
 
 
 def test_where_no_tube_is_certified_nothing_is_covered():
-    assert of({}, None, "case1_rmpc") == ["all of it: controller robust_mpc has no certified tube"]
+    assert of({}, None, "case1_rmpc") == ["no certificate: controller robust_mpc has no tube"]
 
 
 def test_the_status_tells_of_declared_hardware_alone():

@@ -92,7 +92,7 @@ def test_a_flight_has_the_wall_times_of_a_law_in_python_step_by_step():
 def test_the_times_of_steps_are_told_by_node_beside_the_period():
     times = step_statistics(1e-3 * np.arange(1, 102))
     told = step_times_in_words({"nodes": {"tube_mpc": times}, "period_ms": 20.0})
-    assert told == "tube_mpc 51 ms in the median, 99 % 100, largest 101; a period has 20 ms"
+    assert told == "tube_mpc median 51, p99 100, max 101 ms; period 20 ms"
 
 
 def test_settings_reach_the_controller_in_si_units():

@@ -6,7 +6,7 @@ from functools import partial
 
 from hsv.bags.description import CONTROLLER, CONTROLLERS, NOTCH_FILTER
 from hsv.base.errors import ParameterError
-from hsv.control.controller import NODE
+from hsv.control.controller import NODE, ExternalController
 from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.control.notch_filter import NOTCH_PARAMETERS, NotchFilter
 from hsv.flight.blocks import Signals
@@ -51,7 +51,10 @@ class ControllerNode(BlockNode):
         self.component = build_controller(values | {"controller": name}, design)
 
     def stepped(self, signals: Signals) -> None:
-        """Publish the diagnostics, with whether the command was limited."""
+        """Publish the diagnostics, with whether the command was limited; warn of a first command in degrees."""
+        if signals.step == 0 and isinstance(self.component, ExternalController):
+            if doubt := self.component.doubt(signals.diagnostics.u_unsaturated):
+                self.get_logger().warning(doubt)
         self.diagnose(signals, saturated=bool(signals.saturated.any()))
 
 

@@ -67,6 +67,8 @@ def find_files(path: Path) -> tuple[list[Path], list[str]]:
             f"{path}: recorded with sqlite3, expected MCAP: ros2 bag convert -i {path} -o mcap.yaml makes it, and "
             "docs/replay.md has that file"
         )
+    if path.suffix == ".parquet":
+        raise RecordingError(f"{path}: the results of a campaign, expected a bag (hsv montecarlo summary {path})")
     if path.is_file():
         return [path], []
     if not path.is_dir():

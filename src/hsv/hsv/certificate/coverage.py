@@ -168,7 +168,7 @@ def uncovered(
     controller = str(validate(CONTROLLER_PARAMETERS, values)["controller"])
     if controller != _LAW or design is None or design.tube is None:
         which = "the design" if controller == _LAW else f"controller {controller}"
-        return [f"all of it: {which} has no certified tube"]
+        return [f"no certificate: {which} has no tube"]
     found = ["design: not as it was written, its parameters do not have the digest design.hash"] * design.modified
     found += [*uncovered_vehicle(values, design), *uncovered_hardware(values, design)]
     if certificate is None:

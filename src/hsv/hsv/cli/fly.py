@@ -156,6 +156,7 @@ def simulate(
 
     from hsv.certificate.coverage import uncovered_rates
     from hsv.cli.summary import FlightSummary, report_flight
+    from hsv.control.controller import ExternalController
     from hsv.control.design import digest
     from hsv.control.design_file import find_design, read_design
     from hsv.flight.assembly import assemble_flight, blamed_on, uncovered_of
@@ -174,6 +175,9 @@ def simulate(
     started = time.perf_counter()
     flight = fly(components)
     wall_time = time.perf_counter() - started
+    custom = components.controller
+    if isinstance(custom, ExternalController) and (doubt := custom.doubt(flight.history.u_unsaturated[0])):
+        output.report_line("hsv: warning", doubt, "bold yellow")
     if out:
         columns: dict[str, Any] = {"time": flight.time, **flight.history.columns()}
         with writing(out, "out"), out.open("wb") as stream:

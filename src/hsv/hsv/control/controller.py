@@ -201,6 +201,10 @@ class NodeController(Controller):
         return ParameterError(f"controller = {self.name!r}: a node of its own, expected hsv run to fly it")
 
 
+_FAR = 10.0
+"""Multiple of the input range beyond which a first command is taken for one in degrees."""
+
+
 class ExternalController(Controller):
     """A custom controller, in Python or compiled, whose outputs are checked and limited."""
 
@@ -271,6 +275,13 @@ class ExternalController(Controller):
         if not np.all(np.isfinite(unsaturated)):
             raise self.failure(inputs.step, f"answered {unsaturated.tolist()}")
         return ControllerResult(np.clip(unsaturated, self._minimum, self._maximum), unsaturated)
+
+    def doubt(self, first: np.ndarray) -> str:
+        """Return a warning if the elevator of the ``first`` input (2), before the limits, is far beyond its range."""
+        largest = max(-self._minimum[1], self._maximum[1])
+        if not abs(first[1]) > _FAR * largest:
+            return ""
+        return f"{self.name}: first elevator deflection {first[1]:.3g} rad, the limit is {largest:.3g} rad: in degrees?"
 
     def _call(self, inputs: ControllerInput) -> Any:
         if self.kernel is None:

@@ -88,12 +88,12 @@ def step_statistics(seconds: Sequence[float]) -> dict[str, float]:
 def step_times_in_words(step_times: dict[str, Any]) -> str:
     """Return one line: the wall times of the control laws by node and, if known, of a whole step, and the period."""
     times = [
-        f"{name} {times['median_ms']:.3g} ms in the median, 99 % {times['p99_ms']:.3g}, largest {times['max_ms']:.3g}"
+        f"{name} median {times['median_ms']:.3g}, p99 {times['p99_ms']:.3g}, max {times['max_ms']:.3g} ms"
         for name, times in step_times["nodes"].items()
     ]
     if loop := step_times.get("loop_mean_ms"):
-        times.append(f"a step of law, vehicle and sensors {loop:.3g} ms in the mean")
-    return "; ".join([*times, f"a period has {step_times['period_ms']:g} ms"])
+        times.append(f"one step (law, vehicle, sensors) mean {loop:.3g} ms")
+    return "; ".join([*times, f"period {step_times['period_ms']:g} ms"])
 
 
 def flight_of(components: Components, history: History, memory: tuple[np.ndarray, np.ndarray] | None = None) -> Flight:

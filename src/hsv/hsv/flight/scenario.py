@@ -48,7 +48,7 @@ from hsv.model.faults.table import Fault
 from hsv.model.links import COMMAND_LINK_PARAMETERS
 from hsv.model.plant import EQUIPMENT_PARAMETERS, check_equipment
 from hsv.model.vehicle import DEFAULT_VEHICLE, SHIPPED_VEHICLES, vehicle_label, vehicle_tables
-from hsv.plugins.library import inside
+from hsv.plugins.library import find_in, inside
 
 
 class Scenario(Table):
@@ -210,6 +210,8 @@ def _located(table: dict[str, Any], name: str) -> dict[str, Any]:
         place = str(folder / vehicle["name"]) if is_path(vehicle["name"]) else vehicle["name"]
         located["vehicle"] = {**vehicle, "name": place, "definition": None}
     if isinstance(controller, str):
+        if is_path(name):
+            find_in(folder, controller)
         try:
             located["controller"] = inside(controller, folder)
         except ParameterError as error:
@@ -230,6 +232,8 @@ def _with_definition(table: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def _own_text(name: str) -> str:
+    if name not in scenario_names() and (Path(name).is_dir() or name.endswith(".mcap")):
+        raise ScenarioError(f"scenario {name!r}: a folder or bag, expected a TOML file (hsv replay {name} flies a bag)")
     if is_path(name):
         try:
             return read_text(Path(name))

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import os
 import re
+import sys
 from collections.abc import Mapping
 from ctypes import POINTER, Structure, c_char_p, c_double, c_int64, c_void_p
 from dataclasses import replace
@@ -201,6 +203,19 @@ def inside(controller: str, folder: Path) -> str:
     if not found.is_relative_to(folder.resolve()):
         raise ParameterError(f"controller = {controller!r}: expected a path inside the scenario's folder")
     return f"{found}:{symbol}" if symbol else str(found)
+
+
+def find_in(folder: Path, controller: str) -> None:
+    """Let Python find the module of a scenario's ``controller`` in its ``folder``, if it is there, after all others.
+
+    This holds for processes that are started later, too. Nothing is loaded here.
+    """
+    module = controller.partition(":")[0].partition(".")[0]
+    place = str(folder.resolve())
+    there = module.isidentifier() and ((folder / f"{module}.py").is_file() or (folder / module).is_dir())
+    if there and library_place(controller) is None and ":" in controller and place not in sys.path:
+        sys.path.append(place)
+        os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (os.environ.get("PYTHONPATH"), place)))
 
 
 def seen_from(controller: str, folder: Path) -> str:
