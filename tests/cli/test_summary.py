@@ -16,7 +16,7 @@ from hsv.flight.metrics import Group
 @pytest.mark.parametrize(
     ("words", "printed"),
     [
-        (("simulate", "case1"), "control law  a step of law, vehicle and sensors 0.0"),
+        (("simulate", "case1"), "control law  one step (law, vehicle, sensors) mean 0.0"),
         (
             ("simulate", "case1_no_notch", "--all"),
             "verdict within all 5 limits; not judged: elastic decay time (67.1 s)",

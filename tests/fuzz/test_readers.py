@@ -79,7 +79,7 @@ def small_bag(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Results:
     folder = tmp_path_factory.mktemp("campaign")
-    planned = plan(str(short_scenario(folder, duration=1, fault=0)), samples=2, commit="test")
+    planned = plan(str(short_scenario(folder, duration=1, fault=0)), samples=2)
     run_campaign(planned, ResultStore(folder / "flown.parquet", planned), Executor())
     return Results(folder / "flown.parquet")
 

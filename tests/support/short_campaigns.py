@@ -23,7 +23,7 @@ def planned(short):
     def make(**settings):
         return plan(
             short,
-            **{"samples": 44, "seed": 3, "factors": {"fault[0].start": ("1 s", "2.5 s")}, "commit": "test"} | settings,
+            **{"samples": 44, "seed": 3, "factors": {"fault[0].start": ("1 s", "2.5 s")}} | settings,
         )
 
     return make

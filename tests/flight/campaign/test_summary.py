@@ -36,7 +36,7 @@ def test_distributions_and_worst_flights_agree_with_the_columns(results):
 @pytest.fixture(scope="module")
 def lost(tmp_path_factory):
     """Return a campaign in which flights diverge."""
-    campaign = plan("case1_derived_no_notch", samples=10, commit="test")
+    campaign = plan("case1_derived_no_notch", samples=10)
     out = tmp_path_factory.mktemp("lost") / "lost.parquet"
     run_campaign(campaign, ResultStore(out, campaign), Executor())
     return Results(out)

@@ -70,7 +70,7 @@ def test_the_address_says_what_is_shown_and_shows_it(opened):
 
 
 def test_what_a_campaign_of_whole_flights_opens_with(browser, screen, tmp_path, pictures):
-    campaign = plan("case1", samples=100, seed=1, commit="test")
+    campaign = plan("case1", samples=100, seed=1)
     out = tmp_path / "case1.parquet"
     run_campaign(campaign, ResultStore(out, campaign), Executor())
     results, page = Results(out), tmp_path / "case1.html"

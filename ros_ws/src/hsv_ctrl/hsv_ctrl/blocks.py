@@ -52,9 +52,9 @@ class ControllerNode(BlockNode):
 
     def stepped(self, signals: Signals) -> None:
         """Publish the diagnostics, with whether the command was limited; warn of a first command in degrees."""
-        if signals.step == 0 and isinstance(self.component, ExternalController):
-            if doubt := self.component.doubt(signals.diagnostics.u_unsaturated):
-                self.get_logger().warning(doubt)
+        custom = isinstance(self.component, ExternalController) and signals.step == 0
+        if custom and (doubt := self.component.doubt(signals.diagnostics.u_unsaturated)):
+            self.get_logger().warning(doubt)
         self.diagnose(signals, saturated=bool(signals.saturated.any()))
 
 

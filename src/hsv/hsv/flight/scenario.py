@@ -232,8 +232,8 @@ def _with_definition(table: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def _own_text(name: str) -> str:
-    if name not in scenario_names() and (Path(name).is_dir() or name.endswith(".mcap")):
-        raise ScenarioError(f"scenario {name!r}: a folder or bag, expected a TOML file (hsv replay {name} flies a bag)")
+    if name not in scenario_names() and (name.endswith(".mcap") or any(Path(name).glob("*.mcap*"))):
+        raise ScenarioError(f"scenario {name!r}: a bag, expected a TOML file (hsv replay {name} flies a bag again)")
     if is_path(name):
         try:
             return read_text(Path(name))
@@ -341,7 +341,7 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
 
 
 def _validated(given: dict[str, Any], reading: Reading) -> Scenario:
-    """Return the scenario with the ``given`` fields; the ScenarioError of the first wrong one has notes on the others."""
+    """Return the scenario with the ``given`` fields; the error for the first wrong one has notes on the others."""
     try:
         return Scenario.model_validate(given, context=reading)
     except ValidationError as error:
