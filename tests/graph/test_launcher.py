@@ -31,7 +31,7 @@ def domain(monkeypatch):
 @pytest.mark.parametrize("namespace", [ROOT, "/veh1", "/a" * 90])
 def test_domain_and_namespace_belong_to_one_run(namespace):
     with launcher(namespace):
-        with pytest.raises(RunError, match=f"another run has ROS_DOMAIN_ID={DOMAIN}"), launcher(namespace):
+        with pytest.raises(ParameterError, match=f"another run has ROS_DOMAIN_ID={DOMAIN}"), launcher(namespace):
             pass
         with launcher("/other"):
             pass
@@ -43,11 +43,30 @@ def test_a_node_that_runs_by_hand_is_named(node):
     held = claim("topic", DOMAIN, "/veh1/hsv/command")
     assert held is not None and claim("topic", DOMAIN, "/veh1/hsv/command") is None
     refused = "publishes /veh1/hsv/command already: expected no other tube_mpc there"
-    with held, pytest.raises(RunError, match=refused), launcher("/veh1", node):
+    with held, pytest.raises(ParameterError, match=refused), launcher("/veh1", node):
         pass
     # The refused run has released the names that it claimed.
     with launcher("/veh1"):
         pass
+
+
+def test_a_run_takes_a_free_domain_if_none_is_set_and_the_first_one_is_busy(monkeypatch):
+    monkeypatch.setattr("hsv.graph.launcher._DOMAINS", range(DOMAIN, DOMAIN + 3))
+    monkeypatch.setattr("hsv.graph.launcher.ros_domain", lambda: int(os.environ.get("ROS_DOMAIN_ID", DOMAIN)))
+    monkeypatch.setenv("ROS_DOMAIN_ID", "")
+    monkeypatch.delenv("ROS_DOMAIN_ID")
+    lines = []
+
+    def run():
+        return Launcher([], [], print, lambda node, text: lines.append(text), any_domain=True)
+
+    held = claim("domain", DOMAIN, "")
+    with held, run() as first:
+        assert lines[0] == f"export ROS_DOMAIN_ID={DOMAIN + 1}" == f"export ROS_DOMAIN_ID={os.environ['ROS_DOMAIN_ID']}"
+        assert first
+        # A domain that the user has set is not changed.
+        with pytest.raises(ParameterError, match="another run has"), run():
+            pass
 
 
 @pytest.mark.parametrize("text", ["seven", "-1", "300", "025", "1.0"])

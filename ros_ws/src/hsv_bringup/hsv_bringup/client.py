@@ -174,8 +174,8 @@ def answer(text: str, values: Mapping[str, Any], as_json: bool) -> None:
     print(json_text(values) if as_json else text, flush=True)
 
 
-def acting_from(run: Run, step: int) -> tuple[str, dict[str, Any]]:
-    """Return the time of ``step`` as text, and ``step`` and ``time_s`` as values by name.
+def acting_from(client: GraphClient, run: Run, step: int) -> tuple[str, dict[str, Any]]:
+    """Return the time of ``step`` and the run as text, and ``step``, ``time_s`` and ``run_id`` as values by name.
 
     Raises:
         RunError: The run ends before ``step``.
@@ -183,7 +183,8 @@ def acting_from(run: Run, step: int) -> tuple[str, dict[str, Any]]:
     if step > run.last_step:
         raise RunError(f"the run ends with step {run.last_step}: what begins at step {step} does not act any more")
     time = step * run.period
-    return f"t = {time:.2f} s", {"step": step, "time_s": round(time, 9)}
+    values = {"step": step, "time_s": round(time, 9), "run_id": run.run_id}
+    return f"t = {time:.2f} s (run {run.run_id[:8]}, {client.where})", values
 
 
 def _refuse(problem: object, code: int) -> int:

@@ -37,7 +37,7 @@ def _change(client: GraphClient, options: SimpleNamespace, kind: type, request: 
     response = client.call(FAULT_INJECTOR, kind, request)
     if not response.success:
         raise ParameterError(response.message)
-    time, values = acting_from(run, response.step)
+    time, values = acting_from(client, run, response.step)
     answer(f"{response.message}, {time}", {"message": response.message, **values}, options.json)
 
 
@@ -50,7 +50,7 @@ def _list(client: GraphClient, options: SimpleNamespace) -> None:
         raise RunError(f"no step is flown: no message on {name}")
     status = statuses[-1]
     active = [fault_in(message) for message in status.active]
-    time, values = acting_from(run, status.step)
+    time, values = acting_from(client, run, status.step)
     words = "; ".join(map(str, active)) or "no fault"
     values["active"] = [{"channel": f.channel, "type": f.type, "parameters": f.parameters} for f in active]
     answer(f"step {status.step}, {time}: {words}", values, options.json)
@@ -67,7 +67,7 @@ def _command(client: GraphClient, options: SimpleNamespace) -> None:
     response = client.call(NOMINAL_TRAJECTORY, SetCommand, SetCommand.Request(**fields))
     if not response.success:
         raise ParameterError(response.message)
-    time, values = acting_from(run, response.step)
+    time, values = acting_from(client, run, response.step)
 
     rejected = f"rejected {response.message}: "
 
@@ -106,7 +106,7 @@ def _set(client: GraphClient, options: SimpleNamespace) -> None:
     result: SetParametersResult = response.results[0]
     if not result.successful:
         raise ParameterError(result.reason)
-    time, values = acting_from(run, step_in(result.reason))
+    time, values = acting_from(client, run, step_in(result.reason))
     named = {"node": node.name, "parameter": parameter.name, "value": value}
     answer(f"{result.reason}, {time}", named | values, options.json)
 

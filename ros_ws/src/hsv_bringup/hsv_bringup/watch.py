@@ -36,6 +36,7 @@ def watch_flight(client: GraphClient, options: SimpleNamespace) -> None:
         if client.count_publishers(state):
             raise RunError(f"no step on {state}: expected a run that is not paused (hsv set paused false)")
         raise RunError(f"no run in {client.where}: expected hsv run, or nodes started by hand there")
+    print(f"flight in {client.where}", file=sys.stderr, flush=True)
     moves = sys.stdout.isatty() and not options.json
     shown = 0.0
 

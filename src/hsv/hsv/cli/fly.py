@@ -118,7 +118,9 @@ def run(
 
     def line(node: str, text: str) -> None:
         # The user needs the addresses of the live view even without --verbose.
-        if verbose or WARNING in text or (node == LIVE.label and text.startswith("live ")):
+        if not node:
+            output.errors.print(text)
+        elif verbose or WARNING in text or (node == LIVE.label and text.startswith("live ")):
             output.report_line(node, text)
 
     try:

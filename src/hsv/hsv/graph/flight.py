@@ -9,6 +9,7 @@ from pathlib import Path
 
 from hsv.bags.description import ROOT, TOPICS
 from hsv.base.errors import RecordingError, RunError
+from hsv.control.controller import NODE
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.preparation import PreparedRun
 
@@ -27,11 +28,14 @@ def fly_graph(
 
     Raises:
         RunError: A process failed or is not built, or the bag cannot be repaired; the message has the last error line.
+        ParameterError: Another run has the domain and the namespace.
     """
     failures = []
     try:
         arguments = parameter_arguments(prepared.parameter_files)
-        with Launcher(prepared.nodes, arguments, on_step, on_line, prepared.step_timeout, namespace) as launcher:
+        # A controller that is started by hand must know the domain.
+        own = prepared.scenario.controller != NODE
+        with Launcher(prepared.nodes, arguments, on_step, on_line, prepared.step_timeout, namespace, own) as launcher:
             launcher.wait()
     except RunError as error:
         failures.append(str(error))

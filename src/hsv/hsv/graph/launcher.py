@@ -10,7 +10,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -27,7 +27,7 @@ from hsv.bags.description import (
     graph,
     resolved,
 )
-from hsv.base.errors import RunError
+from hsv.base.errors import ParameterError, RunError
 from hsv.base.processes import ENDING, choose_log_folder, end_with_parent, uninterrupted
 from hsv.graph.exclusive import claim, is_published, ros_domain
 from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
@@ -41,6 +41,9 @@ WARNING = "[WARN] "
 
 _LOOK = 0.02
 """Time (s) between two checks of the processes."""
+
+_DOMAINS = range(41)
+"""ROS domains that a run may take; the tests use others."""
 
 _FLYING = (PLANT, COMPOSED)
 """Processes that report the steps of the flight."""
@@ -114,6 +117,7 @@ class Launcher:
         on_line: Callable[[str, str], None],
         wait_timeout: float = 10.0,
         namespace: str = ROOT,
+        any_domain: bool = False,
     ) -> None:
         """Prepare to start processes.
 
@@ -125,10 +129,13 @@ class Launcher:
             wait_timeout: Time (s, at least HUNG_AFTER) without progress after which a process fails the run: until
                 the first step any except the live view, then only the last.
             namespace: Namespace of all nodes.
+            any_domain: Whether to take a free ROS domain if domain 0 is busy and ROS_DOMAIN_ID is not set; the first
+                line, of no node, is then the command that sets it.
         """
         self._nodes = list(nodes)
         self._arguments = [*arguments, *(["-r", f"__ns:={namespace}"] if namespace != ROOT else [])]
         self._namespace = namespace
+        self._any_domain = any_domain and not os.environ.get("ROS_DOMAIN_ID")
         self._on_step = on_step
         self._on_line = on_line
         self._wait_timeout = max(wait_timeout, HUNG_AFTER)
@@ -139,7 +146,7 @@ class Launcher:
     def __enter__(self) -> Launcher:
         choose_log_folder()
         paths = [executable(node) for node in self._nodes]
-        self._claims.enter_context(claim_graph(self._nodes, self._namespace))
+        self._claims.enter_context(self._claim())
         try:
             for description, path in zip(self._nodes, paths, strict=True):
                 self._start(description, path)
@@ -190,6 +197,16 @@ class Launcher:
                     return code
                 raise RunError(f"{last.description.label} {_ending(last, code)}")
             time.sleep(_LOOK)
+
+    def _claim(self) -> socket.socket:
+        for domain in _DOMAINS if self._any_domain else ():
+            with suppress(ParameterError):
+                held = claim_graph(self._nodes, self._namespace)
+                if domain:
+                    self._on_line("", f"export ROS_DOMAIN_ID={domain}")
+                return held
+            os.environ["ROS_DOMAIN_ID"] = str(domain + 1)
+        return claim_graph(self._nodes, self._namespace)
 
     def _await_first_words(self, process: _Process) -> None:
         """Wait until the viewer has reported its addresses, ended or hung; it then sees the flight from its start."""
@@ -260,19 +277,21 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
     The nodes of two runs would receive each other's messages, and both runs would fail.
 
     Raises:
-        RunError: Another run has this namespace in this domain, or a node publishes a topic of one of ``nodes``.
-        ParameterError: ROS_DOMAIN_ID is invalid, or nodes cannot find each other, see :func:`ros_domain`.
+        ParameterError: Another run has this namespace in this domain, a node publishes a topic of one of ``nodes``,
+            ROS_DOMAIN_ID is invalid, or nodes cannot find each other, see :func:`ros_domain`.
     """
     domain = ros_domain()
     where = f"ROS_DOMAIN_ID={domain}{f' and namespace {namespace}' if namespace != ROOT else ''}"
     held = claim("domain", domain, namespace.rstrip("/"))
     if held is None:
-        raise RunError(f"another run has {where}: expected a separate domain or namespace for every run")
+        raise ParameterError(f"another run has {where}: expected a separate domain or namespace for every run")
     for node in graph() if COMPOSED in nodes else nodes:
         for topic in (resolved(name, namespace) for name in node.own_topics):
             if is_published(domain, topic):
                 held.close()
-                raise RunError(f"a node with {where} publishes {topic} already: expected no other {node.name} there")
+                raise ParameterError(
+                    f"a node with {where} publishes {topic} already: expected no other {node.name} there"
+                )
     return held
 
 
