@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from hsv.bags.description import COMPOSED, ROOT, TUBE_MPC
-from hsv.base.errors import ParameterError, RunError
+from hsv.base.errors import ParameterError
 from hsv.graph.exclusive import claim
 from hsv.graph.launcher import Launcher
 

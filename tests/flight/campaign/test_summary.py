@@ -66,7 +66,7 @@ def partly(tmp_path_factory):
     folder = tmp_path_factory.mktemp("partly")
     (folder / "deep.toml").write_text(DEEP)
     factors = {"fault[0].effectiveness": (0.2, 0.9)}
-    campaign = plan(str(folder / "deep.toml"), samples=32, commit="test", factors=factors)
+    campaign = plan(str(folder / "deep.toml"), samples=32, factors=factors)
     run_campaign(campaign, ResultStore(folder / "deep.parquet", campaign), Executor())
     return Results(folder / "deep.parquet")
 
