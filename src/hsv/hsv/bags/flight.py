@@ -8,7 +8,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from hsv.bags.columns import Columns
-from hsv.bags.description import ACTUATOR, COMMAND, FILTERED_STATE, FORCES, MEASUREMENT, NOMINAL, STATE
+from hsv.bags.description import (
+    ACTUATOR,
+    COMMAND,
+    FILTERED_STATE,
+    FORCES,
+    MEASUREMENT,
+    NOMINAL,
+    STATE,
+    TUBE_STATUS,
+)
 from hsv.bags.reader import Bag
 from hsv.bags.steps import cut_off, expected_stamps, joined
 from hsv.flight.fingerprint import fingerprint
@@ -69,6 +78,13 @@ def flight_data(bag: Bag) -> FlightData:
         reference=state_columns(nominal, "reference."),
         fault_start=float(status["header.stamp"][acting[0]]) * 1e-9 if len(acting) else None,
     )
+
+
+def published_levels(bag: Bag) -> np.ndarray | None:
+    """Return the tube level at the steps of :func:`flight_data`, as the controller published it; None without one."""
+    if TUBE_STATUS not in bag.roles:
+        return None
+    return np.asarray(joined(bag, (STATE, NOMINAL, COMMAND, TUBE_STATUS))[TUBE_STATUS]["level"])
 
 
 def flight_fingerprint(bag: Bag) -> str | None:

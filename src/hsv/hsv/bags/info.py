@@ -23,11 +23,13 @@ from hsv.bags.description import (
 from hsv.bags.flight import (
     effectors,
     equipment_topics,
+    flight_data,
     flight_fingerprint,
     held,
     input_columns,
     measurement_errors,
     moving_air,
+    published_levels,
 )
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
@@ -38,6 +40,7 @@ from hsv.certificate.coverage import FlownFault, uncovered
 from hsv.control.design import design_of
 from hsv.control.design_file import FORMAT
 from hsv.flight.fingerprint import as_published
+from hsv.flight.requirement import margins, requirement_rows
 from hsv.flight.scenario import Scenario, parse_scenario
 from hsv.model.faults.injector import NEVER_TIME
 from hsv.model.faults.table import FAULT_KINDS, SENSOR
@@ -57,9 +60,10 @@ def describe(bag: Bag) -> dict[str, Any]:
         without a published value), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
         entry per interval), ``equipment`` (deviations of sensors, links, effectors and air from the ideal, SI),
         ``step_times`` (wall times of the steps of the control law in ms, by node, and the control period),
-        ``saturation``, ``tube`` and ``not_covered`` (texts: properties of the flight outside the certificate of its
-        design). From ``ending`` on, an entry is None if its topics or other data for it are missing. Names that end in
-        ``_s`` are simulated times in seconds; ``end_s`` is None if an interval lasts until the end of the bag.
+        ``requirements`` (rows of :func:`hsv.flight.requirement.requirement_rows`), ``saturation``, ``tube`` and
+        ``not_covered`` (texts: properties of the flight outside the certificate of its design). From ``ending`` on, an
+        entry is None if its topics or other data for it are missing. Names that end in ``_s`` are simulated times in
+        seconds; ``end_s`` is None if an interval lasts until the end of the bag.
     """
     start, end = bag.span
     fingerprint, warnings = None, bag_warnings(bag)
@@ -87,6 +91,7 @@ def describe(bag: Bag) -> dict[str, Any]:
         "faults": faults,
         "equipment": _equipment(bag) if STATE in bag.roles else None,
         "step_times": _step_times(bag) if DIAGNOSTICS in bag.roles and STATE in bag.roles else None,
+        "requirements": _requirements(bag),
         "saturation": _saturation(bag) if COMMAND in bag.roles else None,
         "tube": _tube(bag) if TUBE_STATUS in bag.roles else None,
         "not_covered": _not_covered(bag, faults) if TUBE_STATUS in bag.roles else None,
@@ -99,6 +104,20 @@ def _scenario(bag: Bag) -> Scenario | None:
         return parse_scenario(bag.text("scenario.toml"), bag.custom_data.get("scenario", ""))
     except HsvError:
         return None
+
+
+def _requirements(bag: Bag) -> list[dict[str, Any]] | None:
+    """Return the margins of the requirements of the attached scenario; None if no step of the flight is complete."""
+    scenario = _scenario(bag)
+    if not scenario or not scenario.requirement:
+        return []
+    try:
+        flight = flight_data(bag)
+    except (RecordingError, KeyError):
+        return None
+    ended = ending(bag) == "finished"
+    found = margins(scenario.requirement, flight, ended=ended, levels=lambda: published_levels(bag))
+    return requirement_rows(scenario.requirement, found, flight.time)
 
 
 def _topic(bag: Bag, name: str) -> dict[str, Any]:

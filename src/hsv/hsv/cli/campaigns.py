@@ -177,7 +177,7 @@ def replay(
     Example: hsv montecarlo replay campaigns/case1_corners.parquet --flight 17 --over-dds
     """
     from hsv.cli.summary import sample_words
-    from hsv.flight.campaign.sample_runner import OUTCOMES
+    from hsv.flight.campaign.sample_runner import outcomes_of
     from hsv.flight.campaign.summary import Results
     from hsv.flight.metrics import is_share
     from hsv.graph.campaign_replay import replay_in_process, replay_over_dds
@@ -192,7 +192,8 @@ def replay(
     else:
         replayed = replay_in_process(results, flight)
     outcome, differing, sample = replayed.repeated, replayed.differing, results.sample(flight)
-    quantities = {name: (float(v), unit) for name, unit in OUTCOMES.items() if (v := outcome.get(name)) is not None}
+    known = outcomes_of(results.campaign.scenario)
+    quantities = {name: (float(v), unit) for name, unit in known.items() if (v := outcome.get(name)) is not None}
     if json:
         output.print_json(
             {

@@ -164,7 +164,9 @@ def simulate(
     from hsv.flight.assembly import assemble_flight, blamed_on, uncovered_of
     from hsv.flight.closed_loop import fly
     from hsv.flight.flight import step_statistics
+    from hsv.flight.requirement import margins, requirement_rows
     from hsv.flight.scenario import load_scenario
+    from hsv.flight.side_by_side import TubeLevels
     from hsv.flight.tables import read_changes
     from hsv.model.plant import FlightStatus
 
@@ -184,13 +186,16 @@ def simulate(
         columns: dict[str, Any] = {"time": flight.time, **flight.history.columns()}
         with writing(out, "out"), out.open("wb") as stream:
             np.savez_compressed(stream, **columns)
+    ended = flight.status is not FlightStatus.DIVERGED
+    levels = TubeLevels(components)
+    found = margins(loaded.requirement, flight, ended=ended, levels=lambda: levels.along(flight))
     flown = FlightSummary(
         loaded,
         flight.metrics,
         flight.missing,
         fingerprint=flight.fingerprint,
         design_hash=design.digest if design else digest({}),
-        ending="diverged" if flight.status is FlightStatus.DIVERGED else "finished",
+        ending="finished" if ended else "diverged",
         simulated_time=float(flight.time[-1]),
         wall_time=wall_time,
         not_covered=[*uncovered_of(loaded, design), *uncovered_rates(design, flight.history.state)],
@@ -199,6 +204,7 @@ def simulate(
             "nodes": {name: step_statistics(times) for name, times in flight.law_times.items()},
             "loop_mean_ms": 1e3 * wall_time / len(flight.time),
         },
+        requirements=requirement_rows(loaded.requirement, found, flight.time),
     )
     report_flight(flown, units, json, strict, every)
 
@@ -324,6 +330,7 @@ def _conclude(
         wall_time=wall_time,
         not_covered=description["not_covered"],
         step_times=description["step_times"],
+        requirements=description["requirements"] or (),
         files=files,
     )
     report_flight(flown, units, json, strict, every)

@@ -178,7 +178,7 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
     from hsv.bags.steps import completeness
     from hsv.base.errors import RecordingError
     from hsv.cli.summary import print_metrics
-    from hsv.flight.metrics import METRICS
+    from hsv.flight.metrics import metric_of
 
     description = describe(opened)
     problem, remark = None, ""
@@ -189,10 +189,11 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
         if not lacking:
             flown = flight_data(opened)
             metrics, missing, remark = flown.metrics, flown.missing, completeness(opened)
+            metrics = metrics | {row["metric"]: row["margin"] for row in description["requirements"] or ()}
     except RecordingError as error:
         # The other contents help to see what is wrong with the bag.
         problem = error
-    quantities = {name: (value, METRICS[name].unit) for name, value in metrics.items()}
+    quantities = {name: (value, metric_of(name).unit) for name, value in metrics.items()}
     if not json:
         _print_description(description, units)
         if lacking:
@@ -229,6 +230,14 @@ def _print_description(description: dict[str, Any], units: UnitSystem) -> None:
     if description["not_covered"]:
         heading["not covered"] = "; ".join(map(str, description["not_covered"]))
     output.print_section("bag", heading)
+    if required := description["requirements"]:
+        table = output.new_table("id", "requirement", "margin", "verdict", "fingerprint", right=["margin"])
+        for row in required:
+            decided = "" if row["decided_at_s"] is None else f", decided at {row['decided_at_s']:g} s"
+            verdict = f"{'kept' if row['kept'] else 'broken'}{decided}"
+            shown = (description["fingerprint"] or "")[:15]
+            table.add_row(row["id"], f"{row['name']}: {row['requirement']}", significant(row["margin"]), verdict, shown)
+        output.console.print(table)
     table = output.new_table("topic", "type", "messages", "rate Hz", right=("messages", "rate Hz"))
     for topic in description["topics"]:
         table.add_row(topic["name"], topic["type"], str(topic["messages"]), significant(topic["rate_hz"] or 0.0))

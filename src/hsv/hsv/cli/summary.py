@@ -17,7 +17,7 @@ from hsv.cli import output
 from hsv.flight.fingerprint import as_published, published_in_words
 from hsv.flight.flight import step_times_in_words
 from hsv.flight.limits import Verdict, in_units, limits_kept, not_judged, verdict_sentence, verdicts
-from hsv.flight.metrics import METRICS, NOT_REACHED, Group, is_share, spaced
+from hsv.flight.metrics import NOT_REACHED, grouped, is_share, metric_of, spaced
 from hsv.flight.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class FlightSummary:
 
     scenario: Scenario
     metrics: Mapping[str, float]
-    """Metrics by name, in SI units."""
+    """Metrics by name, in SI units, without the margins of requirements."""
     missing: Mapping[str, str]
     """The reason for each metric that the flight does not define, by name."""
     fingerprint: str | None
@@ -50,6 +50,8 @@ class FlightSummary:
     """Items of the flight that the certificate does not cover; None if unknown."""
     step_times: dict[str, Any] | None = None
     """Statistics of the wall times of steps, see :func:`hsv.bags.info.describe`; None if unknown."""
+    requirements: Sequence[Mapping[str, Any]] = ()
+    """Margins of the requirements, see :func:`hsv.flight.requirement.requirement_rows`."""
     files: Mapping[str, Path] = field(default_factory=dict)
     """Paths of the written files, by the names under which they are printed."""
 
@@ -64,7 +66,8 @@ def report_flight(
     """
     scenario, time, wall_time = flight.scenario, flight.simulated_time, flight.wall_time
     finished = flight.ending == "finished"
-    judged = verdicts(scenario, flight.metrics, flight.missing, ended=finished)
+    metrics = {**flight.metrics, **{row["metric"]: row["margin"] for row in flight.requirements}}
+    judged = verdicts(scenario, metrics, flight.missing, ended=finished)
     kept = finished and all(verdict.kept for verdict in judged.values())
     margin_kept, margin_words = None, ""
     if scenario.disk_margin is not None:
@@ -80,9 +83,10 @@ def report_flight(
                 "scenario": scenario.name,
                 "diverged_at_s": time if flight.ending == "diverged" else None,
                 "within_limits": kept,
-                "not_judged": not_judged(judged, flight.metrics),
+                "not_judged": not_judged(judged, metrics),
                 **({"disk_margin": {"kept": margin_kept, "words": margin_words}} if margin_words else {}),
-                "metrics": output.to_json({name: (v, METRICS[name].unit) for name, v in flight.metrics.items()}, units),
+                "metrics": output.to_json({name: (v, metric_of(name).unit) for name, v in metrics.items()}, units),
+                **({"requirements": flight.requirements} if flight.requirements else {}),
                 "missing": flight.missing,
                 "fingerprint": flight.fingerprint,
                 "as_published": same,
@@ -103,9 +107,9 @@ def report_flight(
             # The fingerprint is almost as wide as a terminal, so it has a line of its own.
             "fingerprint": f"{published_in_words(flight.fingerprint, same)}\n{flight.fingerprint or ''}".rstrip(),
         }
-        print_metrics(scenario.title, flight.metrics, flight.missing, units, judged, every)
+        print_metrics(scenario.title, metrics, flight.missing, units, judged, every)
         output.print_section("run", run)
-        words = verdict_sentence(judged, flight.metrics, units) if every else limits_kept(judged, units)
+        words = verdict_sentence(judged, metrics, units) if every else limits_kept(judged, units)
         words = "; ".join(filter(None, (words, margin_words)))
         style = "bold red" if not kept else "bold green" if judged else "bold"
         output.console.print(Text.assemble(("verdict ", "bold"), (words, style)))
@@ -134,23 +138,25 @@ def print_metrics(
     table.columns[2].no_wrap = True
     late = [name for name, why in missing.items() if why.startswith(NOT_REACHED)]
     known = [*metrics, *late, *(name for name in judged or () if name not in metrics)]
-    for group in Group:
-        names = [name for name in METRICS if name in known and METRICS[name].group is group]
-        if names:
-            table.add_row(Text(group, "bold"))
-        for name in names:
-            metric, verdict = METRICS[name], (judged or {}).get(name)
+    for group, named in grouped(known).items():
+        table.add_row(Text(group, "bold"))
+        for name, metric in named.items():
+            verdict = (judged or {}).get(name)
             number, unit = in_system(metrics.get(name, math.nan), metric.unit, units, share=metric.share)
             value = significant(number) if name in metrics else "-"
             remark = Text("not judged" if every and judged is not None else missing.get(name, ""), "dim")
             if verdict and verdict.words == "not flown to the end":
                 remark = Text(verdict.words, "red")
+            elif verdict and verdict.requirement:
+                own = ": ".join(filter(None, (verdict.requirement.id, verdict.requirement.words(units))))
+                remark = Text(f"{verdict.words} ({own})", "green" if verdict.kept else "red")
             elif verdict:
                 limit = in_units(name, verdict.limit, units)
                 text = f"{verdict.words} (limit {limit})" if verdict.value is None else f"{verdict.words} {limit}"
                 text = text if verdict.applies else verdict.words
                 remark = Text(text, "green" if verdict.words == "within" else "dim" if verdict.kept else "red")
-            table.add_row("  " + spaced(name), value, "" if unit == "1" else unit, remark)
+            label = verdict.requirement.name if verdict and verdict.requirement else spaced(name)
+            table.add_row("  " + label, value, "" if unit == "1" else unit, remark)
     output.console.print(table)
     for reason in dict.fromkeys(why for name, why in missing.items() if name not in late):
         words = ", ".join(spaced(name) for name, why in missing.items() if why == reason)

@@ -372,8 +372,8 @@ void hsv_lag_response(const hsv_polytope *polytope, const double *gain, const hs
                       double *errors, double *feedback);
 void hsv_sample_sequences(int64_t vertices, int64_t rows, int64_t width, const double *columns, int64_t n,
                           const double *begin, int64_t first, int64_t end, int64_t steps, uint64_t seed, double *worst);
-double hsv_worst_level(const hsv_tube_set *set, int64_t steps, const double *state, const double *deviation,
-                       const double *reference);
+double hsv_levels(const hsv_tube_set *set, int64_t steps, const double *state, const double *deviation,
+                  const double *reference, double *levels);
 void hsv_curves(int64_t steps, int64_t stride, const double *history, const double *auxiliary, const double *reference,
                 double *curves, uint8_t *saturated);
 /* end */

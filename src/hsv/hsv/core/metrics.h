@@ -9,9 +9,9 @@ typedef struct {
     real worst;                                               /* largest level so far; NaN persists */
 } LevelMemory;
 
-/* Update the largest level (e - c)' P (e - c) by step k, with e = (x - x_r - x_n, s - s_n) in the rigid states and the
- * states of the notch filter. */
-static inline void level_step(const hsv_tube_set *set, LevelMemory *memory, int64_t k, const real *x, const real *x_r,
+/* Return the level (e - c)' P (e - c) of step k, with e = (x - x_r - x_n, s - s_n) in the rigid states and the states
+ * of the notch filter, and update the largest level by it. */
+static inline real level_step(const hsv_tube_set *set, LevelMemory *memory, int64_t k, const real *x, const real *x_r,
                               const real *x_n)
 {
     const int64_t states = 2 * set->notch.sections, rigid = set->size - states;
@@ -29,16 +29,17 @@ static inline void level_step(const hsv_tube_set *set, LevelMemory *memory, int6
     memory->worst = choose(kept, memory->worst, value);
     notch_step(&set->notch, memory->actual, x[PITCH_RATE]);
     notch_step(&set->notch, memory->planned, x_r[PITCH_RATE] + x_n[PITCH_RATE]);
+    return value;
 }
 
 #ifdef BASE
-/* Return the largest level of x, x_n and x_r (steps, 9). */
-double hsv_worst_level(const hsv_tube_set *set, int64_t steps, const double *state, const double *deviation,
-                       const double *reference)
+/* Write the levels (steps) of x, x_n and x_r (steps, 9), and return the largest one. */
+double hsv_levels(const hsv_tube_set *set, int64_t steps, const double *state, const double *deviation,
+                  const double *reference, double *levels)
 {
     LevelMemory memory;
     for (int64_t k = 0; k < steps; k++)
-        level_step(set, &memory, k, state + STATES * k, reference + STATES * k, deviation + STATES * k);
+        levels[k] = level_step(set, &memory, k, state + STATES * k, reference + STATES * k, deviation + STATES * k);
     return memory.worst;
 }
 

@@ -1,19 +1,24 @@
-"""The verdict on a flight: its metrics against the limits that its scenario states."""
+"""The verdict on a flight: its metrics against the limits and requirements that its scenario states."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from hsv.base.units import UnitSystem, in_system, significant
-from hsv.flight.metrics import CRITERIA, METRICS, NOT_REACHED, spaced
+from hsv.flight.metrics import CRITERIA, NOT_REACHED, metric_of, spaced
+from hsv.flight.requirement import Requirement
 from hsv.flight.scenario import Scenario
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """A ``limit`` (SI) of a metric and the metric's ``value``, None if the flight does not define the metric."""
+    """A ``limit`` (SI) of a metric and the metric's ``value``, None if the flight does not define the metric.
+
+    If the metric is the margin of a ``requirement``, the value must be at least the limit, which is 0; otherwise its
+    magnitude must be at most the limit.
+    """
 
     limit: float
     value: float | None
@@ -21,6 +26,7 @@ class Verdict:
     """Whether the flight reached its end; a flight that did not may exceed a limit but never keeps one"""
     missing: str = NOT_REACHED
     """The reason if there is no value, as in :attr:`hsv.flight.metrics.FlightData.missing`"""
+    requirement: Requirement | None = None
 
     @property
     def applies(self) -> bool:
@@ -29,13 +35,15 @@ class Verdict:
 
     @property
     def kept(self) -> bool:
-        """Whether the flight reached its end and did not exceed the limit."""
-        return not self.applies or self.words == "within"
+        """Whether the flight reached its end and kept the limit or requirement."""
+        return not self.applies or self.words in ("within", "kept")
 
     @property
     def words(self) -> str:
-        """The verdict: ``within``, ``over``, ``not flown to the end``, or why there is no value."""
-        if self.value is not None and not abs(self.value) <= self.limit:
+        """The verdict: ``within`` or ``kept``, ``over`` or ``broken``, ``not flown to the end``, or why it has no value."""
+        if self.requirement and self.ended:
+            return "kept" if self.value is not None and self.value >= self.limit else "broken"
+        if self.value is not None and not self.requirement and not abs(self.value) <= self.limit:
             return "over"
         if not self.ended:
             return "not flown to the end"
@@ -47,19 +55,21 @@ class Verdict:
 def verdicts(
     scenario: Scenario, metrics: Mapping[str, float], missing: Mapping[str, str], *, ended: bool
 ) -> dict[str, Verdict]:
-    """Return the verdict for each metric that ``scenario`` limits, by name.
+    """Return the verdict on each limit and requirement of ``scenario``, by the name of the metric.
 
-    ``metrics`` and ``missing`` are those of the flight; ``ended``: it reached its end.
+    ``metrics`` (with the margins of requirements) and ``missing`` are those of the flight; ``ended``: it reached its end.
     """
-    return {
+    limited = {
         name: Verdict(limit, metrics.get(name), ended, missing.get(name, NOT_REACHED))
         for name, limit in scenario.limits.items()
     }
+    required = {r.metric: Verdict(0.0, metrics.get(r.metric), ended, requirement=r) for r in scenario.requirement}
+    return limited | required
 
 
 def in_units(name: str, value: float, system: UnitSystem) -> str:
     """Return the ``value`` (SI) of the metric ``name`` as text in ``system``: three significant digits and the unit."""
-    metric = METRICS[name]
+    metric = metric_of(name)
     number, unit = in_system(value, metric.unit, system, share=metric.share)
     return significant(number) + ("" if unit == "1" else f" {unit}")
 
@@ -94,19 +104,35 @@ def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem) -> str:
     if not judged:
         return "not judged: the scenario has no limits"
     others = Counter(verdict.missing for verdict in judged.values() if not verdict.applies)
-    count = len(judged) - others.total()
+    applied = [verdict for verdict in judged.values() if verdict.applies]
     free = [f"{n} {'does' if n == 1 else 'do'} not apply: {why}" for why, n in others.items()]
     if all(verdict.kept for verdict in judged.values()):
-        kept = f"within {'its limit' if count == 1 else f'all {count} limits'}" if count else "not judged"
+        kept = f"within {_counted(applied)}" if applied else "not judged"
         return "; ".join([kept, *free])
     over = [(name, v) for name, v in judged.items() if not v.kept and (v.ended or v.words == "over")]
 
     def broken(name: str, verdict: Verdict) -> str:
         if verdict.value is None:
             return f"{spaced(name)} {verdict.words}"
+        if verdict.requirement:
+            return f"{verdict.requirement.name} ({verdict.requirement.words(system)}), margin {verdict.value:.3g}"
         number, limit = (in_units(name, value, system) for value in (verdict.value, verdict.limit))
         return f"{spaced(name)} {number} (limit {limit})"
 
     said = ", ".join(broken(*each) for each in over)
     head = [] if all(verdict.ended for verdict in judged.values()) else ["not flown to the end"]
-    return "; ".join([*head, *([f"{len(over)} of {count} limits not kept: {said}"] if over else []), *free])
+    return "; ".join(
+        [*head, *([f"{len(over)} of {_counted(applied, every='')} not kept: {said}"] if over else []), *free]
+    )
+
+
+def _counted(judged: Sequence[Verdict], every: str = "all ") -> str:
+    """Return the numbers of limits and requirements in words; ``every`` stands before several of them."""
+    required = sum(verdict.requirement is not None for verdict in judged)
+    parts = []
+    for noun, count in (("limit", len(judged) - required), ("requirement", required)):
+        if count == 1 and every:
+            parts.append(f"its {noun}")
+        elif count:
+            parts.append(f"{every}{count} {noun}{'s' if count > 1 or noun == 'limit' else ''}")
+    return " and ".join(parts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -36,6 +37,7 @@ class Group(StrEnum):
     after_the_fault = "after the fault"
     modes = "modes"
     inputs = "inputs"
+    requirements = "requirements"
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,11 @@ METRICS = {
 }
 """The definitions of all metrics by name, in the order in which files contain them."""
 
+MARGIN = "margin_"
+"""Beginning of the names of the margins of requirements (:mod:`hsv.flight.requirement`), which are metrics, too."""
+
+_MARGIN = Metric("1", "margin of the requirement as a share of its bound", Group.requirements)
+
 CRITERIA = (
     "altitude_end_error",
     "velocity_end_error",
@@ -121,6 +128,19 @@ def spaced(name: str) -> str:
 def is_share(name: str) -> bool:
     """Return whether ``name`` is a metric that is a share, displayed in percent."""
     return name in METRICS and METRICS[name].share
+
+
+def metric_of(name: str) -> Metric:
+    """Return the definition of the metric ``name``, which may be the margin of a requirement."""
+    return _MARGIN if name.startswith(MARGIN) else METRICS[name]
+
+
+def grouped(names: Iterable[str]) -> dict[Group, dict[str, Metric]]:
+    """Return the definitions of the metrics with these ``names``, by group and name, in the order of display."""
+    known = dict.fromkeys(names)
+    ordered = [*(name for name in METRICS if name in known), *(name for name in known if name.startswith(MARGIN))]
+    groups = {group: {n: m for n in ordered if (m := metric_of(n)).group is group} for group in Group}
+    return {group: metrics for group, metrics in groups.items() if metrics}
 
 
 CURVES = 10

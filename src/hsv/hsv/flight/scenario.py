@@ -25,6 +25,7 @@ from hsv.control.tube_law import TUBE_PARAMETERS
 from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.distribution import KINDS, Distribution
 from hsv.flight.metrics import METRICS
+from hsv.flight.requirement import Requirement, read_requirements
 from hsv.flight.tables import (
     Breakpoints,
     CommandTable,
@@ -52,7 +53,7 @@ from hsv.plugins.library import find_in, inside
 
 
 class Scenario(Table):
-    """The description of a flight: vehicle, initial point, commands, controller, design, faults, limits of metrics."""
+    """The description of a flight: vehicle, initial point, commands, controller, design, faults, requirements."""
 
     name: str
     title: Annotated[str, Field(pattern=r"\S")]
@@ -74,6 +75,8 @@ class Scenario(Table):
     """Tables of a custom controller, as written in the file; only the class of the controller can interpret them"""
     limits: dict[str, float] = Field(default_factory=dict)
     """Largest admissible magnitudes of metrics, SI, by name"""
+    requirement: tuple[Requirement, ...] = ()
+    """Requirements, whose margins are metrics"""
     disk_margin: float | None = None
     """Smallest admissible disk margin of the elevator loop, from the table of limits; None: none is required"""
 
@@ -311,7 +314,7 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
     mistakes = Mistakes()
     try:
         reading = Reading(VehicleTable.model_construct(**vehicle).described)
-        given = {**table, "name": name, "own": {}, "settings": {}, "limits": {}, "vehicle": vehicle}
+        given = {**table, "name": name, "own": {}, "settings": {}, "limits": {}, "vehicle": vehicle, "requirement": ()}
         with mistakes:
             limits = table_values((*_LIMITS, _DISK_MARGIN), {"limits": table.get("limits", {})})
             given["disk_margin"] = limits.pop(_DISK_MARGIN.name, None)
@@ -323,6 +326,8 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
             }
         with mistakes:
             given["settings"] = table_values(_PARAMETERS, settings, reading.number)
+        with mistakes:
+            given["requirement"] = read_requirements(table.get("requirement", []), table)
         if isinstance(rows := table.get("fault"), list | tuple):
             given["fault"] = [*rows]
             for index, row in enumerate(rows):

@@ -85,10 +85,18 @@ class TubeLevels:
 
         The level is (e - c)' P (e - c) for the tube error e and the invariant set with centre c and matrix P.
         """
+        return None if (found := self._evaluated(flight)) is None else found[0]
+
+    def along(self, flight: FlightData) -> np.ndarray | None:
+        """Return the level at every step, shape (n + 1,), None if no set applies to the flight."""
+        return None if (found := self._evaluated(flight)) is None else found[1]
+
+    def _evaluated(self, flight: FlightData) -> tuple[float, np.ndarray] | None:
         if not self.set:
             return None
         given = [doubles(vector(each)) for each in (flight.history.state, flight.history.deviation, flight.reference)]
-        return float(lib.hsv_worst_level(self.set.pointer, len(flight.time), *given))
+        levels = np.empty(len(flight.time))
+        return float(lib.hsv_levels(self.set.pointer, len(levels), *given, doubles(levels))), levels
 
 
 def fly_each(

@@ -15,7 +15,7 @@ from hsv.base.errors import CampaignError, ControllerError
 from hsv.control.design_file import find_design, read_parameters
 from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.flight.assembly import require_path_inside
-from hsv.flight.campaign.sample_runner import OUTCOMES, Outcome
+from hsv.flight.campaign.sample_runner import Outcome, outcomes_of
 from hsv.flight.campaign.summary import Results
 
 
@@ -47,7 +47,7 @@ def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
         repeated = runner.outcome((flown, runner.tube_level(flown)))
     except ControllerError as error:
         repeated = runner.outcome(error)
-    return ReplayedFlight(flight, _outcome(row), repeated)
+    return ReplayedFlight(flight, _outcome(row, results), repeated)
 
 
 def replay_over_dds(
@@ -87,7 +87,7 @@ def replay_over_dds(
         # The level that the controller published. It belongs to the state that the controller receives, which is the
         # true state of the campaign only without measurement errors and without an estimator.
         repeated["tube_level"] = float(np.max(recorded.columns(TUBE_STATUS)["level"]))
-    return ReplayedFlight(flight, _outcome(row), repeated, bag)
+    return ReplayedFlight(flight, _outcome(row, results), repeated, bag)
 
 
 def require_design(results: Results) -> None:
@@ -107,8 +107,9 @@ def require_design(results: Results) -> None:
         )
 
 
-def _outcome(row: dict[str, Any]) -> Outcome:
-    return {name: row[name] for name in ("diverged", "crashed", *OUTCOMES, "not_reached", "fingerprint") if name in row}
+def _outcome(row: dict[str, Any], results: Results) -> Outcome:
+    outcomes = outcomes_of(results.campaign.scenario)
+    return {name: row[name] for name in ("diverged", "crashed", *outcomes, "not_reached", "fingerprint") if name in row}
 
 
 def _same(a: float | bool | str | None, b: float | bool | str | None) -> bool:

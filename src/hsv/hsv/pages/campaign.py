@@ -22,12 +22,13 @@ from hsv.flight.campaign.summary import (
     Share,
     distributions,
     limits,
+    required,
     shares,
     within_all,
     worst_flights,
 )
 from hsv.flight.flight import Flight
-from hsv.flight.metrics import METRICS, Group, is_share, spaced
+from hsv.flight.metrics import Group, is_share, metric_of, spaced
 from hsv.model.plant import Plant
 from hsv.pages.engine import Numbers, Plot, render, write_page
 from hsv.pages.picture import Picture, picture
@@ -92,7 +93,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
             "metrics": {
                 d.name: {
                     "title": spaced(d.name),
-                    "units": units_of(OUTCOMES[d.name], share=is_share(d.name)),
+                    "units": units_of(OUTCOMES.get(d.name, "1"), share=is_share(d.name)),
                     "y": numbers.add(np.where(results.finished, results.column(d.name), np.nan)[drawn]),
                     "limits": _limits(results, d),
                 }
@@ -133,7 +134,8 @@ def sentence(results: Results) -> str:
     limited = [share for share in limited if share.flights]
     if not limited:
         return f"{ending}; there are no limits to judge them by."
-    text = f"{within_all(results)} of {ended.flights} flights are within all {len(limited)} limits"
+    named = "limits and requirements" if required(results) else "limits"
+    text = f"{within_all(results)} of {ended.flights} flights are within all {len(limited)} {named}"
     if failed := most_failed(judged):
         broken = f"{failed.flights - failed.within} of {failed.flights}{' that reached the end' if lost else ''}"
         text += f"; the limit that most flights break is {spaced(failed.name)} ({broken})"
@@ -149,14 +151,15 @@ def most_failed(judged: Sequence[Share]) -> Share | None:
 
 def _sorted(results: Results, failed: Share, numbers: Numbers) -> Picture:
     """Return the picture of the ``failed`` limit: the limit, and the sorted magnitudes of its metric in its flights."""
-    values = np.abs(results.column(failed.name)[results.finished])
+    values = results.column(failed.name)[results.finished]
+    values = values if failed.name in required(results) else np.abs(values)
     values = np.sort(values)[: failed.flights]  # times that were not reached come last, as NaN
     across = 100.0 * (np.arange(len(values)) + 0.5) / len(values)
     limit = "bound", None, np.array([0.0, 100.0]), np.full(2, failed.limit)
     lines = (limit, ("actual", 0, across, values))
     curves = [{"kind": kind, "run": run, "x": numbers.add(x), "y": numbers.add(y)} for kind, run, x, y in lines]
-    title = f"{capitalised(spaced(failed.name))}, magnitude"
-    plot = Plot("sorted", title, OUTCOMES[failed.name], "", curves, share=is_share(failed.name))
+    title = capitalised(spaced(failed.name)) + ("" if failed.name in required(results) else ", magnitude")
+    plot = Plot("sorted", title, OUTCOMES.get(failed.name, "1"), "", curves, share=is_share(failed.name))
     return picture([plot], numbers, 100.0, axis="flights, in order of magnitude [%]")
 
 
@@ -164,15 +167,19 @@ def _grouped(shown: Sequence[Distribution]) -> dict[str, list[Distribution]]:
     """Return the distributions by group: metrics by their groups, then end time and tube level under :data:`RUN`."""
     groups: dict[str, list[Distribution]] = {group: [] for group in (*Group, RUN)}
     for distribution in shown:
-        groups[METRICS[distribution.name].group if distribution.name in METRICS else RUN].append(distribution)
+        groups[_group(distribution.name)].append(distribution)
     return {group: found for group, found in groups.items() if found}
+
+
+def _group(name: str) -> str:
+    return RUN if name in ("end_time", "tube_level") else metric_of(name).group
 
 
 def _outcome(name: str, value: float, digits: int = 3) -> Markup:
     """Return the ``value`` (SI) of the metric, end time or tube level ``name`` as HTML in all systems of units."""
     if math.isinf(value):
         return Markup("not reached")
-    return quantity(value, OUTCOMES[name], digits, share=is_share(name))
+    return quantity(value, OUTCOMES.get(name, "1"), digits, share=is_share(name))
 
 
 def share_interval(share: Share) -> str:
@@ -261,11 +268,11 @@ def _histogram(results: Results, shown: Distribution, numbers: Numbers) -> Plot:
         f"histogram_{shown.name}",
         capitalised(spaced(shown.name)),
         "1",
-        f"distributions_{METRICS[shown.name].group if shown.name in METRICS else RUN}",
+        f"distributions_{_group(shown.name)}",
         [{"kind": "bars", "label": "flights", "run": None, "x": x, "y": y}],
         limits=_limits(results, shown),
         notes=[note, *([Markup(f"not reached in {shown.not_reached} flights")] if shown.not_reached else [])],
-        x_unit=OUTCOMES[shown.name],
+        x_unit=OUTCOMES.get(shown.name, "1"),
         x_share=is_share(shown.name),
         limits_on="x",
     )
@@ -281,10 +288,10 @@ def _scatter(results: Results, factor: Factor, drawn: np.ndarray, numbers: Numbe
 
 def _limits(results: Results, shown: Distribution) -> list[float]:
     """Return minus and plus the limit (SI) of a metric, each only if it lies within the range of the data."""
-    limit = limits(results).get(shown.name)
+    limit = 0.0 if shown.name in required(results) else limits(results).get(shown.name)
     values = results.column(shown.name)[results.finished]
     low, high = np.nanmin(values, initial=np.inf), np.nanmax(values, initial=-np.inf)
-    return [] if limit is None else [end for end in (-limit, limit) if low <= end <= high]
+    return [] if limit is None else [end for end in {-limit, limit} if low <= end <= high]
 
 
 def _curve(flight: Flight, windows: np.ndarray, index: int) -> np.ndarray:

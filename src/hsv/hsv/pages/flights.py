@@ -9,13 +9,23 @@ from typing import Any
 import numpy as np
 
 from hsv.bags.description import STATE, TUBE_STATUS
-from hsv.bags.flight import effectors, equipment_topics, flight_data, labels, measurement_errors, moving_air
+from hsv.bags.flight import (
+    effectors,
+    equipment_topics,
+    flight_data,
+    labels,
+    measurement_errors,
+    moving_air,
+    published_levels,
+)
 from hsv.bags.info import describe
 from hsv.bags.reader import Bag
 from hsv.bags.steps import completeness, joined
 from hsv.base.errors import HsvError
 from hsv.control.design_file import parse_parameters
 from hsv.flight.limits import Verdict, verdicts
+from hsv.flight.metrics import FlightData
+from hsv.flight.requirement import LEVEL, SIGNALS
 from hsv.flight.scenario import Scenario, parse_scenario
 from hsv.model.signals import INPUT_NAMES
 from hsv.pages.events import Event, flight_events
@@ -75,6 +85,8 @@ class ReportedRun:
     events: list[Event]
     parameters: dict[str, dict[str, Any]]
     """Parameters in the bag by name, under the keys ``scenario`` and ``design``."""
+    required: dict[str, tuple[np.ndarray, np.ndarray]]
+    """Times (s) and values (SI) of the signals that requirements bound, by name"""
     incomplete: str
     """The number of complete steps and the number of all steps, as text; empty if the bag is complete."""
 
@@ -114,7 +126,8 @@ def reported_runs(bags: Sequence[Bag]) -> list[ReportedRun]:
 def _reported_run(bag: Bag, label: str) -> ReportedRun:
     curves = flight_curves(bag)
     description = describe(bag)
-    data, finished = flight_data(bag), description["ending"] == "finished"
+    data, finished, required = flight_data(bag), description["ending"] == "finished", description["requirements"] or ()
+    metrics = data.metrics | {row["metric"]: row["margin"] for row in required}
     names = ("scenario.toml", "scenario.yaml", "design.yaml", "certificate.json")
     texts = {name: bag.attachments.get(name, b"").decode(errors="replace") for name in names}
     scenario, remark = _scenario(texts["scenario.toml"], bag.custom_data.get("scenario", label))
@@ -124,17 +137,23 @@ def _reported_run(bag: Bag, label: str) -> ReportedRun:
         texts=texts,
         scenario=scenario,
         remark=remark,
-        metrics=data.metrics,
+        metrics=metrics,
         missing=data.missing,
-        verdicts=verdicts(scenario, data.metrics, data.missing, ended=finished) if scenario else {},
+        verdicts=verdicts(scenario, metrics, data.missing, ended=finished) if scenario else {},
         curves=curves,
         events=flight_events(bag, description),
         parameters={
             part: parse_parameters(texts[f"{part}.yaml"], f"{bag.path}: {part}.yaml") if texts[f"{part}.yaml"] else {}
             for part in ("scenario", "design")
         },
+        required={name: (data.time, _required(name, data, bag)) for name in {row["signal"]: None for row in required}},
         incomplete=completeness(bag),
     )
+
+
+def _required(name: str, flight: FlightData, bag: Bag) -> np.ndarray:
+    levels = published_levels(bag) if name == LEVEL else None
+    return SIGNALS[name].along(flight) if levels is None else levels
 
 
 def _scenario(text: str, name: str) -> tuple[Scenario | None, str]:

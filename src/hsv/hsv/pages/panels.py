@@ -60,6 +60,7 @@ class Panel:
 
 
 GROUPS = {
+    "requirements": "Requirements",
     "trajectory": "Trajectory",
     "attitude": "Attitude",
     "elastic": "Elastic modes",

@@ -19,7 +19,8 @@ from hsv.base.units import UnitSystem
 from hsv.control.design_file import find_design, read_parameters
 from hsv.flight.flight import step_times_in_words
 from hsv.flight.limits import criteria_not_judged, limits_kept, verdict_sentence
-from hsv.flight.metrics import CRITERIA, METRICS, Group, Metric, spaced
+from hsv.flight.metrics import CRITERIA, grouped, spaced
+from hsv.flight.requirement import SIGNALS
 from hsv.flight.scenario import scenario_names
 from hsv.graph.node_parameters import NODE_PARAMETERS
 from hsv.model.faults.injector import NEVER_TIME
@@ -55,7 +56,7 @@ def write_report(bags: Sequence[Bag], out: Path, *, units: UnitSystem = UnitSyst
 def report_page(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.metric) -> str:
     """Return the report of ``runs`` as an HTML page; ``units`` are its initial units."""
     numbers = Numbers()
-    plots = [_plot(panel, runs, numbers) for panel in all_panels(runs)]
+    plots = [*_required(runs, numbers), *(_plot(panel, runs, numbers) for panel in all_panels(runs))]
     drawn = {plot.group for plot in plots}
     groups = {key: heading for key, heading in GROUPS.items() if key in drawn}
     sections = {"summary": "Summary", "metrics": "Metrics", "events": "Events", "vehicle": "Vehicle"}
@@ -82,8 +83,8 @@ def report_page(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.m
         picture=_picture(runs, plots, numbers),
         effectors=any(curve.kind is Kind.effector for run in runs for c in run.curves.curves.values() for curve in c),
         criteria=CRITERIA,
-        metrics=_grouped(runs),
-        differing={name for name in METRICS if len({run.metrics.get(name) for run in runs}) > 1},
+        metrics=(shown := grouped(name for run in runs for name in (*run.metrics, *run.verdicts, *run.missing))),
+        differing={n for named in shown.values() for n in named if len({run.metrics.get(n) for run in runs}) > 1},
         parameters={part: list(_parameters(part, runs)) for part in ("scenario", "design")},
         shipped_scenarios=scenario_names(),
         set_options=_set_options,
@@ -156,6 +157,29 @@ def _plot(panel: Panel, runs: Sequence[ReportedRun], numbers: Numbers) -> Plot:
     return Plot(panel.name, panel.title, panel.unit, panel.group, curves, False, limits, _shades(panel, runs), notes)
 
 
+def _required(runs: Sequence[ReportedRun], numbers: Numbers) -> list[Plot]:
+    """Return a plot of each signal that requirements bound.
+
+    A bound is drawn over its window; at the deciding instant, a line leads from it to the signal.
+    """
+    plots = []
+    for name in dict.fromkeys(name for run in runs for name in run.required):
+        curves = []
+        for index, run in enumerate(runs):
+            if name in run.required:
+                x, y = map(numbers.add, run.required[name])
+                curves.append({"kind": Kind.actual, "label": run.label, "run": index, "x": x, "y": y})
+            for row in run.description["requirements"] or ():
+                if row["signal"] == name and row["decided_at_s"] is not None:
+                    at, bound = row["decided_at_s"], row["bound"]
+                    x = numbers.add(np.array([row["from_s"], at, at, at, row["to_s"]]))
+                    y = numbers.add(np.array([bound, bound, row["value"], bound, bound]))
+                    curves.append({"kind": Kind.bound, "label": row["name"], "run": index, "x": x, "y": y})
+        title = capitalised(spaced(name))
+        plots.append(Plot(f"required_{name}", title, SIGNALS[name].unit, "requirements", curves))
+    return plots
+
+
 def _actual(panel: Panel, runs: Sequence[ReportedRun]) -> list[np.ndarray | None]:
     return [run.curves.actual(panel.name) for run in runs]
 
@@ -203,16 +227,6 @@ def _picture(runs: Sequence[ReportedRun], plots: Sequence[Plot], numbers: Number
     pictured = sorted((plot for plot in plots if plot.name in PICTURED), key=lambda plot: PICTURED.index(plot.name))
     kinds = DRAWN if len(runs) == 1 else [kind for kind in DRAWN if kind != Kind.nominal]
     return picture(pictured, numbers, end, shades, kinds=kinds)
-
-
-def _grouped(runs: Sequence[ReportedRun]) -> dict[Group, dict[str, Metric]]:
-    """Return the metrics that have a value, a verdict or a reason in any run, by group and name."""
-    known = {name for run in runs for name in (*run.metrics, *run.verdicts, *run.missing)}
-    groups = {
-        group: {name: metric for name, metric in METRICS.items() if metric.group is group and name in known}
-        for group in Group
-    }
-    return {group: metrics for group, metrics in groups.items() if metrics}
 
 
 def _parameters(part: str, runs: Sequence[ReportedRun]) -> Iterator[tuple[str, str, list[Markup]]]:

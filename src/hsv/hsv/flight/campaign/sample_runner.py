@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import lru_cache
+from functools import lru_cache, partial
 from io import BytesIO
 from typing import Any
 
@@ -21,6 +22,8 @@ from hsv.flight.campaign.variants import FlightVariants
 from hsv.flight.closed_loop import Components, fly, watched
 from hsv.flight.flight import Flight
 from hsv.flight.metrics import METRICS, NOT_REACHED, FlightData
+from hsv.flight.requirement import margins
+from hsv.flight.scenario import Scenario
 from hsv.flight.side_by_side import FlightGroup, TubeLevels
 from hsv.model.dynamics import in_model_range
 from hsv.plugins.library import LibraryController
@@ -36,6 +39,12 @@ LATEST = 2
 
 OUTCOMES = {"end_time": "s", "tube_level": "1", **{name: metric.unit for name, metric in METRICS.items()}}
 """Names of the numbers that are recorded of every flight, with their SI units; a number may be undefined (null)."""
+
+
+def outcomes_of(scenario: Scenario) -> dict[str, str]:
+    """Return :data:`OUTCOMES` and, with the unit 1, the margins of the requirements of ``scenario``."""
+    return OUTCOMES | {requirement.metric: "1" for requirement in scenario.requirement}
+
 
 WRITTEN: dict[str, Any] = {"compression": "zstd", "write_page_checksum": True}
 """Parquet options of the result file; its checksums detect damage that does not stop the decompression."""
@@ -112,18 +121,23 @@ class SampleRunner:
     def outcome(self, flown: FlownSample) -> Outcome:
         """Return a flight's results by column, or only how it ended if its controller crashed."""
         if isinstance(flown, ControllerError):
-            return {"diverged": False, "crashed": str(flown)}
+            lost = {requirement.metric: -math.inf for requirement in self.scenario.requirement}
+            return {"diverged": False, "crashed": str(flown), **lost}
         flight, level = flown
         return self.measured(flight, level, flight.fingerprint)
 
     def measured(self, flight: FlightData, level: float | None, fingerprint: str | None) -> Outcome:
         """Return the results of a flight that did not crash, by column; ``level`` is its largest tube level."""
         vehicle = self._variants.unchanged.plant.vehicle
+        diverged = not in_model_range(flight.history.state[-1], vehicle.angle_limit)
+        levels = partial(self._levels.along, flight)
+        required = margins(self.scenario.requirement, flight, ended=not diverged, levels=levels)
         return {
-            "diverged": not in_model_range(flight.history.state[-1], vehicle.angle_limit),
+            "diverged": diverged,
             "end_time": float(flight.time[-1]),
             "tube_level": level,
             **flight.metrics,
+            **{name: margin.margin for name, margin in required.items()},
             "not_reached": " ".join(n for n, why in flight.missing.items() if why.startswith(NOT_REACHED)) or None,
             "crashed": None,
             "fingerprint": fingerprint,
@@ -141,7 +155,7 @@ class SampleRunner:
         columns = {"flight": flights, "seed": seeds, **dict(drawn)}
         columns |= {
             name: [outcome.get(name) for outcome in outcomes]
-            for name in ("diverged", "crashed", *OUTCOMES, "not_reached", "fingerprint")
+            for name in ("diverged", "crashed", *outcomes_of(self.scenario), "not_reached", "fingerprint")
         }
         return encode(self.campaign, columns, envelope)
 
@@ -170,7 +184,7 @@ def schema(campaign: Campaign) -> pa.Schema:
     ``not_reached`` has the names of the times that the flight did not reach, separated by spaces, or null.
     """
     samples = [_number(f"sample_{factor.name}", factor.unit) for factor in campaign.factors]
-    outcomes = [_number(name, unit) for name, unit in OUTCOMES.items()]
+    outcomes = [_number(name, unit) for name, unit in outcomes_of(campaign.scenario).items()]
     fixed = [pa.field("flight", pa.int64(), False), pa.field("seed", pa.uint64(), False)]
     ended = [pa.field("diverged", pa.bool_(), False), pa.field("crashed", pa.string())]
     texts = [pa.field(name, pa.string()) for name in ("not_reached", "fingerprint")]

@@ -16,7 +16,7 @@ from hsv.base.errors import CampaignError
 from hsv.flight.assembly import require_trust
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
-from hsv.flight.campaign.sample_runner import OUTCOMES, SampleRunner
+from hsv.flight.campaign.sample_runner import SampleRunner, outcomes_of
 from hsv.flight.campaign.store import read_result
 from hsv.flight.metrics import METRICS, spaced
 from hsv.plugins.controllers import names_code
@@ -63,6 +63,8 @@ class Share:
 @dataclass(frozen=True)
 class WorstFlight:
     """One of the worst flights: ``ratio`` is the largest ratio of a metric to its limit, ``limit`` names this metric.
+
+    The ratio of a requirement is 1 minus its margin, the share of the bound that the signal uses.
 
     If the flight did not finish, ``limit`` is ``crashed`` or ``diverged``, and ``ratio`` is infinite, as for a time
     that was not reached. Limits of 0 are ignored; if there are no others, ``ratio`` is 0 and ``limit`` is empty.
@@ -183,6 +185,11 @@ def limits(results: Results) -> dict[str, float]:
     return stated
 
 
+def required(results: Results) -> list[str]:
+    """Return the names of the margins of the requirements; a margin is kept if it is at least 0."""
+    return [requirement.metric for requirement in results.campaign.scenario.requirement]
+
+
 def _judged(results: Results) -> dict[str, tuple[float | None, np.ndarray, np.ndarray]]:
     """Return by metric its limit (SI), and of each flight whether it is judged and whether it keeps the limit.
 
@@ -195,6 +202,8 @@ def _judged(results: Results) -> dict[str, tuple[float | None, np.ndarray, np.nd
         values = np.abs(results.column(name))
         applies = finished & (~np.isnan(values) | results.not_reached(name))
         found[name] = limit, applies, applies & (values <= limit)  # a comparison with NaN is false
+    for name in required(results):
+        found[name] = 0.0, finished, finished & (results.column(name) >= 0.0)
     return found
 
 
@@ -226,14 +235,15 @@ def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
     """Return the ``number`` worst flights: crashed, diverged (earliest first), then by largest ratio to a limit."""
     stated = {name: limit for name, limit in limits(results).items() if limit > 0.0}
     diverged, crashed, end = results.column("diverged"), results.crashed, results.column("end_time")
-    ratios = np.zeros((len(diverged), len(stated) or 1))
-    for index, (name, limit) in enumerate(stated.items()):
-        ratio = np.abs(results.column(name)) / limit
+    every = [*stated, *required(results)]
+    ratios = np.zeros((len(diverged), len(every) or 1))
+    for index, name in enumerate(every):
+        ratio = np.abs(results.column(name)) / stated[name] if name in stated else 1.0 - results.column(name)
         ratios[:, index] = np.where(np.isnan(ratio), np.where(results.not_reached(name), np.inf, 0.0), ratio)
     largest = np.where(diverged | crashed, np.inf, ratios.max(axis=1))
     ended = np.where(crashed, -1.0, np.where(diverged, end, math.inf))
     order = np.lexsort((np.arange(len(end)), ended, -largest))[:number]
-    samples, names = results.samples, list(stated) or [""]
+    samples, names = results.samples, every or [""]
     found = []
     for flight in order.tolist():
         within = names[int(np.argmax(ratios[flight]))]
@@ -245,7 +255,7 @@ def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
 
 @dataclass(frozen=True)
 class Distribution:
-    """Statistics (SI) of one of :data:`OUTCOMES` in the finished flights to which it applies.
+    """Statistics (SI) of one of the outcomes in the finished flights to which it applies.
 
     Errors with a sign count by their magnitude. A time that was not reached counts as infinite.
     """
@@ -272,7 +282,7 @@ class Distribution:
 def distributions(results: Results) -> list[Distribution]:
     """Return the statistics of every outcome that applies to at least one finished flight."""
     found = []
-    for name, unit in OUTCOMES.items():
+    for name, unit in outcomes_of(results.campaign.scenario).items():
         late = int(np.count_nonzero(results.finished & results.not_reached(name)))
         values = results.column(name)[results.finished]
         values = np.sort(np.abs(values) if name in METRICS and METRICS[name].signed else values)
