@@ -40,7 +40,7 @@ class Verdict:
 
     @property
     def words(self) -> str:
-        """The verdict: ``within`` or ``kept``, ``over`` or ``broken``, ``not flown to the end``, or why it has no value."""
+        """The verdict: ``within`` or ``kept``, ``over`` or ``broken``, ``not flown to the end``, or a reason."""
         if self.requirement and self.ended:
             return "kept" if self.value is not None and self.value >= self.limit else "broken"
         if self.value is not None and not self.requirement and not abs(self.value) <= self.limit:
@@ -57,7 +57,7 @@ def verdicts(
 ) -> dict[str, Verdict]:
     """Return the verdict on each limit and requirement of ``scenario``, by the name of the metric.
 
-    ``metrics`` (with the margins of requirements) and ``missing`` are those of the flight; ``ended``: it reached its end.
+    ``metrics``, margins included, and ``missing`` are those of the flight; ``ended``: it reached its end.
     """
     limited = {
         name: Verdict(limit, metrics.get(name), ended, missing.get(name, NOT_REACHED))
