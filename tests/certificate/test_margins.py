@@ -25,16 +25,7 @@ from hsv.certificate.margins import (
 )
 from hsv.control.design_file import find_design, read_design
 
-DESIGNS = (
-    "baseline",
-    "baseline_derived",
-    "adjustable",
-    "realistic",
-    "winged_cone",
-    "winged_cone_lift",
-    "robust",
-    "tight",
-)
+DESIGNS = sorted(path.stem for path in find_design("baseline").parent.glob("*.toml"))
 
 
 def worst_vertex(name, broken="elevator"):

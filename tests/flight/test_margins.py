@@ -3,7 +3,7 @@
 import pytest
 
 from hsv.base.errors import ScenarioError
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design_file import find_certificate, find_design, read_certificate, read_design
 from hsv.flight.assembly import flight_parameters
 from hsv.flight.margins import corner_file, flown_borders, margin_verdict, scenario_loops
 from hsv.flight.scenario import load_scenario, parse_scenario
@@ -56,8 +56,14 @@ def test_a_corner_is_a_scenario():
 
 
 def test_a_required_disk_margin_is_judged_by_the_certificate():
-    kept, words = margin_verdict(load_scenario("case1_robust"))
-    assert kept and words == "disk margin 0.900 (limit 0.85)"
-    assert margin_verdict(load_scenario("case1_robust", {"limits.disk_margin": 0.95}))[0] is False
+    design, scenario = read_design(find_design("robust")), load_scenario("case1_robust")
+    assert margin_verdict(scenario, design) == {"kept": True, "words": "disk margin 0.900 (limit 0.85)"}
+    assert margin_verdict(load_scenario("case1_robust", {"limits.disk_margin": 0.95}), design)["kept"] is False
+    assert margin_verdict(load_scenario("case1"), design) is None
+    unknown = {"kept": None, "words": "disk margin not judged: hsv margins case1_robust"}
+    other = read_certificate(find_certificate("tight"))  # margins above those of this design, and a block without any
+    other["margins"]["vertices"]["elevator"]["margin"] = [0.99] * len(design.polytope.A)
+    for certificate in ({}, {"margins": {"vertices": {"elevator": {}}}}, {"margins": None}, other):
+        assert margin_verdict(scenario, design, certificate) == unknown
     solved = load_scenario("case1_qp", {"limits.disk_margin": 0.5})
-    assert margin_verdict(solved) == (None, "disk margin not judged: hsv margins case1_qp")
+    assert margin_verdict(solved, design)["words"] == "disk margin not judged: hsv margins case1_qp"

@@ -1,9 +1,12 @@
 """The HTML page of a campaign."""
 
+import copy
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import tomli_w
 
 from hsv.flight.campaign.summary import Share, limits, shares, within_all
 from hsv.pages.campaign import campaign_page, histogram, sentence, share_interval
@@ -31,6 +34,14 @@ def test_it_opens_with_how_many_flights_keep_all_limits(results):
     assert sentence(results).startswith(f"{count} of 44 flights are within all {rows.shape[1]} limits")
     page = campaign_page(results)
     assert page.index('class="lead') < page.index('class="picture"') < page.index("<table")
+
+
+def test_a_required_disk_margin_is_judged_once_for_all_flights(results):
+    required = copy.copy(results)
+    text = tomli_w.dumps(results.campaign.table | {"limits": {"disk_margin": 0.7}})
+    required.campaign = replace(results.campaign, scenario_text=text)
+    assert sentence(required).endswith(" Disk margin 0.640 (limit 0.7).") and results.disk_margin is None
+    assert '<p class="lead bad">' in campaign_page(required)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import pytest
 from changed_bags import changed_bag
 
 from hsv.bags.reader import Bag
+from hsv.bags.replay.attached import supply
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import RecordingError
 from hsv.flight.metrics import METRICS
@@ -63,6 +64,18 @@ def test_the_verdict_has_its_numbers_in_the_units_shown(quiet):
     (metres, m), (feet, ft) = (value.search(said).groups() for said in (metric, paper))
     assert (m, ft) == ("m", "ft") and float(metres) == pytest.approx(0.3048 * float(feet), rel=0.01)
     assert float(metres) == pytest.approx(run.metrics["altitude_end_error"], rel=0.01)
+
+
+def test_a_required_disk_margin_is_judged_by_the_attached_certificate(quiet, tmp_path):
+    scenario = tmp_path / "required.toml"
+    for required, words_of_it, mark in ((0.6, "Disk margin 0.640 (limit 0.6)", "✓"), (0.7, "(limit 0.7)", "✗")):
+        scenario.write_text(f'extends = "case1"\nlimits = {{ disk_margin = {required} }}\n')
+        bag = Bag(quiet.path)
+        supply(bag, None, str(scenario))
+        (run,) = reported_runs([bag])
+        assert run.good == (mark == "✓") and f"{mark} " in (seen := words(report_page([run]))) and words_of_it in seen
+        del bag.attachments["certificate.json"]
+        assert "disk margin not judged: hsv margins case1" in str(sentence(reported_runs([bag]))).lower()
 
 
 def test_what_happened_is_told_and_escaped(page):

@@ -60,17 +60,18 @@ def describe(bag: Bag) -> dict[str, Any]:
         without a published value), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
         entry per interval), ``equipment`` (deviations of sensors, links, effectors and air from the ideal, SI),
         ``step_times`` (wall times of the steps of the control law in ms, by node, and the control period),
-        ``requirements`` (rows of :func:`hsv.flight.requirement.requirement_rows`), ``saturation``, ``tube`` and
-        ``not_covered`` (texts: properties of the flight outside the certificate of its design). From ``ending`` on, an
-        entry is None if its topics or other data for it are missing. Names that end in ``_s`` are simulated times in
-        seconds; ``end_s`` is None if an interval lasts until the end of the bag.
+        ``requirements`` (rows of :func:`hsv.flight.requirement.requirement_rows`), ``saturation``, ``tube``,
+        ``not_covered`` (texts: properties of the flight outside the certificate of its design) and ``disk_margin`` (see
+        :func:`hsv.flight.margins.margin_verdict`). From ``ending`` on, an entry is None if its topics or other data for
+        it are missing. Names that end in ``_s`` are simulated times in seconds; ``end_s`` is None if an interval lasts
+        until the end of the bag.
     """
     start, end = bag.span
     fingerprint, warnings = None, bag_warnings(bag)
     with suppress(RecordingError):
         fingerprint = flight_fingerprint(bag)
     topics = [_topic(bag, name) for name in sorted(bag.topics)]
-    faults = _faults(bag) if ACTUATOR in bag.roles else None
+    faults, scenario = _faults(bag) if ACTUATOR in bag.roles else None, _scenario(bag)
     return {
         "path": str(bag.path),
         "folder": str(bag.folder),
@@ -82,7 +83,7 @@ def describe(bag: Bag) -> dict[str, Any]:
         "topics": topics,
         "custom_data": bag.custom_data,
         "fingerprint": fingerprint,
-        "as_published": as_published(fingerprint, _scenario(bag), bag.custom_data.get("design_hash", "")),
+        "as_published": as_published(fingerprint, scenario, bag.custom_data.get("design_hash", "")),
         "attachments": [
             {"name": name, "media_type": bag.media_types[name], "size_bytes": len(data)}
             for name, data in sorted(bag.attachments.items())
@@ -95,6 +96,7 @@ def describe(bag: Bag) -> dict[str, Any]:
         "saturation": _saturation(bag) if COMMAND in bag.roles else None,
         "tube": _tube(bag) if TUBE_STATUS in bag.roles else None,
         "not_covered": _not_covered(bag, faults) if TUBE_STATUS in bag.roles else None,
+        "disk_margin": _disk_margin(bag, scenario),
     }
 
 
@@ -197,15 +199,32 @@ def _equipment(bag: Bag) -> dict[str, Any] | None:
 def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | None:
     """Return a text on each property of the flight outside its certificate; None if attachments are missing or bad."""
     try:
-        sections = [ParameterSections.parse(bag.text(name), name) for name in ("design.yaml", "scenario.yaml")]
-        values = sections[0].overlaid(sections[1]).of(TUBE_MPC.name)
-        report = bag.attachments.get("certificate.json")
-        certificate = parse_json(report) if report else None
+        values, certificate = _attached(bag)
         if isinstance(certificate, dict) and (version := certificate.get("format", 1)) != FORMAT:
             return [f"all of it: certificate.json has format {version!r}, expected {FORMAT}; fly the design of today"]
         return uncovered(values, design_of(values), certificate, map(_flown, faults or ()))
     except (HsvError, ValueError, LookupError, TypeError):
         return None  # the attachments are of another version or incomplete
+
+
+def _attached(bag: Bag) -> tuple[dict[str, Any], Any]:
+    """Return the parameters of the tube law in the attached files, and the attached certificate, None without one."""
+    sections = [ParameterSections.parse(bag.text(name), name) for name in ("design.yaml", "scenario.yaml")]
+    report = bag.attachments.get("certificate.json")
+    return sections[0].overlaid(sections[1]).of(TUBE_MPC.name), parse_json(report) if report else None
+
+
+def _disk_margin(bag: Bag, scenario: Scenario | None) -> dict[str, Any] | None:
+    """Return the verdict on the disk margin by the attached design and certificate; None if none is required."""
+    if scenario is None or scenario.disk_margin is None:
+        return None
+    from hsv.flight.margins import margin_verdict
+
+    design, certificate = None, None
+    with suppress(HsvError, ValueError, LookupError, TypeError):  # the attachments are of another version or incomplete
+        values, certificate = _attached(bag)
+        design = design_of(values)
+    return margin_verdict(scenario, design, certificate or {})
 
 
 def _flown(fault: dict[str, Any]) -> FlownFault:

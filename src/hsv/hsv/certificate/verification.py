@@ -544,6 +544,12 @@ class Tube:
         F = self.system.F
         return self._narrowed(np.sqrt(np.sum((F @ self.Q) * F, axis=1)), slice(N_RIGID, None))
 
+    @property
+    def certified(self) -> np.ndarray:
+        """Certified half-ranges (7) of the outputs :attr:`rows`; at limited rates, if stated."""
+        bounds = np.concatenate((self.half_width[:N_RIGID], self.feedback))
+        return bounds if self.rated is None else np.minimum(bounds, self.rated)
+
     def _narrowed(self, bounds: np.ndarray, rows: slice) -> np.ndarray:
         """Return ``bounds``; the first of them are limited to the star norms of the output ``rows``, if stated."""
         if self.star is None:
@@ -575,8 +581,7 @@ class Tube:
         behind the plan.
         """
         middle = self.system.F @ self.c + self.system.F_d @ self.middle
-        feedback = self.feedback if self.rated is None else np.minimum(self.feedback, self.rated[N_RIGID:])
-        half = feedback + np.abs(self.system.F_d) @ self.half
+        half = self.certified[N_RIGID:] + np.abs(self.system.F_d) @ self.half
         lower, upper = self.design.input_minimum - middle + half, self.design.input_maximum - middle - half
         return np.stack((lower - lag[0], upper - lag[1]))
 

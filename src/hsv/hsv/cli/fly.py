@@ -189,6 +189,11 @@ def simulate(
     ended = flight.status is not FlightStatus.DIVERGED
     levels = TubeLevels(components)
     found = margins(loaded.requirement, flight, ended=ended, levels=lambda: levels.along(flight))
+    disk_margin = None
+    if loaded.disk_margin is not None:
+        from hsv.flight.margins import margin_verdict
+
+        disk_margin = margin_verdict(loaded, design)
     flown = FlightSummary(
         loaded,
         flight.metrics,
@@ -199,6 +204,7 @@ def simulate(
         simulated_time=float(flight.time[-1]),
         wall_time=wall_time,
         not_covered=[*uncovered_of(loaded, design), *uncovered_rates(design, flight.history.state)],
+        disk_margin=disk_margin,
         step_times={
             "period_ms": 1e3 * flight.period,
             "nodes": {name: step_statistics(times) for name, times in flight.law_times.items()},
@@ -329,6 +335,7 @@ def _conclude(
         simulated_time=float(data.time[-1]),
         wall_time=wall_time,
         not_covered=description["not_covered"],
+        disk_margin=description["disk_margin"],
         step_times=description["step_times"],
         requirements=description["requirements"] or (),
         files=files,

@@ -229,6 +229,8 @@ def _print_description(description: dict[str, Any], units: UnitSystem) -> None:
     }
     if description["not_covered"]:
         heading["not covered"] = "; ".join(map(str, description["not_covered"]))
+    if description["disk_margin"]:
+        heading["limits"] = description["disk_margin"]["words"]
     output.print_section("bag", heading)
     if required := description["requirements"]:
         table = output.new_table("id", "requirement", "margin", "verdict", "fingerprint", right=["margin"])

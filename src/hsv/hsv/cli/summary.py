@@ -16,7 +16,7 @@ from hsv.base.units import UnitSystem, in_system, significant, unit_in
 from hsv.cli import output
 from hsv.flight.fingerprint import as_published, published_in_words
 from hsv.flight.flight import step_times_in_words
-from hsv.flight.limits import Verdict, in_units, limits_kept, not_judged, verdict_sentence, verdicts
+from hsv.flight.limits import Verdict, in_units, limits_kept, missed, not_judged, verdict_sentence, verdicts
 from hsv.flight.metrics import NOT_REACHED, grouped, is_share, metric_of, spaced
 from hsv.flight.scenario import Scenario
 
@@ -48,6 +48,8 @@ class FlightSummary:
     """Wall time (s) that the flight took; None if unknown."""
     not_covered: Sequence[str] | None
     """Items of the flight that the certificate does not cover; None if unknown."""
+    disk_margin: Mapping[str, Any] | None
+    """The verdict on the disk margin, see :func:`hsv.flight.margins.margin_verdict`."""
     step_times: dict[str, Any] | None = None
     """Statistics of the wall times of steps, see :func:`hsv.bags.info.describe`; None if unknown."""
     requirements: Sequence[Mapping[str, Any]] = ()
@@ -67,14 +69,8 @@ def report_flight(
     scenario, time, wall_time = flight.scenario, flight.simulated_time, flight.wall_time
     finished = flight.ending == "finished"
     metrics = {**flight.metrics, **{row["metric"]: row["margin"] for row in flight.requirements}}
-    judged = verdicts(scenario, metrics, flight.missing, ended=finished)
-    kept = finished and all(verdict.kept for verdict in judged.values())
-    margin_kept, margin_words = None, ""
-    if scenario.disk_margin is not None:
-        from hsv.flight.margins import margin_verdict
-
-        margin_kept, margin_words = margin_verdict(scenario)
-        kept = kept and margin_kept is not False
+    judged, margin = verdicts(scenario, metrics, flight.missing, ended=finished), flight.disk_margin
+    kept = finished and all(verdict.kept for verdict in judged.values()) and not missed(margin)
     factor = time / wall_time if wall_time else None
     same = as_published(flight.fingerprint, scenario, flight.design_hash)
     if json:
@@ -84,7 +80,7 @@ def report_flight(
                 "diverged_at_s": time if flight.ending == "diverged" else None,
                 "within_limits": kept,
                 "not_judged": not_judged(judged, metrics),
-                **({"disk_margin": {"kept": margin_kept, "words": margin_words}} if margin_words else {}),
+                "disk_margin": margin,
                 "metrics": output.to_json({name: (v, metric_of(name).unit) for name, v in metrics.items()}, units),
                 **({"requirements": flight.requirements} if flight.requirements else {}),
                 "missing": flight.missing,
@@ -109,8 +105,7 @@ def report_flight(
         }
         print_metrics(scenario.title, metrics, flight.missing, units, judged, every)
         output.print_section("run", run)
-        words = verdict_sentence(judged, metrics, units) if every else limits_kept(judged, units)
-        words = "; ".join(filter(None, (words, margin_words)))
+        words = verdict_sentence(judged, metrics, units, margin) if every else limits_kept(judged, units, margin)
         style = "bold red" if not kept else "bold green" if judged else "bold"
         output.console.print(Text.assemble(("verdict ", "bold"), (words, style)))
     if flight.ending == "diverged":
@@ -118,7 +113,7 @@ def report_flight(
     if not finished:
         raise RunError(f"flight broken off at t = {time:.2f} s of {scenario.duration:.2f} s")
     if strict and not kept:
-        raise RunError("; ".join(filter(None, (limits_kept(judged, units), margin_words))))
+        raise RunError(limits_kept(judged, units, margin))
 
 
 def print_metrics(
@@ -185,6 +180,7 @@ def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, f
                     | {name: getattr(share, name) for name in ("name", "within", "fraction", "interval")}
                     for share in shares(results)
                 ],
+                "disk_margin": results.disk_margin,
                 "distributions": {
                     d.name: {
                         statistic: in_system(getattr(d, statistic), d.unit, output.json_system(units))[0]
@@ -224,6 +220,8 @@ def _print_campaign(results: Results, units: UnitSystem) -> None:
         within = within if share.flights else ("-", "-")
         table.add_row(spaced(share.name), limit, *within, interval)
     output.console.print(table)
+    if results.disk_margin:
+        output.say(results.disk_margin["words"])
     numbers = ("least", "median", "95 %", "largest")
     table = output.new_table("metric", *numbers, "unit", right=numbers)
     for d in distributions(results):

@@ -57,11 +57,24 @@ from hsv.model.lpv.actuated import respond, sampled_actuators
 from hsv.model.lpv.linearisation import acceleration_channels
 from hsv.model.lpv.polytope import evaluate
 from hsv.model.plant import FlightStatus
-from hsv.model.signals import ACCELERATED, CHANNELS, N_INPUTS, N_RIGID, N_STATES, PITCH_RATE, REMAINING
+from hsv.model.signals import (
+    ACCELERATED,
+    CHANNELS,
+    INPUT_NAMES,
+    N_INPUTS,
+    N_RIGID,
+    N_STATES,
+    PITCH_RATE,
+    REMAINING,
+    STATE_NAMES,
+)
 from hsv.model.trim import trim
 
 DRAWN = 192
 """Number of flights that are drawn from a design's region by default."""
+
+OUTPUTS = (*STATE_NAMES[:N_RIGID], *(f"feedback {name}" for name in INPUT_NAMES))
+"""Names of the outputs of a tube, :attr:`Tube.rows`."""
 
 SEQUENCES, STEPS = 20_000, 600
 """Number of random sequences of vertices and disturbances, and their steps."""
@@ -137,7 +150,8 @@ class Evidence:
     The largest ratio occurs in ``channel`` at ``step``. ``lowest`` and ``highest``, shape (3,), are the extremes of the
     two inputs u_r + u_n and of the nominal pitch acceleration (rad/s^2). ``lag``, shape (2, 2), and ``channels``, shape
     (2, 7), have the minima (row 0) and maxima (row 1) of the two fields of :class:`Disturbances` with these names.
-    ``moved``, shape (2,), is the largest change of altitude (m) and velocity (m/s) in a step.
+    ``moved``, shape (2,), is the largest change of altitude (m) and velocity (m/s) in a step. ``outputs``, shape (7,),
+    are the largest distances of the errors and of the feedback (:attr:`Tube.rows`) from the centre of the set.
     """
 
     level: float
@@ -149,6 +163,7 @@ class Evidence:
     lag: np.ndarray
     channels: np.ndarray
     moved: np.ndarray
+    outputs: np.ndarray
 
 
 def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
@@ -166,9 +181,9 @@ def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
     np.divide(found.channels, bounds, out=ratios, where=bounds != 0.0)
     step, channel = np.unravel_index(int(np.argmax(ratios)), ratios.shape)
     plan = flight.plan
-    turning = np.diff(h.deviation[:, PITCH_RATE]) / flight.period
+    turning, v = np.diff(h.deviation[:, PITCH_RATE]) / flight.period, found.error - tube.c
     return Evidence(
-        float(ellipsoid_levels(tube.Q, found.error - tube.c).max()),
+        float(ellipsoid_levels(tube.Q, v).max()),
         float(ratios[step, channel]),
         CHANNELS[channel].name,
         int(step),
@@ -177,6 +192,7 @@ def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
         np.stack((found.lag.min(axis=0), found.lag.max(axis=0))),
         np.stack((found.channels.min(axis=0), found.channels.max(axis=0))),
         np.abs(np.diff(h.state[:, :2], axis=0)).max(axis=0),
+        np.abs(v @ tube.rows.T).max(axis=0),
     )
 
 
@@ -231,8 +247,10 @@ def flight_checks(subject: Subject, seed: int, number: int = DRAWN) -> Checks:
     yield at_most("flights of the region: level", max(f.level for f in own), stated["worst_level"] * allowance)
     yield at_most("flights of the region: ratio to W", max(f.ratio for f in own), stated["worst_ratio"] * allowance)
     yield at_most(f"{number} drawn flights: level", max(f.level for f in flown), 1.0)
-    if declared["share"] == 1.0:
-        yield at_most(f"{number} drawn flights: ratio to W", max(f.ratio for f in flown), 1.0)
+    yield at_most(f"{number} drawn flights: ratio to W", declared["share"] * max(f.ratio for f in flown), 1.0)
+    outputs, certified = np.max([f.outputs for f in flown], axis=0), tube.certified
+    for name, reached, bound in zip(OUTPUTS, outputs, certified, strict=True):
+        yield at_most(f"{number} drawn flights: {name}", reached, bound)
     if declared["share"] < 1.0:  # every flight counts
         own = fly_perturbed(parts, everyone, show)
     yield recomputed(subject, f"{field}.outside", sum(f.ratio > 1.0 for f in own), "copied")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from hsv.base.units import UnitSystem, in_system, significant
 from hsv.flight.metrics import CRITERIA, NOT_REACHED, metric_of, spaced
@@ -67,6 +68,11 @@ def verdicts(
     return limited | required
 
 
+def missed(margin: Mapping[str, Any] | None) -> bool:
+    """Return whether the verdict on the disk ``margin`` is that the design misses it; not if it is not judged."""
+    return margin is not None and margin["kept"] is False
+
+
 def in_units(name: str, value: float, system: UnitSystem) -> str:
     """Return the ``value`` (SI) of the metric ``name`` as text in ``system``: three significant digits and the unit."""
     metric = metric_of(name)
@@ -80,12 +86,18 @@ def not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, float]) -> l
     return sorted(free, key=lambda name: name not in CRITERIA)
 
 
-def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float], system: UnitSystem) -> str:
+def verdict_sentence(
+    judged: Mapping[str, Verdict],
+    metrics: Mapping[str, float],
+    system: UnitSystem,
+    margin: Mapping[str, Any] | None = None,
+) -> str:
     """Return one line: whether a flight kept its limits, which it did not keep, and which criteria have no limit.
 
-    Other metrics without a limit are counted. If the scenario has no limits, the line says only that.
+    Other metrics without a limit are counted. If the scenario has no limits, the line says only that. ``margin`` is
+    the verdict on the disk margin, see :func:`limits_kept`.
     """
-    text = limits_kept(judged, system)
+    text = limits_kept(judged, system, margin)
     words = criteria_not_judged(judged, metrics, system)
     if others := len(not_judged(judged, metrics)) - len(words):
         plural = "s" if others > 1 else ""
@@ -99,8 +111,13 @@ def criteria_not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, flo
     return [f"{spaced(name)} ({in_units(name, metrics[name], system)})" for name in named]
 
 
-def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem) -> str:
-    """Return in words whether a flight kept its limits, and which limits it did not keep."""
+def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem, margin: Mapping[str, Any] | None = None) -> str:
+    """Return in words whether a flight kept its limits, and which limits it did not keep.
+
+    The line ends with the verdict on the disk ``margin``, see :func:`hsv.flight.margins.margin_verdict`.
+    """
+    if margin:
+        return "; ".join([*([limits_kept(judged, system)] if judged else []), margin["words"]])
     if not judged:
         return "not judged: the scenario has no limits"
     others = Counter(verdict.missing for verdict in judged.values() if not verdict.applies)

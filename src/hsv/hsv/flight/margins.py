@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -22,7 +23,7 @@ from hsv.certificate.margins import (
     margins_of,
 )
 from hsv.control.design import ControlDesign
-from hsv.control.design_file import find_certificate, find_design, read_certificate, read_design
+from hsv.control.design_file import certificate_path, find_design, read_certificate
 from hsv.control.tube_law import TubeLaw
 from hsv.flight.assembly import assemble_flight, assemble_with
 from hsv.flight.closed_loop import Components, fly
@@ -202,27 +203,29 @@ def scenario_loops(scenario: Scenario) -> VehicleLoops:
     return VehicleLoops(feedback, initial_trim(values)[0], scenario.vehicle.described.uncertainty, places, own)
 
 
-def margin_verdict(scenario: Scenario) -> tuple[bool | None, str]:
-    """Return whether the design of a scenario has the disk margin that the scenario requires, and a line that says so.
+def margin_verdict(
+    scenario: Scenario, design: ControlDesign | None, certificate: Mapping[str, Any] | None = None
+) -> dict[str, Any] | None:
+    """Return whether ``design`` has the disk margin that the scenario requires; None if it requires none.
 
-    The margin is that of the elevator loop at the worst vertex, from the certificate; the pencil verifies it there. It
-    is not judged (None) without such a block, or if the loop of the scenario is not that of F.
+    ``kept`` is true, false, or None if the margin is not judged, and ``words`` is a line that says so. The margin is
+    that of the elevator loop at the worst vertex, from the ``certificate``, or else from the file next to the
+    scenario's design; the pencil verifies it at every vertex. It is not judged without such a block, or if the loop of
+    the scenario is not that of F.
     """
-    required, not_judged = scenario.disk_margin, f"disk margin not judged: hsv margins {scenario.name}"
-    try:
+    if scenario.disk_margin is None:
+        return None
+    with suppress(HsvError, LookupError, TypeError, ValueError):
         refuse_other_loops(scenario)
-        design = read_design(find_design(scenario.design))
-        certificate = find_certificate(scenario.design)
-        stated = read_certificate(certificate)["margins"]["vertices"]["elevator"]["margin"] if certificate else []
-        loops = vertex_loops(design)
-        verified = len(stated) == len(loops) and all(
-            is_proved(loop.broken("elevator"), margin) for loop, margin in zip(loops, stated, strict=True)
-        )
-    except (HsvError, LookupError, TypeError):
-        return None, not_judged
-    if required is None or not verified or np.any(design.tau < 1.0):
-        return None, not_judged
-    return min(stated) >= required, f"disk margin {min(stated):.3f} (limit {required:g})"
+        if certificate is None:
+            certificate = read_certificate(certificate_path(find_design(scenario.design)))
+        stated = certificate["margins"]["vertices"]["elevator"]["margin"]
+        if design is None or np.any(design.tau < 1.0):
+            raise ScenarioError(f"scenario {scenario.name!r}: no margins: no design with tau = 1")
+        if all(is_proved(loop.broken("elevator"), m) for loop, m in zip(vertex_loops(design), stated, strict=True)):
+            words = f"disk margin {min(stated):.3f} (limit {scenario.disk_margin:g})"
+            return {"kept": min(stated) >= scenario.disk_margin, "words": words}
+    return {"kept": None, "words": f"disk margin not judged: hsv margins {scenario.name}"}
 
 
 def corner_file(scenario: Scenario, around: VehicleLoops, corner: str) -> str:

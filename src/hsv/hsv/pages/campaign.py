@@ -28,6 +28,7 @@ from hsv.flight.campaign.summary import (
     worst_flights,
 )
 from hsv.flight.flight import Flight
+from hsv.flight.limits import missed
 from hsv.flight.metrics import Group, is_share, metric_of, spaced
 from hsv.model.plant import Plant
 from hsv.pages.engine import Numbers, Plot, render, write_page
@@ -112,7 +113,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
         picture=picture(pictured, numbers, end, shades),
         result=results.path.name,
         shares=judged,
-        within_all=within_all(results),
+        good=within_all(results) == results.campaign.samples and not missed(results.disk_margin),
         flights=list(flights),
         distributions=grouped,
         constant=[d for d in shown if d.minimum == d.maximum],
@@ -131,15 +132,16 @@ def sentence(results: Results) -> str:
     ended, *limited = judged = shares(results)
     lost = ended.flights - ended.within
     ending = f"{lost} of {ended.flights} flights are lost" if lost else "All flights reached the end"
+    margin = f" {capitalised(results.disk_margin['words'])}." if results.disk_margin else ""
     limited = [share for share in limited if share.flights]
     if not limited:
-        return f"{ending}; there are no limits to judge them by."
+        return f"{ending}; there are no limits to judge them by.{margin}"
     named = "limits and requirements" if required(results) else "limits"
     text = f"{within_all(results)} of {ended.flights} flights are within all {len(limited)} {named}"
     if failed := most_failed(judged):
         broken = f"{failed.flights - failed.within} of {failed.flights}{' that reached the end' if lost else ''}"
         text += f"; the limit that most flights break is {spaced(failed.name)} ({broken})"
-    return f"{text}. {ending}."
+    return f"{text}. {ending}.{margin}"
 
 
 def most_failed(judged: Sequence[Share]) -> Share | None:

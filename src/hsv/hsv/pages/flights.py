@@ -23,7 +23,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.steps import completeness, joined
 from hsv.base.errors import HsvError
 from hsv.control.design_file import parse_parameters
-from hsv.flight.limits import Verdict, verdicts
+from hsv.flight.limits import Verdict, missed, verdicts
 from hsv.flight.metrics import FlightData
 from hsv.flight.requirement import LEVEL, SIGNALS
 from hsv.flight.scenario import Scenario, parse_scenario
@@ -108,7 +108,19 @@ class ReportedRun:
     @property
     def good(self) -> bool:
         """Whether the flight is completely recorded and finished within every limit."""
-        return not self.failure and not self.incomplete and all(verdict.kept for verdict in self.verdicts.values())
+        within = not missed(self.disk_margin) and all(verdict.kept for verdict in self.verdicts.values())
+        return within and not self.failure and not self.incomplete
+
+    @property
+    def disk_margin(self) -> dict[str, Any] | None:
+        """The verdict on the disk margin of the design, see :func:`hsv.flight.margins.margin_verdict`."""
+        found: dict[str, Any] | None = self.description["disk_margin"]
+        return found
+
+    @property
+    def judged(self) -> bool:
+        """Whether there is a limit to judge the flight by."""
+        return bool(self.verdicts or self.disk_margin)
 
     @property
     def input_limits(self) -> dict[str, tuple[float, float]]:

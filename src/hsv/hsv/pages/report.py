@@ -18,7 +18,7 @@ from hsv.base.files import parse_json
 from hsv.base.units import UnitSystem
 from hsv.control.design_file import find_design, read_parameters
 from hsv.flight.flight import step_times_in_words
-from hsv.flight.limits import criteria_not_judged, limits_kept, verdict_sentence
+from hsv.flight.limits import criteria_not_judged, limits_kept, missed, verdict_sentence
 from hsv.flight.metrics import CRITERIA, grouped, spaced
 from hsv.flight.requirement import SIGNALS
 from hsv.flight.scenario import scenario_names
@@ -79,6 +79,7 @@ def report_page(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.m
         groups=groups,
         sentence=sentence(runs),
         verdict=verdict,
+        missed=missed,
         step_times=step_times_in_words,
         picture=_picture(runs, plots, numbers),
         effectors=any(curve.kind is Kind.effector for run in runs for c in run.curves.curves.values() for curve in c),
@@ -110,18 +111,24 @@ def sentence(runs: Sequence[ReportedRun]) -> Markup:
 
 def verdict(run: ReportedRun) -> Markup:
     """Return the verdict on one flight as HTML in all systems of units."""
-    texts = {system: _one(run, verdict_sentence(run.verdicts, run.metrics, system)) for system in UnitSystem}
+    texts = {
+        system: _one(run, verdict_sentence(run.verdicts, run.metrics, system, run.disk_margin)) for system in UnitSystem
+    }
     return switched({system: str(escape(f"{capitalised(text)}.")) for system, text in texts.items()})
 
 
 def _several(runs: Sequence[ReportedRun], system: UnitSystem) -> str:
-    judged = [run for run in runs if run.verdicts or run.failure]
+    judged = [run for run in runs if run.judged or run.failure]
     if not judged:
         return "there are no limits to judge these flights by"
     good = sum(run.good for run in judged)
     which = " that have limits" if len(judged) < len(runs) else ""
     parts = [f"within all of their limits: {good} of {len(judged)} flights{which}"]
-    parts += [f"{run.label}: {_one(run, limits_kept(run.verdicts, system))}" for run in judged if not run.good]
+    parts += [
+        f"{run.label}: {_one(run, limits_kept(run.verdicts, system, run.disk_margin))}"
+        for run in judged
+        if not run.good
+    ]
     for run in judged:
         if free := criteria_not_judged(run.verdicts, run.metrics, system):
             parts.append(f"{run.label}: not judged: {', '.join(free)}")

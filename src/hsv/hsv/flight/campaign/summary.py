@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from hsv.base.errors import CampaignError
+from hsv.control.design import design_of
 from hsv.flight.assembly import require_trust
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
@@ -103,6 +104,15 @@ class Results:
         """
         require_trust(self.campaign.scenario.controller, self.path, self.trust)
         return SampleRunner(self.campaign)
+
+    @cached_property
+    def disk_margin(self) -> dict[str, Any] | None:
+        """The verdict on the disk margin of the design, see :func:`hsv.flight.margins.margin_verdict`."""
+        if self.campaign.scenario.disk_margin is None:
+            return None
+        from hsv.flight.margins import margin_verdict
+
+        return margin_verdict(self.campaign.scenario, design_of(self.campaign.design))
 
     def column(self, name: str) -> np.ndarray:
         """Return a column of numbers or truth values, shape (flights,), in SI units; undefined numbers are NaN."""
