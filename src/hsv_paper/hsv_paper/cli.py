@@ -1,4 +1,4 @@
-"""The hsv-paper command: figures and claims of the paper, and sensitivity of its choices."""
+"""The hsv-paper command: figures and claims of the paper, sensitivity of its choices, and the gap of certificates."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hsv.cli.main import run
 from hsv.cli.options import check_folder, check_target
 from hsv.cli.output import console, print_estimate, print_written, stages
 
-COMMANDS = {name: Command(__name__) for name in ("figures", "claims", "sensitivity")}
+COMMANDS = {name: Command(__name__) for name in ("figures", "claims", "sensitivity", "gap")}
 """The commands and the module that holds them."""
 
 _FIGURE, _CLAIMS = 4.0, 120.0
@@ -116,3 +116,32 @@ def sensitivity(
     for table in outcome.tables:
         console.print(markdown(table), soft_wrap=True, highlight=False)
     print_written([*written, page], as_json=False)
+
+
+def gap(
+    verified: Annotated[list[Path], typer.Argument(help="Output of hsv verify NAME --json, each in a file NAME.json.")],
+    out: Annotated[Path, typer.Option(help="Folder for a PDF and a PNG of the figure.")] = Path("gap"),
+    over: Annotated[str, typer.Option(help="Design whose W is compared with parts of its tube.")] = "baseline",
+) -> None:
+    """Compare what is certified with worst sequences and with drawn flights, and print the tables of docs/gap.md.
+
+    The bounds are those of the certificates, which hsv verify recomputes; those at limited rates are computed here.
+
+    Example: hsv-paper gap verified/baseline.json verified/robust.json --out docs/images
+    """
+    import matplotlib
+
+    from hsv_paper.gap import bound_rows, draw, flight_rows, gap_of, needed_rows
+    from hsv_paper.plots import RC, save
+    from hsv_paper.study import markdown
+
+    check_folder(out, "out")
+    out.mkdir(parents=True, exist_ok=True)
+    with stages() as progress, matplotlib.rc_context(RC):
+        found = gap_of(verified, progress)
+        tables = bound_rows(found), flight_rows(found), needed_rows(over, progress)
+        written = save(draw(found), out / "gap")
+    for table in tables:
+        console.print(markdown(table), soft_wrap=True, highlight=False)
+        console.print()
+    print_written(written, as_json=False)

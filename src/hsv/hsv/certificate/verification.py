@@ -756,14 +756,18 @@ def rated_checks(subject: Subject) -> Checks:
     rates, field = declared_rates(subject), f"{inside}.rated.horizon"
     yield recomputed(subject, f"{inside}.rated.rates", rates, "copied")
     horizons = [subject.count(f"{field}.{k}", LONGEST) for k in range(len(tube.rows))]
+    check = recomputed(subject, f"{inside}.rated.half_range", bounds_at(tube, rates, horizons), "half-widths")
+    yield required(replace(check, fields=(*check.fields, field)))
+
+
+def bounds_at(tube: Tube, rates: Sequence[float], horizons: Sequence[int]) -> np.ndarray:
+    """Return bounds (7) of the outputs for flights at limited ``rates`` (m/s, m/s^2), see :func:`rated_bounds`."""
     stacks = [[tube.Q[None]] for _ in tube.rows]
     if tube.star:
         acting = tube.columns.any(axis=(0, 1))
         stacks = [[*stack, Q[acting]] for stack, Q in zip(stacks, tube.star.Q, strict=True)]
-    loops, changes = np.concatenate((tube.A, tube.columns), axis=2), np.array(rates) * subject.design.period
-    bounds, _ = rated_bounds(subject.design.polytope, loops, tube.c, tube.rows, stacks, changes, horizons)
-    check = recomputed(subject, f"{inside}.rated.half_range", bounds, "half-widths")
-    yield required(replace(check, fields=(*check.fields, field)))
+    loops, changes = np.concatenate((tube.A, tube.columns), axis=2), np.array(rates) * tube.design.period
+    return rated_bounds(tube.design.polytope, loops, tube.c, tube.rows, stacks, changes, horizons)[0]
 
 
 def declared_rates(subject: Subject) -> list[float]:
