@@ -1,13 +1,14 @@
 """The gap between certificates and flights, from the output of hsv verify; W over parts of a tube."""
 
 import json
+from itertools import pairwise
 
 import pytest
 from marking import long
 
 from hsv.certificate.checks import load_subject
 from hsv.control.design_file import find_design
-from hsv.flight.verification import OUTPUTS, flight_checks
+from hsv.flight.flown_checks import OUTPUTS, flight_checks
 from hsv_paper.gap import KINDS, bounds, needed_rows
 
 
@@ -17,7 +18,7 @@ def test_bounds_become_smaller_from_the_certificate_to_the_worst_sequence(name):
     found = bounds(subject, dict.fromkeys(OUTPUTS, 0.0))
     assert list(found) == [kind for kind in KINDS if name == "tight" or kind != "at limited rates"]
     values = list(found.values())
-    assert all((a >= b).all() for a, b in zip(values, values[1:], strict=False))
+    assert all((a >= b).all() for a, b in pairwise(values))
     if name == "tight":  # its certificate has these bounds, rounded outwards
         assert found["at limited rates"] == pytest.approx(subject.stated("tube.invariant_set.rated.half_range"), 1e-8)
 

@@ -13,12 +13,13 @@ from hsv.base.files import parse_json, read_text
 from hsv.base.processes import Progress
 from hsv.certificate.checks import Subject, load_subject
 from hsv.certificate.convolution import LONGEST
-from hsv.certificate.verification import Tube, acceleration_channels, bounds_at
+from hsv.certificate.verification import Tube, bounds_at
 from hsv.control.design_file import find_design
 from hsv.flight.closed_loop import fly
 from hsv.flight.corners import screening_corners
-from hsv.flight.verification import OUTPUTS, region, share_of
+from hsv.flight.flown_checks import OUTPUTS, region, share_of
 from hsv.model.dynamics import advance
+from hsv.model.lpv.linearisation import acceleration_channels
 from hsv.model.lpv.polytope import evaluate
 from hsv.model.signals import ACCELERATED, CHANNELS, N_RIGID
 from hsv_paper.plots import BLUE, DEGREES, GREEN, GREY, RED, new_figure
