@@ -16,6 +16,7 @@ from hsv.base.errors import ControllerError, HsvError, ParameterError
 from hsv.control.design_file import find_design, read_design
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
+from hsv.flight.repeatability import findings, from_copied_state
 from hsv.flight.scenario import load_scenario
 from hsv.flight.vehicle_export import exported_vehicle
 from hsv.plugins.c_export import exported_controller
@@ -69,6 +70,7 @@ def test_fmpy_finds_nothing_wrong(exported, name):
     assert validate_fmu(str(path)) == []
     described = {v.name: v for v in read_model_description(str(path)).modelVariables}
     assert described["measurement.altitude"].unit == "m"
+    assert all(variable.unit and variable.description for variable in described.values())
     assert described["command.elevator_deflection"].unit == "rad"
     with zipfile.ZipFile(path) as archive:
         assert {f"binaries/x86_64-linux/{name}.so", "sources/fmu.c", "sources/core.h"} <= {*archive.namelist()}
@@ -188,6 +190,11 @@ def test_a_wrong_fmu_is_one_line(tmp_path, table, description, match, templates)
     [
         ("if (currentCommunicationPoint > 0.39) *(volatile int *)0 = 1;", r"model.fmu, step 20: crashed \(SIGSEGV\)"),
         ("if (currentCommunicationPoint > 0.39) return fmi3Error;", r"model.fmu, step 20: .*fmi3DoStep"),
+        (
+            'if (currentCommunicationPoint > 0.39) { ((Model *)instance)->logMessage(NULL, fmi3Error, "", "no fuel"); '
+            "return fmi3Error; }",
+            r"model.fmu, step 20: .*fmi3DoStep.*: no fuel$",
+        ),
     ],
 )
 def test_a_failure_inside_the_fmu_ends_the_flight_in_one_line(tmp_path, statement, match, templates):
@@ -199,6 +206,29 @@ def test_a_failure_inside_the_fmu_ends_the_flight_in_one_line(tmp_path, statemen
     )
     with refused(match, ControllerError):
         fly(flight(tmp_path, MAPPED))
+
+
+CONTROLLER = 'unconnected = ["defect.*"]'
+
+
+def test_an_fmu_that_declares_it_is_copied_by_its_state(exported, tmp_path):
+    shutil.copy(exported / "controller.fmu", tmp_path / "model.fmu")
+    flown = fly(flight(tmp_path, CONTROLLER))
+    assert from_copied_state(flight(tmp_path, CONTROLLER), flown) == ""
+
+
+def test_other_fmus_are_not_checked_from_a_copied_state(tmp_path, templates):
+    templates.template_fmu(tmp_path / "model.fmu", ["h"], TRIM)
+    flight(tmp_path, MAPPED)
+    found = {each.check: each for each in findings(load_scenario(str(tmp_path / "fmu.toml"), {"fault": []}))}
+    copied = found.pop("from a copied state")
+    assert (copied.flights, copied.not_checked) == (0, "this FMU cannot be copied")
+    assert not any(each.difference or each.not_checked for each in found.values())
+
+
+def test_a_missing_fmu_is_called_an_fmu(tmp_path):
+    with refused(r"model.fmu'.*No such file or directory\), expected an FMU"):
+        flight(tmp_path)
 
 
 def test_without_a_compiler_the_export_is_refused_in_one_line(tmp_path, monkeypatch):

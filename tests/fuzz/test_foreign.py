@@ -7,16 +7,13 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
-import hypothesis
 import numpy as np
 import pytest
 from c_libraries import build_probe
-from gymnasium.error import Error
-from hypothesis import HealthCheck, settings
+from fuzzing import Fuzz
 from hypothesis import strategies as st
 from mutations import Mutated, mutated
 
-from hsv.base.errors import HsvError
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario
@@ -41,24 +38,6 @@ fault = []
 """
 
 
-@pytest.fixture(params=[pytest.param(1, id="short"), pytest.param(10_000, id="long", marks=[pytest.mark.fuzz])])
-def count(request: pytest.FixtureRequest) -> int:
-    long = request.param > 1
-    return request.config.getoption("--fuzz-inputs") if long else 1
-
-
-def _fuzzed(files: st.SearchStrategy[Any], read: Any, count: int) -> None:
-    @settings(max_examples=count, derandomize=count == 1, database=None, suppress_health_check=list(HealthCheck))
-    @hypothesis.given(files)
-    def each(given: Any) -> None:
-        try:
-            read(given)
-        except (HsvError, Error) as error:
-            assert str(error) and "\n" not in str(error)
-
-    each()
-
-
 def _flown(folder: Path, controller: str, more: str = "") -> None:
     path = folder / "mine.toml"
     path.write_text(SCENARIO.format(controller=controller, more=more))
@@ -68,7 +47,7 @@ def _flown(folder: Path, controller: str, more: str = "") -> None:
         library_user(folder / controller.partition(":")[0]).end()
 
 
-def test_a_library(count: int, tmp_path: Path) -> None:
+def test_a_library(fuzz: Fuzz, tmp_path: Path) -> None:
     library = build_probe(tmp_path)
     shutil.move(library, tmp_path / "whole.so")
 
@@ -76,11 +55,11 @@ def test_a_library(count: int, tmp_path: Path) -> None:
         library.write_bytes(given.data)
         _flown(tmp_path, "probe.so:probe")
 
-    _fuzzed(mutated((tmp_path / "whole.so").read_bytes()), read, min(count, _PROCESSES))
+    fuzz(mutated((tmp_path / "whole.so").read_bytes()), read, _PROCESSES)
 
 
 @pytest.mark.parametrize("part", ["modelDescription.xml", "binaries/x86_64-linux/model.so", ""])
-def test_an_fmu(count: int, part: str, tmp_path: Path) -> None:
+def test_an_fmu(fuzz: Fuzz, part: str, tmp_path: Path) -> None:
     whole, path = tmp_path / "whole.fmu", tmp_path / "mine.fmu"
     pytest.importorskip("template_fmus").template_fmu(whole, ["h"], {"phi": 0.3, "delta": 0.2})
     with zipfile.ZipFile(whole) as archive:
@@ -95,7 +74,7 @@ def test_an_fmu(count: int, part: str, tmp_path: Path) -> None:
             path.write_bytes(given.data)
         _flown(tmp_path, "mine.fmu", _NAMES)
 
-    _fuzzed(mutated(contents[part] if part else whole.read_bytes()), read, min(count, _PROCESSES))
+    fuzz(mutated(contents[part] if part else whole.read_bytes()), read, _PROCESSES)
 
 
 _VALUES = st.one_of(
@@ -111,7 +90,7 @@ _ACTIONS = st.one_of(_VALUES, st.lists(_VALUES, max_size=3), st.lists(st.lists(_
 _SEEDS = st.one_of(st.none(), st.integers(-3, 10), st.lists(st.integers(0, 10), max_size=3))
 
 
-def test_an_environment(count: int) -> None:
+def test_an_environment(fuzz: Fuzz) -> None:
     single, vector = TrackEnv(scale=1.0), TrackVectorEnv(2, scale=1.0)
     single.reset(seed=1)
     vector.reset(seed=1)
@@ -124,4 +103,4 @@ def test_an_environment(count: int) -> None:
         observation = env.step(action)[0]
         assert np.shape(observation) == env.observation_space.shape and np.isfinite(observation).all()
 
-    _fuzzed(st.tuples(_SEEDS, _ACTIONS), step, count)
+    fuzz(st.tuples(_SEEDS, _ACTIONS), step)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from zlib import crc32
@@ -12,7 +11,8 @@ import hypothesis
 import pyarrow.parquet as pq
 import pytest
 from changed_bags import changed_bag
-from hypothesis import HealthCheck, Phase, settings
+from fuzzing import Fuzz
+from hypothesis import settings
 from hypothesis import strategies as st
 from mutations import Mutated, mutated
 from node_processes import short_scenario
@@ -34,35 +34,6 @@ from hsv.flight.campaign.store import ResultStore
 from hsv.flight.campaign.summary import Results, limits, shares, worst_flights
 from hsv.flight.scenario import load_scenario, scenario_names, scenario_text
 from hsv.model.vehicle import load_vehicle, vehicle_names, vehicle_text
-
-QUICK, LONG = 5, 10_000
-
-Fuzz = Callable[[st.SearchStrategy[Mutated], Callable[[Mutated], object]], None]
-
-
-@pytest.fixture(params=[pytest.param(QUICK, id="short"), pytest.param(LONG, id="long", marks=[pytest.mark.fuzz])])
-def fuzz(request: pytest.FixtureRequest) -> Fuzz:
-    """Return a function that passes mutated files to a reader; in the short form their order is always the same."""
-    examples = request.config.getoption("--fuzz-inputs") if request.param == LONG else QUICK
-
-    def run(files: st.SearchStrategy[Mutated], read: Callable[[Mutated], object]) -> None:
-        @settings(
-            max_examples=examples,
-            derandomize=request.param == QUICK,
-            database=None,
-            phases=[Phase.generate, Phase.shrink],
-            suppress_health_check=list(HealthCheck),
-        )
-        @hypothesis.given(files)
-        def each(file: Mutated) -> None:
-            try:
-                read(file)
-            except HsvError as error:
-                assert str(error) and "\n" not in str(error)
-
-        each()
-
-    return run
 
 
 @pytest.fixture(scope="module")

@@ -260,7 +260,7 @@ def check(
             progress(scenario.controller, len(found), 4)
     failing = [finding for finding in found if finding.difference]
     if json:
-        checks = [vars(finding) | {"same": not finding.difference} for finding in found]
+        checks = [vars(f) | {"same": None if f.not_checked else not f.difference} for f in found]
         output.print_json(
             {"controller": scenario.controller, "scenario": scenario.name, "ok": not failing, "checks": checks}
         )
@@ -269,7 +269,8 @@ def check(
         table = output.new_table("check", "flights", "bytes", title=title, right=["flights"])
         for finding in found:
             style = "bold red" if finding.difference else None
-            table.add_row(finding.check, str(finding.flights), finding.difference or "the same", style=style)
+            result = f"not checked: {finding.not_checked}" if finding.not_checked else finding.difference or "the same"
+            table.add_row(finding.check, str(finding.flights), result, style=style)
         output.console.print(table)
     if failing:
         output.report_error(f"{scenario.controller}, {failing[0].check}: {failing[0].difference}")

@@ -149,6 +149,9 @@ class Controller(ABC):
         fuel, elevator = self.step(inputs).u_unsaturated
         return float(fuel), float(elevator)
 
+    not_copied = ""
+    """Why the controller cannot be copied, as it declares itself; empty: it can"""
+
     def copied(self) -> Controller:
         """Return a separate controller that continues from the state of this one."""
         return copy.deepcopy(self)

@@ -82,7 +82,7 @@ STATUS = _signal(
     "status",
     "1",
     1,
-    "whether the flight goes on, has finished or has diverged",
+    "0: in flight, 1: finished, 2: diverged",
     "measurement.status",
     "state.status",
     "filtered_state.status",
@@ -117,11 +117,11 @@ FILTER_STATE = _signal(
     "filtered_state.filter_state",
     sequence="two for each section of the notch filter",
 )
-REFERENCE = _state("reference", "x_r", "nominal.reference")
-REFERENCE_INPUT = _input("reference_input", "u_r", "nominal.reference_input")
+REFERENCE = _state("reference", "x_r, the reference", "nominal.reference")
+REFERENCE_INPUT = _input("reference_input", "u_r, input of the reference", "nominal.reference_input")
 DEFECT = _state("defect", "d_r, defect of the reference")
-DEVIATION = _state("deviation", "x_n", "nominal.deviation")
-NOMINAL_INPUT = _input("nominal_input", "u_n", "nominal.input")
+DEVIATION = _state("deviation", "x_n, nominal deviation from the reference", "nominal.deviation")
+NOMINAL_INPUT = _input("nominal_input", "u_n, nominal deviation from the input of the reference", "nominal.input")
 GAIN = _signal(
     "gain",
     "",
@@ -130,8 +130,20 @@ GAIN = _signal(
     "nominal.gain",
     sequence=f"{N_INPUTS * N_STATES}, or none",
 )
-GAIN_INDEX = _signal("gain_index", "1", 1, "gain of the family that gave u_n", "nominal.gain_index")
-NOMINAL_STATUS = _signal("nominal_status", "1", 1, "flags of the nominal trajectory", "nominal.status")
+GAIN_INDEX = _signal(
+    "gain_index",
+    "1",
+    1,
+    "number of the nominal gain K that gave u_n, 0 for that of the largest set, 255 for one found in flight",
+    "nominal.gain_index",
+)
+NOMINAL_STATUS = _signal(
+    "nominal_status",
+    "1",
+    1,
+    "sum of 1: deviation outside all sets of the gains, 2: outside the envelope, 4 and 8: no solution in flight",
+    "nominal.status",
+)
 UNSATURATED_INPUT = _input("wanted_input", "input before the limits")
 COMMAND = _input("command", "u, within the limits", "command.fuel_equivalence_ratio")
 SATURATED = _signal("saturated", "1", N_INPUTS, "whether the limits have changed each input", "command.saturated")

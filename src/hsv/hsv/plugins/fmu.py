@@ -10,11 +10,12 @@ contains the names that differ.
 
 from __future__ import annotations
 
+import copy
 import re
 import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
-from ctypes import c_double, c_void_p, cast
+from ctypes import byref, c_double, c_void_p, cast
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +69,7 @@ class FmuClass(LibraryClass):
         period = next(p for p in PLANT_PARAMETERS if p.name == "period")
         numbers = np.array([validate((period,), values)["period"], *routes], float)
         vehicle = Vehicle.from_parameters(values).decoupled
-        return LibraryController(self._name, self._path, self._symbol, self.block.state_size, numbers, vehicle)
+        return FmuController(self._name, self._path, self._symbol, self.block.state_size, numbers, vehicle)
 
     def _routes(self, own: Mapping[str, Any]) -> list[int]:
         """Return for each FMU input its index in ``_INPUTS``, or -1; then for each of ``_OUTPUTS``, the FMU's index."""
@@ -101,6 +102,21 @@ class FmuClass(LibraryClass):
         return routes
 
 
+class FmuController(LibraryController):
+    """A controller in an FMU; its state is the number of its copy, see :meth:`LoadedFmu.copied`."""
+
+    @property
+    def not_copied(self) -> str:  # type: ignore[override]
+        """A reason if the FMU does not declare that its state can be got and set."""
+        return "" if len(self._state) else "this FMU cannot be copied"
+
+    def copied(self) -> LibraryController:
+        """Return a separate controller that continues from the state of this one."""
+        made = copy.deepcopy(self)
+        made._state[0] = self.library.request("copied", int, self._state[0])
+        return made
+
+
 def _matches(name: str, pattern: str) -> bool:
     return re.fullmatch(re.escape(pattern).replace(r"\*", ".*"), name) is not None
 
@@ -126,6 +142,10 @@ class LoadedFmu:
         Raises:
             ParameterError: The FMU cannot be loaded.
         """
+        self._logged = ""
+        self._fmu: Any = None
+        self._saved: dict[float, tuple[Any, int]] = {}
+        self._next = 0
         try:
             self._load(path)
         except ModuleNotFoundError as error:
@@ -133,7 +153,7 @@ class LoadedFmu:
         except ParameterError:
             raise
         except Exception as error:
-            raise ParameterError(f"cannot be loaded ({failure_words(error)}), expected an FMU") from error
+            raise ParameterError(f"cannot be loaded ({self._words(error)}), expected an FMU") from error
         self.failure = ""
         """Reason of the last failure of a step; empty before the first"""
         self._function = STEP_FUNCTION(self._step)
@@ -141,19 +161,19 @@ class LoadedFmu:
             self._description.modelName,
             "",
             cast(self._function, c_void_p).value or 0,
-            0,
+            int(self._description.coSimulation.canGetAndSetFMUstate),
             tuple(map(_signal, self._inputs)),
             tuple(map(_signal, self._outputs)),
             (),
         )
 
     def _load(self, path: Path) -> None:
-        from fmpy import extract, read_model_description
-        from fmpy.fmi2 import FMU2Slave
+        from fmpy import extract, fmi2, read_model_description
         from fmpy.fmi3 import FMU3Slave
+        from fmpy.logging import addLoggerProxy
 
         found = read_model_description(str(path))
-        kinds = {"2": FMU2Slave, "3": FMU3Slave}
+        kinds = {"2": fmi2.FMU2Slave, "3": FMU3Slave}
         self._version = found.fmiVersion[0]
         if self._version not in kinds or found.coSimulation is None:
             raise ParameterError(f"FMI {found.fmiVersion}, expected an FMU for co-simulation, FMI 2.0 or 3.0")
@@ -161,21 +181,62 @@ class LoadedFmu:
         self._inputs = [v for v in found.modelVariables if v.causality == "input"]
         self._outputs = [v for v in found.modelVariables if v.causality == "output"]
         self._folder = extract(str(path), tempfile.mkdtemp())
-        self._fmu: Any = None
+        self._logger: dict[str, Any] = {"logMessage": self._log}
+        if self._version == "2":
+            callbacks = fmi2.fmi2CallbackFunctions.from_buffer_copy(fmi2.defaultCallbacks)
+            callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._log)
+            addLoggerProxy(byref(callbacks))
+            self._logger = {"callbacks": callbacks}
         self._instantiate()  # so that an FMU that fails here is refused before the flight
 
     def _instantiate(self) -> None:
         if self._fmu:
             with suppress(Exception):
+                for state, _ in self._saved.values():
+                    self._fmu.freeFMUState(state)
                 self._fmu.terminate()
             self._fmu.freeInstance()
+        self._saved.clear()
+        self._copy = 0.0
+        """Number of the copy whose state the instance has"""
         self._fmu = self._kind(
             instanceName="controller",
             guid=self._description.guid,
             modelIdentifier=self._description.coSimulation.modelIdentifier,
             unzipDirectory=str(self._folder),
         )
-        self._fmu.instantiate()
+        self._fmu.instantiate(**self._logger)
+
+    def _log(self, *arguments: Any) -> None:
+        """Keep the FMU's last message about a failure; it comes last among the arguments, after status and category."""
+        if arguments[-3] > 0:
+            self._logged = " ".join((arguments[-1] or b"").decode(errors="replace").split())
+
+    def _words(self, error: BaseException) -> str:
+        return ": ".join(filter(None, (failure_words(error), self._logged)))
+
+    def copied(self, number: float) -> int:
+        """Save the state of the copy ``number``, 0 for the original, as a new copy; return its number.
+
+        Raises:
+            RunError: The FMU failed.
+        """
+        try:
+            self._continue(number)
+            made = int(max((number, *self._saved))) + 1
+            self._saved[made] = self._fmu.getFMUState(), self._next
+        except FOREIGN_FAILURES as error:
+            raise RunError(self._words(error)) from error
+        return made
+
+    def _continue(self, number: float) -> None:
+        """Give the instance the state of the copy ``number``."""
+        if number != self._copy:
+            self._saved[self._copy] = self._fmu.getFMUState(), self._next
+            state, self._next = self._saved.pop(number)
+            self._fmu.setFMUState(state)
+            self._fmu.freeFMUState(state)
+            self._copy = number
 
     def _set(self, values: Mapping[int, float]) -> None:
         if values:
@@ -193,6 +254,7 @@ class LoadedFmu:
 
     def _step(self, k: int, given: int, out: int, state: int, par: int) -> int:
         """Step the FMU, as a step function of ``hsv_block.h``; ``par``: period (s), then :meth:`FmuClass._routes`."""
+        self._logged = ""
         try:
             count = len(self._inputs)
             period, *routes = (c_double * (1 + count + len(_OUTPUTS))).from_address(par)
@@ -204,6 +266,8 @@ class LoadedFmu:
             }
             if k == 0:
                 self._begin(values)
+            elif self.block.state_size:
+                self._continue(c_double.from_address(state).value)
             if k != self._next:
                 raise RunError(f"step {k} after {self._next - 1}, expected the steps of one flight in order")
             self._set(values)
@@ -215,7 +279,7 @@ class LoadedFmu:
             (c_double * len(_OUTPUTS)).from_address(out)[:] = read(wanted)
             self._next = k + 1
         except FOREIGN_FAILURES as error:
-            self.failure = failure_words(error)
+            self.failure = self._words(error)
             return 1
         return 0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
+import re
 import subprocess
 import uuid
 import zipfile
@@ -19,7 +20,7 @@ import numpy as np
 
 from hsv.base.errors import ParameterError
 from hsv.base.units import base_units
-from hsv.model.signals import SignalType, numbers_of
+from hsv.model.signals import SIGNALS, SignalType, numbers_of
 from hsv.plugins.library import load_block
 from hsv.plugins.library_answers import CBlock
 
@@ -107,13 +108,13 @@ def _numbers(signals: tuple[SignalType, ...]) -> list[tuple[str, str]]:
     return [number for signal in signals for number in numbers_of(signal)]
 
 
-def _parameter_numbers(block: CBlock) -> list[tuple[str, str, float, float, float]]:
-    """Return name, unit, value, minimum and maximum of each scalar; a parameter that is an array has several."""
+def _parameter_numbers(block: CBlock) -> list[tuple[str, str, float, float, float, str]]:
+    """Return name, unit, value, minimum, maximum and description of each scalar; an array has several."""
     rows = []
     for parameter in block.parameters:
         values, name = np.ravel(parameter.default), parameter.name.partition(".")[2]
         names = numbers_of(SignalType(name, parameter.unit or "1", len(values)))
-        limits = parameter.minimum, parameter.maximum
+        limits = parameter.minimum, parameter.maximum, parameter.description
         rows += [(*row, float(value), *limits) for row, value in zip(names, values, strict=True)]
     return rows
 
@@ -166,19 +167,21 @@ def _model_description(block: ExportedBlock, described: CBlock, token: str) -> b
     ElementTree.SubElement(root, "DefaultExperiment", experiment)
     variables = ElementTree.SubElement(root, "ModelVariables")
 
-    def variable(name: str, unit: str, causality: str, others: Mapping[str, str] = MappingProxyType({})) -> None:
+    def variable(name: str, unit: str, causality: str, **others: str) -> None:
+        known = SIGNALS.get(re.split(r"[.\[]", name)[0])
         attributes = {"name": name, "valueReference": str(len(variables)), "causality": causality, "unit": unit}
-        ElementTree.SubElement(variables, "Float64", {**attributes, **others})
+        attributes |= {"description": known.meaning} if known else {}
+        ElementTree.SubElement(variables, "Float64", attributes | others)
 
     for name, unit in inputs:
-        variable(name, unit, "input", {"start": repr(block.start.get(name, 0.0))})
-    for name, unit, value, low, high in parameters:
+        variable(name, unit, "input", start=repr(block.start.get(name, 0.0)))
+    for name, unit, value, low, high, meaning in parameters:
         limits = {"min": repr(low), "max": repr(high)} if np.isfinite((low, high)).all() else {}
-        variable(name, unit, "parameter", {"variability": "tunable", "start": repr(value), **limits})
+        variable(name, unit, "parameter", description=meaning, variability="tunable", start=repr(value), **limits)
     first = len(variables)
     for name, unit in outputs:
         variable(name, unit, "output")
-    variable("time", "s", "independent")
+    variable("time", "s", "independent", description="time of the simulation")
     structure = ElementTree.SubElement(root, "ModelStructure")
     for kind in ("Output", "InitialUnknown"):
         for reference in range(first, first + len(outputs)):

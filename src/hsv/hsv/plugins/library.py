@@ -255,9 +255,8 @@ class LibraryClass:
             self.block: CBlock = library_user(path).describe(symbol)
             self._check()
         except OSError as error:
-            raise ParameterError(
-                f"controller = {name!r}: cannot be read ({reason(error)}), expected a shared library"
-            ) from error
+            words = f"cannot be read ({reason(error)}), expected {'a shared library' if symbol else 'an FMU'}"
+            raise ParameterError(f"controller = {name!r}: {words}") from error
         except ProcessError as error:
             raise ParameterError(f"controller = {name!r}: {error} while it was loaded") from error
         except HsvError as error:

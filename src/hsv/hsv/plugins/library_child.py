@@ -59,6 +59,12 @@ class LoadedLibrary:
             return self._fmu.block
         return self._load(self._path, symbol)
 
+    def copied(self, number: float) -> int:
+        """Return the number of a new copy of an FMU's copy ``number``, see :meth:`hsv.plugins.fmu.LoadedFmu.copied`."""
+        self.describe("")
+        assert self._fmu is not None
+        return self._fmu.copied(number)
+
     def step(self, symbol: str, k: int, inputs: np.ndarray, state: np.ndarray, parameters: np.ndarray) -> np.ndarray:
         """Call the library's step function; return the unsaturated input (2), then the state after the step."""
         with self._reason():
