@@ -1,7 +1,7 @@
 """Answers of the child process of a library, in a fixed form that is read without running code.
 
 The library can write whatever it likes to the descriptors of its process, so that an answer is data from a stranger:
-a mark, the kind and the length, then numbers, bytes, or a text. Unlike the requests, no answer is a pickle.
+a mark and the length of a JSON text. Unlike the requests, no answer is a pickle.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from hsv.base.errors import HsvError, ProcessError
 from hsv.base.parameters import Parameter
 from hsv.model.signals import SignalType
 
-_HEADER = struct.Struct("<4scq")
+_HEADER = struct.Struct("<4sq")
 _MARK = b"hsv1"
 _MOST = 2**28
 """Maximum length (bytes) of an answer"""
@@ -45,10 +45,18 @@ class CBlock:
 
 def send_answer(descriptor: int, answer: Any) -> None:
     """Write ``answer`` to a socket: None, an error of the library, an integer, bytes, numbers, or a block."""
-    kind, content = _packed(answer)
-    message = memoryview(_HEADER.pack(_MARK, kind, len(content)) + content)
+    content = json.dumps(answer, default=_plain, ensure_ascii=False).encode()
+    message = memoryview(_HEADER.pack(_MARK, len(content)) + content)
     while message:
         message = message[os.write(descriptor, message) :]
+
+
+def _plain(answer: Any) -> Any:
+    if isinstance(answer, HsvError):
+        return {"error": type(answer).__name__, "text": str(answer)}
+    if isinstance(answer, bytes):
+        return answer.decode("latin-1")
+    return answer.tolist() if isinstance(answer, np.ndarray) else asdict(answer)
 
 
 def receive_answer(descriptor: int, patience: float) -> Any:
@@ -59,11 +67,11 @@ def receive_answer(descriptor: int, patience: float) -> Any:
         EOFError: The child has ended.
     """
     until = time.monotonic() + patience
-    mark, kind, length = _HEADER.unpack(_read(descriptor, _HEADER.size, until))
+    mark, length = _HEADER.unpack(_read(descriptor, _HEADER.size, until))
     if mark == _MARK and 0 <= length <= _MOST:
         try:
-            return _unpacked(kind, _read(descriptor, length, until))
-        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, RecursionError):
+            return _parsed(json.loads(_read(descriptor, length, until)))
+        except (ArithmeticError, LookupError, TypeError, ValueError, RecursionError):
             pass
     raise ProcessError("wrote to a descriptor that is not its own")
 
@@ -81,50 +89,26 @@ def _read(descriptor: int, length: int, until: float) -> bytes:
     return bytes(found)
 
 
-def _packed(answer: Any) -> tuple[bytes, bytes]:
-    if answer is None:
-        return b"-", b""
-    if isinstance(answer, HsvError):
-        return b"e", json.dumps([type(answer).__name__, str(answer)]).encode()
-    if isinstance(answer, int):
-        return b"i", struct.pack("<q", answer)
-    if isinstance(answer, bytes):
-        return b"b", answer
-    if isinstance(answer, np.ndarray):
-        return b"n", answer.tobytes()
-    return b"d", json.dumps(asdict(answer)).encode()
-
-
-def _unpacked(kind: bytes, content: bytes) -> Any:
-    if kind == b"-":
-        return None
-    if kind == b"e":
-        name, text = map(str, json.loads(content))
-        found = getattr(errors, name, None)
-        known = isinstance(found, type) and issubclass(found, HsvError) and found is not errors.SignalError
-        return found(text) if known and found else ProcessError(text)
-    if kind == b"i":
-        return struct.unpack("<q", content)[0]
-    if kind == b"b":
-        return content
-    if kind == b"n":
-        return np.frombuffer(content).copy()
-    if kind == b"d":
-        return _block(json.loads(content))
-    raise ValueError(kind)
-
-
-def _block(fields: dict[str, Any]) -> CBlock:
-    """Return the description of a block from its ``fields``, with the types that it must have."""
+def _parsed(found: Any) -> Any:
+    if isinstance(found, str):
+        return found.encode("latin-1")
+    if isinstance(found, list):
+        return np.array(found, float)
+    if not isinstance(found, dict):
+        return found
+    if "error" in found:
+        kind = getattr(errors, str(found["error"]), None)
+        known = isinstance(kind, type) and issubclass(kind, HsvError) and kind is not errors.SignalError
+        return (kind if known and kind else ProcessError)(str(found["text"]))
     parameters = []
-    for given in fields["parameters"]:
-        default = [float(each) for each in np.ravel(given["default"])]
+    for given in found["parameters"]:
+        default = np.ravel(np.array(given["default"], float)).tolist()
         name, description, unit = (str(given[key]) for key in ("name", "description", "unit"))
         bounds = float(given["minimum"]), float(given["maximum"])
         parameters.append(Parameter(name, default if len(default) > 1 else default[0], description, unit, *bounds))
     inputs, outputs = (
-        tuple(SignalType(str(s["name"]), str(s["unit"]), int(s["size"])) for s in fields[key])
+        tuple(SignalType(str(s["name"]), str(s["unit"]), int(s["size"])) for s in found[key])
         for key in ("inputs", "outputs")
     )
-    name, source, size = str(fields["name"]), str(fields["source"]), int(fields["state_size"])
-    return CBlock(name, source, int(fields["address"]), size, inputs, outputs, tuple(parameters))
+    name, source, size = str(found["name"]), str(found["source"]), int(found["state_size"])
+    return CBlock(name, source, int(found["address"]), size, inputs, outputs, tuple(parameters))
