@@ -10,6 +10,8 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "src" / "hsv"
+MINUTES = 10
+"""Processor time of the random calls of the core"""
 STRICT = "-Wall -Wextra -Werror"
 
 PROGRAM = """
@@ -44,17 +46,35 @@ def fly(library, first, stride, **environment):
     return flown.stdout.strip()
 
 
-@pytest.mark.long
-def test_all_flights_and_the_binding_under_the_sanitizers(tmp_path):
-    library = build(tmp_path, "gcc", "-O1 -fsanitize=address,undefined -fno-sanitize-recover=all")
+@pytest.fixture(scope="module")
+def sanitized(tmp_path_factory):
+    """Return the folder of a build with both sanitizers, and the variables with which it is imported."""
+    library = build(
+        tmp_path_factory.mktemp("sanitized"), "gcc", "-O1 -fsanitize=address,undefined -fno-sanitize-recover=all"
+    )
     runtime = subprocess.run(["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
     # Python and numpy do not free all memory at exit.
-    environment = {"LD_PRELOAD": runtime.stdout.strip(), "ASAN_OPTIONS": "detect_leaks=0"}
+    return library, {"LD_PRELOAD": runtime.stdout.strip(), "ASAN_OPTIONS": "detect_leaks=0"}
+
+
+@pytest.mark.long
+def test_all_flights_and_the_binding_under_the_sanitizers(sanitized):
+    library, environment = sanitized
     fly(library, 0, 5, **environment)
     words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests/core/test_binding.py"]
-    environment |= os.environ | {"PYTHONPATH": str(library)}
+    environment = os.environ | environment | {"PYTHONPATH": str(library)}
     tested = subprocess.run(words, env=environment, cwd=ROOT, capture_output=True, text=True)
     assert tested.returncode == 0, tested.stdout[-3000:]
+
+
+@pytest.mark.long
+def test_random_numbers_in_all_data_of_the_core_under_the_sanitizers(sanitized):
+    library, environment = sanitized
+    path = os.pathsep.join(map(str, (library, ROOT / "tests" / "support", ROOT / "tests" / "flight")))
+    words = [sys.executable, ROOT / "tests" / "support" / "fuzzed_core.py", str(MINUTES * 60)]
+    environment = os.environ | environment | {"PYTHONPATH": path}
+    ran = subprocess.run(words, env=environment, capture_output=True, text=True)
+    assert (ran.returncode, ran.stderr) == (0, "") and int(ran.stdout) > 0, ran.stderr[-3000:]
 
 
 @pytest.mark.long

@@ -29,7 +29,7 @@ int64_t hsv_begin_faults(hsv_faults *faults, int64_t k, int64_t seed)
                 memory->away = 0;
             else {
                 const double drawn = first_uniform(seed, k, FAULT_OCCURRENCE + fault->code, fault->channel);
-                if (drawn < fault->cycle[memory->away]) memory->away = !memory->away;
+                if (drawn < fault->cycle[memory->away != 0]) memory->away = !memory->away;
             }
             acts = !memory->away;
         }
