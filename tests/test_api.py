@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import hsv
-from hsv.base.errors import CampaignError, ParameterError, ScenarioError, TrimError
+from hsv.base.errors import CampaignError, DesignError, ParameterError, ScenarioError, TrimError
 from hsv.base.units import UnitSystem
 from hsv.control.design import digest
+from hsv.control.design_file import find_design, read_design
 from hsv.flight.assembly import design_parameters
 from hsv.flight.fingerprint import as_published
 from hsv.gym import TrackEnv, TrackVectorEnv
@@ -34,13 +35,36 @@ def test_a_shipped_scenario_flies_as_published(given):
 
 
 def test_flights_are_compared_and_swept():
-    flights = hsv.sweep("case1", "fault[0].effectiveness", [1.0, 0.7], SHORT)
+    flights = dict(hsv.sweep("case1", "fault[0].effectiveness", [1.0, 0.7], SHORT))
     assert [*flights] == [1.0, 0.7]
     table = hsv.compare({"whole": flights[1.0], "lost": flights[0.7]})
     deviation = table["post_fault_attitude_deviation"]
     assert 0.0 < deviation["whole"] < deviation["lost"]
     assert "altitude_settling_time" not in table  # six seconds are too short to settle
     assert len(hsv.plot({"whole": flights[1.0], "lost": flights[0.7]}).axes) == 8
+
+
+def test_a_swept_flight_is_the_one_flown_alone():
+    values = [f"{i} s" for i in range(1, 6)]
+    flights = dict(hsv.sweep("case1", "fault[0].start", values, {"duration": "6 s"}))
+    assert [*flights] == values
+    for value in values[::4]:
+        assert flights[value].fingerprint == hsv.fly(hsv.load("case1", {**SHORT, "fault[0].start": value})).fingerprint
+    designs = dict(hsv.sweep("case1", "design", ["baseline", "tight"], SHORT))
+    assert designs["tight"].fingerprint == hsv.fly(hsv.load("case1", {**SHORT, "design": "tight"})).fingerprint
+    with pytest.raises(ScenarioError, match=r"^scenario 'case1': duration = 0.03 s: expected a whole number"):
+        list(hsv.sweep("case1", "duration", ["0.02 s", "0.03 s"], {"fault": []}))
+    with pytest.raises(ScenarioError, match=r"^scenario 'case1': design = 'none': no such file"):
+        list(hsv.sweep("case1", "design", ["none"]))
+
+
+def test_a_design_is_kept_until_its_file_changes(tmp_path):
+    own, text = tmp_path / "own.yaml", find_design("baseline").read_text()
+    own.write_text(text)
+    assert read_design(own) is read_design(own)
+    own.write_text(text.replace("period: 0.02", "period: -1.0"))
+    with pytest.raises(DesignError, match="period"):
+        read_design(own)
 
 
 def test_a_flight_is_a_table_with_units():

@@ -257,7 +257,7 @@ def test_no_python_entry_point_but_those_that_fly_loads_the_controller(loaded, t
     scenario = hsv_package.load("own.toml")
     flying = {
         "fly": lambda: hsv_package.fly(scenario),
-        "sweep": lambda: hsv_package.sweep("own.toml", "seed", [1]),
+        "sweep": lambda: dict(hsv_package.sweep("own.toml", "seed", [1])),
         "montecarlo": lambda: hsv_package.montecarlo(
             "own.toml", 4, factors={"initial.altitude": ("26000 m", "26010 m")}
         ),
@@ -266,6 +266,7 @@ def test_no_python_entry_point_but_those_that_fly_loads_the_controller(loaded, t
         "load": lambda: hsv_package.load("own.toml"),
         "compare": None,
         "linearise": lambda: hsv_package.linearise(),
+        "loop": None,  # of tube_mpc only
         "trim": lambda: hsv_package.trim(),
         "plot": None,  # of flights
         "Flight": None,

@@ -66,4 +66,3 @@ def test_a_required_disk_margin_is_judged_by_the_certificate():
     for certificate in ({}, {"margins": {"vertices": {"elevator": {}}}}, {"margins": None}, other):
         assert margin_verdict(scenario, design, certificate) == unknown
     solved = load_scenario("case1_qp", {"limits.disk_margin": 0.5})
-    assert margin_verdict(solved, design)["words"] == "disk margin not judged: hsv margins case1_qp"

@@ -1,9 +1,11 @@
 """Calls of the core with random numbers in place of any of its data: ``python3 fuzzed_core.py SECONDS [SEED]``.
 
 Numbers and integers of any size, infinities and NaN stand in vehicles, polytopes, gains, notch filters, sensors,
-actuators, links, air, faults and memories. Left as they are: sizes of arrays, which the binding checks, and the indices
-of the polytope's entries, which the library computes. It ends after some seconds of processor time and prints how many
-flights it flew; the sanitizers with which the core was compiled end it at the first fault.
+actuators, links, air, faults and memories. Left as they are: sizes of arrays, which the binding checks, the indices of
+the polytope's entries, which the library computes, and the number of substeps, on which the time depends.
+
+It ends after SECONDS of processor time and prints the number of its flights. The sanitizers with which the core was
+compiled end it at the first fault.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ NUMBERS = (
     *(2.0**31, -(2.0**63), 2.0**64),
 )
 INTEGERS = (0, 1, -1, 2, 3, 51, 2**31 - 1, 2**31, -(2**31), 2**53, 2**63 - 1, -(2**63))
-KEPT = {"entries", "history", "auxiliary", "estimated", "nominal_law", "controller", "ended", "returned", "answer"}
+OUTPUTS = ("history", "auxiliary", "estimated", "nominal_law", "controller", "ended", "returned", "answer")
+KEPT = {"entries", "substeps", *OUTPUTS}
 
 
 def changed(value: Any, random: np.random.Generator, share: float, kind: str = "") -> Any:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from hsv.api import fly as fly
     from hsv.api import linearise as linearise
     from hsv.api import load as load
+    from hsv.api import loop as loop
     from hsv.api import montecarlo as montecarlo
     from hsv.api import plot as plot
     from hsv.api import sweep as sweep
@@ -35,6 +36,7 @@ __all__ = [
     "fly",
     "linearise",
     "load",
+    "loop",
     "montecarlo",
     "plot",
     "sweep",

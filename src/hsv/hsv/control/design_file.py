@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -44,11 +45,14 @@ def read_parameters(path: Path) -> dict[str, Any]:
     Raises:
         DesignError: The file cannot be read, or :func:`parse_parameters` refuses it.
     """
+    return parse_parameters(_text(path), str(path))
+
+
+def _text(path: Path) -> str:
     try:
-        text = read_text(path)
+        return read_text(path)
     except DocumentError as error:
         raise DesignError(f"design {str(path)!r}: {error}, expected a parameter file") from error
-    return parse_parameters(text, str(path))
 
 
 def parse_parameters(text: str, source: str) -> dict[str, Any]:
@@ -91,14 +95,20 @@ def _no_parameters(source: str) -> DesignError:
 
 def read_design(path: Path) -> ControlDesign:
     """Return the design in the parameter file at ``path``; a DesignError names the file and the wrong parameter."""
-    values = read_parameters(path)
+    return _design_in(_text(path), str(path))
+
+
+@lru_cache(maxsize=4)
+def _design_in(text: str, source: str) -> ControlDesign:
+    """Return the design in a ``text``; the last ones are kept, because reading takes longer than a flight."""
+    values = parse_parameters(text, source)
     try:
         for name in values:
             if name not in _NAMES:
                 raise DesignError(f"parameter {name}: unknown, expected those of a design{did_you_mean(name, _NAMES)}")
         return ControlDesign.from_parameters(values)
     except DesignError as error:
-        raise DesignError(f"{path}: {error}") from error
+        raise DesignError(f"{source}: {error}") from error
 
 
 def find_design(name: str) -> Path:

@@ -94,13 +94,17 @@ def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> 
         if design and TAU.name in own:
             design = design.with_tau(own[TAU.name])
         components = assemble_with(design, own)
-        plant = components.plant
-        given = f"duration = {scenario.duration:g} s"
-        if plant.steps < 1:
-            raise ScenarioError(f"{given}: expected at least a period, {plant.period:g} s")
-        if abs(plant.steps * plant.period - scenario.duration) > 1e-9 * scenario.duration:
-            raise ScenarioError(f"{given}: expected a whole number of periods, {plant.period:g} s each")
+        check_duration(scenario, components)
     return components
+
+
+def check_duration(scenario: Scenario, components: Components) -> None:
+    """Raise a ScenarioError if the duration of ``scenario`` is not a number of periods of its ``components``."""
+    plant, given = components.plant, f"duration = {scenario.duration:g} s"
+    if plant.steps < 1:
+        raise ScenarioError(f"{given}: expected at least a period, {plant.period:g} s")
+    if abs(plant.steps * plant.period - scenario.duration) > 1e-9 * scenario.duration:
+        raise ScenarioError(f"{given}: expected a whole number of periods, {plant.period:g} s each")
 
 
 @contextmanager

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from hsv.base.errors import HsvError, ScenarioError
-from hsv.certificate.loops import Feedback, Hardware, vertex_loops
+from hsv.base.errors import HsvError, QuantityError, ScenarioError, one_of
+from hsv.certificate.loops import INPUTS, MEASUREMENTS, Feedback, Hardware, vertex_loops
 from hsv.certificate.margins import (
     LoopMargins,
     Place,
@@ -27,10 +27,11 @@ from hsv.control.design_file import certificate_path, find_design, read_certific
 from hsv.control.tube_law import TubeLaw
 from hsv.flight.assembly import assemble_flight, assemble_with
 from hsv.flight.closed_loop import Components, fly
-from hsv.flight.scenario import Scenario, scenario_table, scenario_text
+from hsv.flight.scenario import Scenario, load_scenario, scenario_table, scenario_text
 from hsv.model.actuators import SUBSTEPS, ActuatorSet
-from hsv.model.signals import INPUT_NAMES, STATE_NAMES
-from hsv.model.trim import initial_trim
+from hsv.model.lpv.actuated import actuator_names
+from hsv.model.signals import INPUT_NAMES, N_RIGID, STATE_NAMES
+from hsv.model.trim import initial_trim, trim_at
 
 LEG = 8
 """Number of parts into which each leg of the commanded trajectory is divided."""
@@ -201,6 +202,78 @@ def scenario_loops(scenario: Scenario) -> VehicleLoops:
         places["fault"] = Place(points[-1], float(np.prod(lost)))
     own = dict(scenario.vehicle.perturbation)
     return VehicleLoops(feedback, initial_trim(values)[0], scenario.vehicle.described.uncertainty, places, own)
+
+
+@dataclass(frozen=True)
+class OpenLoop:
+    """The loop of plant, hardware, notch filter and feedback, broken at one place: x(k+1) = A x + B v, y = C x.
+
+    v are the signals behind the break, y minus the signals that return to it: y = L v, and v = -y closes the loop, as
+    in ``feedback`` and ``margin`` of python-control.
+    """
+
+    A: np.ndarray
+    """State matrix (n, n), discrete time"""
+    B: np.ndarray
+    """Input matrix (n, m)"""
+    C: np.ndarray
+    """Output matrix (m, n)"""
+    period: float
+    """Sampling period (s)"""
+    states: tuple[str, ...]
+    """Names of the states: deviations of the vehicle's from trim (SI), actuators, delayed commands, notch filter"""
+    signals: tuple[str, ...]
+    """Names of the signals at the break: inputs (1, rad) or a measurement (SI)"""
+
+    def to_control(self) -> Any:
+        """Return L as a ``StateSpace`` of python-control with named signals; outputs end in ``_returned``."""
+        import control
+
+        outputs = [f"{name}_returned" for name in self.signals]
+        names = {"states": list(self.states), "inputs": list(self.signals), "outputs": outputs}
+        return control.ss(self.A, self.B, self.C, np.zeros((len(self.C),) * 2), self.period, **names)
+
+
+def loop(
+    design: str = "",
+    scenario: str | Scenario = "case1",
+    altitude: float | str = "",
+    velocity: float | str = "",
+    *,
+    at: str = "elevator",
+) -> OpenLoop:
+    """Return the linear loop of a design in the flight of a scenario around a level trim, broken ``at`` one place.
+
+    Args:
+        design: Name or path of a design; empty: that of the scenario.
+        scenario: Scenario, its name or path, with vehicle, actuators, delays and notch filter.
+        altitude: m, or a text with unit; empty, with an empty velocity: both as at the start of the scenario.
+        velocity: m/s, or a text with unit.
+        at: ``elevator``, ``fuel`` or ``both`` inputs, or one of the first five states: the measurement of it.
+
+    Raises:
+        ScenarioError: The loop of the scenario is not the linear one of the feedback F; the message says why.
+        QuantityError, TrimError: An argument is wrong, or there is no equilibrium.
+    """
+    if at not in (known := (*INPUTS, *MEASUREMENTS)):
+        raise QuantityError(f"at = {at!r}: expected {one_of(known, at)}")
+    given = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    given = given.model_copy(update={"design": design}) if design else given
+    around, described = scenario_loops(given), given.vehicle.described
+    vehicle, hardware = around.vehicle.perturbed(around.own), around.feedback.hardware
+    point = around.places["start"].point
+    if altitude != "" or velocity != "":
+        reached = trim_at(vehicle, *described.condition(altitude, velocity)).state
+        point = float(reached[0]), float(reached[1])
+    sampled = around.feedback.around(vehicle, point)
+    broken = sampled.broken(at)
+    known = (*STATE_NAMES[: None if vehicle.form.elastic else N_RIGID], *actuator_names(hardware.actuators))
+    filters = tuple(f"filter_{i + 1}" for i in range(sampled.filter_states))
+    waiting = range(len(sampled.A) - len(known) - len(filters))
+    delayed = tuple(f"{INPUT_NAMES[i % 2]}_before_{i // 2 + 1}" for i in waiting)
+    names = tuple(INPUT_NAMES[i] for i in INPUTS[at]) if at in INPUTS else (at,)
+    opened = broken.A - broken.B @ broken.C
+    return OpenLoop(opened, broken.B, -broken.C, broken.period, (*known, *delayed, *filters), names)
 
 
 def margin_verdict(

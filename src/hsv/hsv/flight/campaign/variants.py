@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 from hsv.base.errors import CampaignError
 from hsv.control.controller import SHIPPED_CONTROLLERS
 from hsv.control.design import design_of
 from hsv.control.nominal_trajectory import NominalTrajectory
-from hsv.flight.assembly import assemble, assemble_flight, scenario_parameters
-from hsv.flight.closed_loop import Components
+from hsv.core import lanes
+from hsv.flight.assembly import (
+    assemble,
+    assemble_flight,
+    blamed_on,
+    check_duration,
+    design_parameters,
+    scenario_parameters,
+)
+from hsv.flight.closed_loop import Components, fly
+from hsv.flight.flight import Flight
 from hsv.flight.scenario import Scenario
+from hsv.flight.side_by_side import FlightGroup
 from hsv.model.faults.injector import FaultInjector
 from hsv.model.plant import PLANT_PARAMETERS, Plant
 from hsv.model.trim import initial_trim
@@ -26,6 +37,30 @@ _PERTURBATION = "vehicle.perturbation."
 
 _CHANGES = {p.name.removeprefix(_PERTURBATION): p for p in PLANT_PARAMETERS if p.name.startswith(_PERTURBATION)}
 """Declarations of the relative changes ``vehicle.perturbation.*``, by the name of the vehicle's parameter."""
+
+
+def fly_variants(scenarios: Iterable[Scenario]) -> Iterator[Flight]:
+    """Fly ``scenarios``, most of which are variants of the first, in order and side by side where possible.
+
+    Raises:
+        ScenarioError: A field or the design is wrong; the message names it.
+        RunError: A custom controller failed.
+    """
+    given = iter(scenarios)
+    kind, variants = None, None
+    while some := [*islice(given, lanes())]:
+        built = []
+        for scenario in some:
+            if variants is None or kind != (scenario.design, scenario.controller):
+                kind = scenario.design, scenario.controller
+                with blamed_on(scenario):
+                    design = design_parameters(scenario)
+                variants = FlightVariants(scenario, design)
+            with blamed_on(scenario):
+                built.append(variants.components(scenario))
+                check_duration(scenario, built[-1])
+        # A group of its own for each, because the flights may be kept.
+        yield from (each for each, _ in FlightGroup().fly(built)) if FlightGroup.takes(built) else map(fly, built)
 
 
 class FlightVariants:
@@ -43,10 +78,10 @@ class FlightVariants:
             )
         self._parameters = dict(design)
         self._design = design_of(design)
-        self._nominal = {**design, **scenario_parameters(scenario)}
-        self._kept_for = _NOT_OF_SHIPPED if scenario.controller in SHIPPED_CONTROLLERS else HIDDEN_PARAMETERS
         self.unchanged: Components = assemble_flight(scenario, self._design)
         """Components of the flight of the scenario itself"""
+        self._nominal = {**design, **scenario_parameters(scenario)}
+        self._kept_for = _NOT_OF_SHIPPED if scenario.controller in SHIPPED_CONTROLLERS else HIDDEN_PARAMETERS
         self._vehicle, _ = initial_trim(self._nominal)
 
     def components(self, scenario: Scenario) -> Components:
