@@ -67,7 +67,7 @@ def sweep(
         ScenarioError: A field or the design is wrong; the message names it.
         RunError: A custom controller failed.
     """
-    load(name, changes)  # so that errors in what all flights share are raised at the call
+    require("scenario", name, str, "a name, or a path as text")
     given = [*values]
     scenarios = (load(name, {**(changes or {}), field: value}) for value in given)
     return zip(given, fly_variants(scenarios), strict=True)
