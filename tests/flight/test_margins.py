@@ -1,11 +1,14 @@
 """Borders of stability: flights on both sides of the computed ones; and which scenarios have no margins, and why."""
 
+import control
+import numpy as np
 import pytest
 
-from hsv.base.errors import ScenarioError
+from hsv.base.errors import QuantityError, ScenarioError
+from hsv.certificate.margins import classical_margins
 from hsv.control.design_file import find_certificate, find_design, read_certificate, read_design
 from hsv.flight.assembly import flight_parameters
-from hsv.flight.margins import corner_file, flown_borders, margin_verdict, scenario_loops
+from hsv.flight.margins import corner_file, flown_borders, loop, margin_verdict, scenario_loops
 from hsv.flight.scenario import load_scenario, parse_scenario
 
 
@@ -66,3 +69,27 @@ def test_a_required_disk_margin_is_judged_by_the_certificate():
     for certificate in ({}, {"margins": {"vertices": {"elevator": {}}}}, {"margins": None}, other):
         assert margin_verdict(scenario, design, certificate) == unknown
     solved = load_scenario("case1_qp", {"limits.disk_margin": 0.5})
+    assert margin_verdict(solved, design)["words"] == "disk margin not judged: hsv margins case1_qp"
+
+
+@pytest.mark.parametrize("at", ["elevator", "fuel", "both", "pitch_rate", "altitude"])
+def test_the_loop_of_a_scenario_is_a_state_space_of_python_control(at):
+    around = scenario_loops(load_scenario("case1_realistic", {"link.computational_delay": "30 ms"}))
+    own = loop("", load_scenario("case1_realistic", {"link.computational_delay": "30 ms"}), at=at)
+    L, sampled = own.to_control(), around.loop("", "start")
+    closed = control.feedback(L, np.eye(len(own.signals)))
+    np.testing.assert_allclose(closed.A, sampled.closed, atol=1e-9)
+    assert len(own.states) == len(L.A) and own.states[-1] == "filter_2" and "elevator_deflection_before_2" in own.states
+    if at != "both":
+        assert L(np.exp(1j * 4.0 * own.period)) == pytest.approx(sampled.broken(at).transfer(4.0), rel=1e-6)
+
+
+def test_margins_of_the_loop_are_those_of_hsv_margins():
+    own = loop("robust", altitude="86000 ft", velocity="7800 ft/s")
+    margins = classical_margins(scenario_loops(load_scenario("case1_robust")).loop("", "start").broken("elevator"))
+    theirs = control.stability_margins(loop("robust").to_control(), returnall=True, method="frd")[0]
+    for border in (margins.gain_up, margins.gain_down):
+        assert min(abs(theirs / border - 1.0)) < 0.01
+    assert own.signals == ("elevator_deflection",) and not np.array_equal(own.A, loop("robust").A)
+    with pytest.raises(QuantityError, match=r"^at = 'rudder': expected one of fuel, elevator"):
+        loop(at="rudder")
