@@ -79,7 +79,7 @@ def test_a_flight_is_a_table_with_units():
 
 
 def test_a_campaign_is_a_table_with_a_row_per_flight():
-    table = hsv.montecarlo("case1", 3, seed=5, factors={"fault[0].start": ("90 s", "110 s")})
+    table = hsv.montecarlo("case1", 3, seed=5, factor={"fault[0].start": ("90 s", "110 s")})
     assert len(table) == 3 and table["fingerprint"].nunique() == 3
     assert table["sample_fault[0].start"].between(90.0, 110.0).all()
     assert table.attrs["units"]["sample_fault[0].start"] == "s"
@@ -161,7 +161,7 @@ def test_the_package_itself_imports_nothing_heavy():
         (lambda: hsv.montecarlo("case1", 4, workers=2.5), "workers = 2.5: expected an integer from 0 to 4096"),
         (lambda: hsv.montecarlo("case1", "many"), "samples = 'many': expected an integer"),
         (lambda: hsv.montecarlo("case1", 4, seed=1.5), "seed = 1.5: expected an integer"),
-        (lambda: hsv.montecarlo("case1", 4, factors=[1]), "factors = [1]: expected least and largest values by field"),
+        (lambda: hsv.montecarlo("case1", 4, factor=[1]), "factors = [1]: expected least and largest values by field"),
         (lambda: TrackEnv(5), "scenario = 5: expected a name, or a path as text"),
         (lambda: TrackVectorEnv(2.5), "num_envs = 2.5: expected an integer above zero"),
         (lambda: TrackVectorEnv(0), "num_envs = 0: expected an integer above zero"),

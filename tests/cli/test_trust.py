@@ -76,6 +76,7 @@ def test_a_campaign_is_summed_up_without_the_code_that_it_names(hsv, campaign, l
     shown = hsv("montecarlo", "summary", campaign)
     assert shown.code == 0 and "4 of 4" in shown.out
     assert "marked:Own, which runs only with --trust" in (tmp_path / "own.html").read_text()
+    assert len(hsv_package.read_campaign(tmp_path / campaign)) == 4
     assert not loaded()
     assert hsv("montecarlo", "summary", campaign, "--trust").code == 0
     assert "Solid: the scenario unchanged" in (tmp_path / "own.html").read_text()
@@ -259,12 +260,13 @@ def test_no_python_entry_point_but_those_that_fly_loads_the_controller(loaded, t
         "fly": lambda: hsv_package.fly(scenario),
         "sweep": lambda: dict(hsv_package.sweep("own.toml", "seed", [1])),
         "montecarlo": lambda: hsv_package.montecarlo(
-            "own.toml", 4, factors={"initial.altitude": ("26000 m", "26010 m")}
+            "own.toml", 4, factor={"initial.altitude": ("26000 m", "26010 m")}
         ),
     }
     reading = {
         "load": lambda: hsv_package.load("own.toml"),
         "compare": None,
+        "read_campaign": None,  # of a result, read above
         "linearise": lambda: hsv_package.linearise(),
         "loop": None,  # of tube_mpc only
         "trim": lambda: hsv_package.trim(),

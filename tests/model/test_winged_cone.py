@@ -106,7 +106,7 @@ def test_its_flight_has_no_metric_of_modes_and_stays_in_the_certified_tube():
 
 @pytest.mark.long
 def test_at_all_corners_of_its_uncertainty_none_is_lost_and_none_leaves_the_set():
-    flights = hsv.montecarlo("winged_cone", method="corners")
+    flights = hsv.montecarlo("winged_cone", corners=True)
     assert len(flights) == 128 and not flights["diverged"].any() and not flights["crashed"].any()
     assert (flights["end_time"] == 200.0).all() and (flights["saturated_steps"] == 0).all()
     assert flights["tube_level"].max() == pytest.approx(0.205, abs=5e-4)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from hsv.api import loop as loop
     from hsv.api import montecarlo as montecarlo
     from hsv.api import plot as plot
+    from hsv.api import read_campaign as read_campaign
     from hsv.api import sweep as sweep
     from hsv.api import trim as trim
 
@@ -39,6 +40,7 @@ __all__ = [
     "loop",
     "montecarlo",
     "plot",
+    "read_campaign",
     "sweep",
     "trim",
 ]

@@ -85,27 +85,30 @@ def compare(flights: Mapping[str, Flight]) -> dict[str, dict[str, float]]:
 
 
 def montecarlo(
-    scenario: str,
+    scenario: Scenario | str,
     samples: int = 1000,
     *,
     seed: int = 1,
-    method: str = "uniform",
+    sampling: str = "uniform",
+    corners: bool = False,
     scale: float = 1.0,
-    factors: Mapping[str, tuple[object, object]] | None = None,
+    factor: Mapping[str, Sequence[object]] | None = None,
     workers: int = 1,
 ) -> DataFrame:
     """Fly a campaign; return a table with one row per flight: varied values, outcome, metrics and fingerprint.
 
-    The SI units of the columns are in ``attrs["units"]``. A script that uses several workers must call this function
-    under ``if __name__ == "__main__"``.
+    The arguments are the options of ``hsv montecarlo``. The table is that of :func:`read_campaign`. A script that uses
+    several workers must call this function under ``if __name__ == "__main__"``.
 
     Args:
-        scenario: Name of a shipped scenario, or path.
-        samples: Number of flights, a power of two for ``sobol``; ignored for ``corners``.
-        seed: Seed from which all samples are drawn.
-        method: ``uniform``, ``latin_hypercube``, ``sobol`` or ``corners`` (all combinations of extreme values).
+        scenario: A scenario of :func:`load`, the name of a shipped scenario, or a path.
+        samples: Number of flights, for each point of a grid; a power of two for ``sobol``, ignored for corners.
+        seed: Seed from which all samples and the noise are drawn: the same seed, the same vehicles and noise.
+        sampling: ``uniform``, ``latin_hypercube`` or ``sobol``.
+        corners: Whether to fly all combinations of extreme values.
         scale: Factor on the bounds of the vehicle's uncertain parameters; with 0 these bounds are not used.
-        factors: Least and largest value of further fields, by field, written as in a scenario file.
+        factor: Values of further fields by name, as in a scenario file: a pair of the least and the largest value, or
+            a list with the values of a grid. A pair is a tuple.
         workers: Number of processes: 1 to fly in this process, 0 for one per processor.
 
     Raises:
@@ -117,11 +120,27 @@ def montecarlo(
     from hsv.flight.campaign.store import ResultStore
     from hsv.flight.campaign.summary import Results
 
-    campaign = plan(scenario, method=method, samples=samples, seed=seed, scale=scale, factors=factors)
+    method = "corners" if corners else sampling
+    campaign = plan(scenario, method=method, samples=samples, seed=seed, scale=scale, factors=factor)
     with TemporaryDirectory() as folder, make_executor(workers) as executor:
         path = Path(folder, "campaign.parquet")
         run_campaign(campaign, ResultStore(path, campaign), executor)
         return Results(path).frame()
+
+
+def read_campaign(path: Path | str) -> DataFrame:
+    """Return the result file of a campaign as a table with one row per flight, without running code that it names.
+
+    ``attrs["units"]`` has the SI unit of each column, ``attrs["limits"]`` the limits (SI) of its metrics, and
+    ``attrs["vehicles"]`` the number of flights at each point of the grid. The columns are described in
+    docs/montecarlo.md.
+
+    Raises:
+        CampaignError: The file is missing, damaged, not the result of a campaign, or of an unknown format.
+    """
+    from hsv.flight.campaign.summary import Results
+
+    return Results(Path(path)).frame()
 
 
 def trim(

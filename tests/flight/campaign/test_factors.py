@@ -123,3 +123,34 @@ def test_samples_stay_what_they_were_in_every_bit(method):
 def test_wrong_settings_are_named(planned, settings, field):
     with pytest.raises(CampaignError, match=rf"^{field} = .*expected"):
         planned(**settings)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_grid_flies_the_same_vehicles_with_the_same_noise_at_every_point(planned, method):
+    one = planned(method=method, samples=4, scale=1.0, factors={})
+    swept = planned(
+        method=method, samples=4, factors={"fault[0].start": ["1 s", "2 s"], "fault[0].effectiveness": [0.9]}
+    )
+    assert (swept.samples, swept.vehicles) == (2 * one.samples, one.samples)
+    names = [factor.name for factor in swept.factors]
+    samples, _ = draw(swept)
+    vehicles = samples[:, [not factor.values for factor in swept.factors]]
+    np.testing.assert_array_equal(vehicles, np.tile(draw(one)[0], (2, 1)))
+    assert samples[:, names.index("fault[0].start")].tolist() == [1.0] * one.samples + [2.0] * one.samples
+    assert swept.flight_seed(1) == swept.flight_seed(one.samples + 1) == one.flight_seed(1)
+    assert Campaign.from_text(swept.text) == swept
+    for flights in (range(3, 6), range(one.samples - 1, one.samples + 1)):
+        np.testing.assert_array_equal(swept.draw(flights)[0], samples[flights.start : flights.stop])
+
+
+@pytest.mark.parametrize(
+    ("factors", "words"),
+    [
+        ({"fault[0].start": ["1 s", "1 s"]}, "expected different numbers"),
+        ({"fault[0].start": []}, r"expected grid = \[value, value, ...\]"),
+        ({"fault[0].start": ["1 s", "200 s"]}, "expected a time before the flight's end"),
+    ],
+)
+def test_a_wrong_grid_is_named(planned, factors, words):
+    with pytest.raises(ScenarioError, match=words):
+        planned(factors=factors)

@@ -128,8 +128,8 @@ def rewritten(path, campaign=None, without=()):
     [
         ({"wind": 3.0, "commit": "abc"}, (), "written by commit abc, which this version does not read"),
         ({"factors": [{"name": "wind", "unit": "1", "low": 0.0, "high": 1.0}]}, (), "factor 'wind'"),
-        ({}, ("tube_level",), "has no column 'tube_level', written by commit test"),
-        ({}, ("hsv.envelope",), "has no envelope .* written by commit test"),
+        ({}, ("tube_level",), "has no column 'tube_level', written by commit unknown"),
+        ({}, ("hsv.envelope",), "has no envelope .* written by commit unknown"),
     ],
 )
 def test_a_result_of_another_version_is_refused_with_its_commit(results, out, campaign, without, expected):

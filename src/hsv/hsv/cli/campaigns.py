@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from dataclasses import replace
 from enum import StrEnum
 from itertools import chain
@@ -71,13 +72,13 @@ montecarlo = typer.Typer(
 @montecarlo.command()
 def fly(
     scenario: ScenarioArgument = "case1",
-    samples: Annotated[int | None, Option(help=f"Number of flights; default: {_SAMPLES}.")] = None,
+    samples: Annotated[int | None, Option(help=f"Flights, for each point of a grid; default: {_SAMPLES}.")] = None,
     seed: Annotated[int, Option(help="Determines all samples.")] = 1,
     sampling: Annotated[Sampling | None, Option(help="How samples are drawn; default: uniform.")] = None,
     corners: Annotated[bool, Option("--corners", help="Fly all combinations of extreme values.")] = False,
     scale: Annotated[float, Option(help="Factor on the parameters' bounds; 0 leaves them alone.")] = 1.0,
     factor: Annotated[
-        list[str] | None, Option(help="Vary a field, e.g. 'fault[0].start=90 s..110 s'; repeatable.")
+        list[str] | None, Option(help="Vary a field: 'FIELD=90 s..110 s', or a grid, FIELD=0.9,0.8,0.7.")
     ] = None,
     changes: SetOption = None,
     out: Annotated[Path | None, Option(help="Result file; default: campaigns/<scenario>_<method>.parquet.")] = None,
@@ -93,7 +94,9 @@ def fly(
     A flight whose controller crashes is recorded with the reason, and the campaign continues. The exit code is 1 if
     every flight crashed.
 
-    Example: hsv montecarlo fly case1 --samples 1000 --seed 7 --factor "fault[0].start=90 s..110 s"
+    With a grid, the same vehicles with the same noise fly at each of its points.
+
+    Example: hsv montecarlo fly case1 --samples 100 --factor "fault[0].effectiveness=0.9,0.8,0.7"
     """
     from hsv.cli.summary import show_campaign
     from hsv.flight.campaign.campaign import plan
@@ -108,15 +111,15 @@ def fly(
         if corners and value is not None:
             raise CampaignError(f"{name} = {value}: expected no --{name} with --corners, which defines the flights")
     method = "corners" if corners else (sampling or Sampling.uniform).value
-    factors: dict[str, tuple[object, object]] = {}
+    factors: dict[str, Sequence[object]] = {}
     for text in factor or ():
-        field, ends = (part.strip() for part in text.partition("=")[::2])
-        low, dots, high = ends.partition("..")
-        if not dots:
-            raise CampaignError(f"factor = {text!r}: expected FIELD=LEAST..LARGEST")
+        field, values = (part.strip() for part in text.partition("=")[::2])
+        low, dots, high = values.partition("..")
+        if not dots and "," not in values:
+            raise CampaignError(f"factor = {text!r}: expected FIELD=LEAST..LARGEST or FIELD=VALUE,VALUE,...")
         if field in factors:
             raise CampaignError(f"factor = {text!r}: a field is given twice, expected once")
-        factors[field] = low.strip(), high.strip()
+        factors[field] = (low.strip(), high.strip()) if dots else [value.strip() for value in values.split(",")]
     count = _SAMPLES if samples is None else samples
     changed = read_changes(changes or ())
     campaign = plan(scenario, method=method, samples=count, seed=seed, scale=scale, factors=factors, changes=changed)

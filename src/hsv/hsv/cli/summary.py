@@ -12,7 +12,7 @@ import numpy as np
 from rich.text import Text
 
 from hsv.base.errors import RunError
-from hsv.base.units import UnitSystem, in_system, significant, unit_in
+from hsv.base.units import UnitSystem, in_system, quantity_text, significant, unit_in
 from hsv.cli import output
 from hsv.flight.fingerprint import as_published, published_in_words
 from hsv.flight.flight import step_times_in_words
@@ -21,7 +21,7 @@ from hsv.flight.metrics import NOT_REACHED, grouped, is_share, metric_of, spaced
 from hsv.flight.scenario import Scenario
 
 if TYPE_CHECKING:
-    from hsv.flight.campaign.summary import Results
+    from hsv.flight.campaign.summary import Results, Share
 
 _LISTED = 5
 """Number of worst flights listed on the terminal; the page has more."""
@@ -160,7 +160,7 @@ def print_metrics(
 
 def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, flown: int | None = None) -> None:
     """Print a campaign's summary and, with ``page``, write its page; ``flown`` (for JSON): number of new flights."""
-    from hsv.flight.campaign.summary import CONFIDENCE, distributions, shares, worst_flights
+    from hsv.flight.campaign.summary import CONFIDENCE, distributions, points, shares, worst_flights
     from hsv.pages.campaign import write_campaign_page
 
     written = results.path.with_suffix(".html") if page else None
@@ -181,6 +181,16 @@ def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, f
                     for share in shares(results)
                 ],
                 "disk_margin": results.disk_margin,
+                "grid": [
+                    {
+                        "values_si": point.values,
+                        "finished": point.survived.within,
+                        "interval": point.survived.interval,
+                        "within_all": point.within_all,
+                        "flights": point.survived.flights,
+                    }
+                    for point in points(results)
+                ],
                 "distributions": {
                     d.name: {
                         statistic: in_system(getattr(d, statistic), d.unit, output.json_system(units))[0]
@@ -206,22 +216,30 @@ def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, f
 
 
 def _print_campaign(results: Results, units: UnitSystem) -> None:
-    from hsv.flight.campaign.summary import ENDED, distributions, shares, worst_flights
+    from hsv.flight.campaign.summary import ENDED, distributions, points, shares, worst_flights
 
     headings = ("limit", "", "within", "share", "95 % interval")
     ended = f"{lost} lost, limits are those of the others" if (lost := np.sum(~results.finished)) else "none lost"
-    title = f"{results.campaign.scenario.title}: {results.campaign.samples} flights, {ended}"
+    campaign = results.campaign
+    title = f"{campaign.scenario.title}: {campaign.samples} flights, {ended}"
     table = output.new_table(*headings, title=title, right=headings[1:])
     for share in shares(results):
         limit = "" if share.limit is None else " ".join(_outcome(share.name, share.limit, units)).strip()
-        every = "all corners" if share.flights else "does not apply"
-        interval = every if share.interval is None else " to ".join(f"{100.0 * p:.3g} %" for p in share.interval)
         within = f"{share.within} of {share.flights}", f"{100.0 * share.fraction:.3g} %"
         within = within if share.flights else ("-", "-")
-        table.add_row(spaced(share.name), limit, *within, interval)
+        table.add_row(spaced(share.name), limit, *within, _interval(share))
     output.console.print(table)
     if results.disk_margin:
         output.say(results.disk_margin["words"])
+    if swept := points(results):
+        columns, unit_of = ("finished", "share", "95 % interval", "all limits"), {f.name: f.unit for f in campaign.grid}
+        table = output.new_table(*swept[0].values, *columns, right=columns)
+        for point in swept:
+            share = point.survived
+            values = [quantity_text(value, unit_of[name], units) for name, value in point.values.items()]
+            counts = f"{share.within} of {share.flights}", f"{100.0 * share.fraction:.3g} %"
+            table.add_row(*values, *counts, _interval(share), f"{point.within_all} of {share.flights}")
+        output.console.print(table)
     numbers = ("least", "median", "95 %", "largest")
     table = output.new_table("metric", *numbers, "unit", right=numbers)
     for d in distributions(results):
@@ -236,6 +254,11 @@ def _print_campaign(results: Results, units: UnitSystem) -> None:
         used = "not reached" if math.isinf(w.ratio) else f"at {100 * w.ratio:.0f} % of its limit"
         used = w.limit if w.limit in ENDED else f"{spaced(w.limit)} {used}"
         output.say(output.folded(f"{w.flight}: {used}; {sample_words(w.sample, units)}", 4, first=2))
+
+
+def _interval(share: Share) -> str:
+    every = "all corners" if share.flights else "does not apply"
+    return every if share.interval is None else " to ".join(f"{100.0 * p:.3g} %" for p in share.interval)
 
 
 def sample_words(sample: Mapping[str, float], units: UnitSystem) -> str:

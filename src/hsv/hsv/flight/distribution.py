@@ -17,8 +17,8 @@ from hsv.base.errors import QuantityError
 from hsv.base.units import parse_quantity, rounded
 from hsv.core.arithmetic import logarithm, of_each
 
-KINDS = {"uniform": "[least, largest]", "normal": "[mean, standard deviation]"}
-"""Kinds of distributions by their key in a file, each with the meaning of its two values."""
+KINDS = {"uniform": "[least, largest]", "normal": "[mean, standard deviation]", "grid": "[value, value, ...]"}
+"""Kinds of distributions by their key in a file, each with the meaning of its values. A grid is not drawn but swept."""
 
 TRUNCATION = 3.0
 """Number of standard deviations from the mean to each end of a truncated normal distribution."""
@@ -74,13 +74,20 @@ class Distribution:
     low: float
     high: float
     kind: str = "uniform"
-    """One of :data:`KINDS`, each symmetric about its mean"""
+    """One of :data:`KINDS`; those that are drawn are symmetric about the mean"""
     whole: bool = False
     """Whether the number is an integer, drawn with equal probabilities, ends included"""
+    values: tuple[float, ...] = ()
+    """The values of a grid in their order, empty for the other kinds"""
 
     @property
     def middle(self) -> float:
-        """The mean, rounded down for integers; it stands for the number wherever none is drawn, as in checks."""
+        """The mean, rounded down for integers; it stands for the number wherever none is drawn, as in checks.
+
+        Of a grid, it is the value in the middle of the list.
+        """
+        if self.values:
+            return self.values[len(self.values) // 2]
         mean = (self.low + self.high) / 2.0
         return float(np.floor(mean)) if self.whole else rounded(mean)
 
@@ -104,19 +111,26 @@ def read_distribution(given: Mapping[str, Any], unit: str, field: str, *, whole:
     """Return the distribution in the inline table ``given`` for a scenario's ``field``, whose numbers are in ``unit``.
 
     Raises:
-        QuantityError: The kind is unknown, the values are not two quantities in ``unit``, the least value is not below
-            the largest, or the deviation is not positive. With ``whole``, only ``uniform`` with integers is accepted.
+        QuantityError: The kind is unknown, the values are not quantities in ``unit``, two unless it is a grid, the
+            least is not below the largest, the deviation is not positive, or a value of a grid is repeated. With
+            ``whole``, only ``uniform`` and ``grid`` with integers are accepted.
     """
     forms = " or ".join(f"{{ {kind} = {pair} }}" for kind, pair in KINDS.items())
     if len(given) != 1 or next(iter(given)) not in KINDS:
         raise QuantityError(f"{field} = {given!r}: expected a number or {forms}")
     [(kind, pair)] = given.items()
-    if not isinstance(pair, list | tuple) or len(pair) != 2:
+    if not isinstance(pair, list | tuple) or (len(pair) != 2 if kind != "grid" else not pair):
         raise QuantityError(f"{field} = {given!r}: expected {kind} = {KINDS[kind]}")
     try:
-        first, second = (parse_quantity(value, unit, kind) for value in pair)
+        numbers = [parse_quantity(value, unit, kind) for value in pair]
     except QuantityError as error:
         raise QuantityError(f"{field} = {given!r}: {error}") from error
+    if kind == "grid":
+        values = tuple(map(rounded, numbers))
+        if len(set(values)) < len(values) or (whole and not all(value.is_integer() for value in values)):
+            raise QuantityError(f"{field} = {given!r}: expected different {'whole ' if whole else ''}numbers")
+        return Distribution(unit=unit, low=min(values), high=max(values), kind=kind, whole=whole, values=values)
+    first, second = numbers
     if whole and (kind != "uniform" or not (first.is_integer() and second.is_integer())):
         raise QuantityError(f"{field} = {given!r}: expected uniform = {KINDS['uniform']}, both whole numbers")
     if kind == "normal":

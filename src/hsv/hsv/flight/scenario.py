@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import tomli_w
-from pydantic import Field, StrictInt, ValidationError
+from pydantic import Field, PrivateAttr, StrictInt, ValidationError
 
 from hsv.base.errors import DocumentError, HsvError, Mistakes, ParameterError, ScenarioError, one_of, require
 from hsv.base.files import EXTENDS, follow_extends, is_path, parse_toml, read_text
@@ -79,6 +79,12 @@ class Scenario(Table):
     """Requirements, whose margins are metrics"""
     disk_margin: float | None = None
     """Smallest admissible disk margin of the elevator loop, from the table of limits; None: none is required"""
+    _text: str = PrivateAttr("")
+
+    @property
+    def text(self) -> str:
+        """The complete TOML text from which :func:`parse_scenario` read the scenario; empty for other scenarios."""
+        return self._text
 
     @property
     def commands(self) -> Breakpoints:
@@ -294,6 +300,7 @@ def parse_scenario(text: str, name: str) -> Scenario:
     if drawn:
         field = next(iter(drawn))
         raise refused(name, f"{field}: a distribution, which hsv montecarlo draws; expected a number")
+    scenario._text = text
     return scenario
 
 

@@ -103,7 +103,7 @@ class Reading:
         if not isinstance(value, dict):
             return read_number(parameter, value, name)
         drawn = self.distribution(value, parameter.unit or "1", name, whole=parameter.whole)
-        if not parameter.minimum <= drawn.low < drawn.high <= parameter.maximum:
+        if not parameter.minimum <= drawn.low <= drawn.high <= parameter.maximum:
             limits = limits_in_words(parameter, next(iter(value.values()))[0])
             raise ScenarioError(f"{name} = {value!r}: expected all values{limits}")
         return drawn.middle

@@ -60,7 +60,7 @@ def coupling(scope: Scope) -> Outcome:
     return Outcome(
         figure,
         f"Case 1 on the coupled model, {vehicles(scope.over)}. (a) Growth of the linear loops. (b), (c) Flights; a "
-        "curve has a gap where the rates have not decayed by the end of the flight. With κ = 0 and without "
+        "curve ends where the rates have not decayed by the end of the flight. With κ = 0 and without "
         "notch, RMPC is the controller of the paper, which flies it on the decoupled model only. The paper-like "
         f"coupling is κ = {PAPER_LIKE:.2f}.",
         [

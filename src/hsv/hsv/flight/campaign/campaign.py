@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
@@ -22,7 +23,7 @@ from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.assembly import assemble_flight, blamed_on, design_parameters, without_code
 from hsv.flight.campaign.run import Batch
 from hsv.flight.distribution import KINDS, Distribution
-from hsv.flight.scenario import Scenario, scenario_at_means, scenario_table, scenario_text
+from hsv.flight.scenario import Scenario, parse_scenario, scenario_at_means, scenario_table, scenario_text
 from hsv.flight.tables import set_field
 from hsv.model.dynamics import COEFFICIENT_UNITS
 from hsv.plugins.library import library_digest
@@ -80,7 +81,7 @@ class Campaign:
     method: str
     """Sampling method, one of :data:`METHODS`."""
     samples: int
-    """Number of flights."""
+    """Number of flights: the same samples fly at each point of the grid, point after point."""
     seed: int
     factors: tuple[Factor, ...]
     commit: str = "unknown"
@@ -113,9 +114,19 @@ class Campaign:
         title = {"title": f"{self.scenario_name}, flight {flight}"}
         return tomli_w.dumps(self._flown_table(flight, sample) | title | replaced)
 
+    @cached_property
+    def grid(self) -> list[Factor]:
+        """The factors with a grid; the last one varies fastest."""
+        return [factor for factor in self.factors if factor.values]
+
+    @property
+    def vehicles(self) -> int:
+        """Number of flights at each point of the grid; without a grid, of all flights."""
+        return self.samples // math.prod(len(factor.values) for factor in self.grid)
+
     def flight_seed(self, flight: int) -> int:
-        """Return the seed for the random numbers within a flight, from the campaign's seed and the flight number."""
-        return (self.seed * MAX_SAMPLES + int(flight)) % _SEEDS
+        """Return the seed for the random numbers within a flight, from the campaign's seed and the sample's number."""
+        return (self.seed * MAX_SAMPLES + int(flight) % self.vehicles) % _SEEDS
 
     def _flown_table(self, flight: int, sample: Sequence[float]) -> dict[str, Any]:
         flown = copy.deepcopy(self.table) | {"seed": self.flight_seed(flight)}
@@ -136,32 +147,36 @@ class Campaign:
         With the method ``uniform``, every sample is drawn with a seed of its own. With the other methods, the seed of
         every sample is the campaign's; corners do not depend on it.
         """
-        d, seeds = len(self.factors), np.full(len(flights), self.seed, np.uint64)
+        points, numbers = np.divmod(np.array(flights), self.vehicles)
+        d, seeds = len(self.factors) - len(self.grid), np.full(len(flights), self.seed, np.uint64)
         if self.method == "uniform":
-            keys = (np.random.SeedSequence(self.seed, spawn_key=(flight,)) for flight in flights)
+            keys = (np.random.SeedSequence(self.seed, spawn_key=(number,)) for number in numbers.tolist())
             seeds = np.array([key.generate_state(1, np.uint64)[0] for key in keys], np.uint64)
             shares = np.stack([np.random.default_rng(own).random(d) for own in seeds.tolist()])
         elif self.method == "latin_hypercube":
-            shares = self._hypercube[flights.start : flights.stop]
+            shares = self._hypercube[numbers]
         elif self.method == "sobol":
             from scipy.stats import qmc
 
-            engine = qmc.Sobol(d, seed=self.seed)
-            if flights.start:
-                engine.fast_forward(flights.start)
-            shares = np.asarray(engine.random(len(flights)))
+            engine, first = qmc.Sobol(d, seed=self.seed), int(numbers.min())
+            if first:
+                engine.fast_forward(first)
+            shares = np.asarray(engine.random(int(numbers.max()) + 1 - first))[numbers - first]
         else:
-            # Corners: bit by bit of the flight number, 0 for the least value; the first factor has the highest bit.
-            shares = (np.array(flights)[:, None] >> np.arange(d)[::-1] & 1).astype(float)
+            # Corners: bit by bit of the sample's number, 0 for the least value; the first factor has the highest bit.
+            shares = (numbers[:, None] >> np.arange(d)[::-1] & 1).astype(float)
         # Each column of shares has the cumulative probabilities (0 to 1) of one factor's samples.
-        return np.column_stack([f.quantiles(column) for f, column in zip(self.factors, shares.T, strict=True)]), seeds
+        columns, places = iter(shares.T), iter(np.unravel_index(points, [len(f.values) for f in self.grid] or [1]))
+        samples = [np.array(f.values)[next(places)] if f.values else f.quantiles(next(columns)) for f in self.factors]
+        return np.column_stack(samples), seeds
 
     @cached_property
     def _hypercube(self) -> np.ndarray:
-        """The Latin hypercube for all flights of the campaign: values from 0 to 1, shape (flights, factors)."""
+        """The Latin hypercube: values from 0 to 1, shape (vehicles, factors without a grid)."""
         from scipy.stats import qmc
 
-        return np.asarray(qmc.LatinHypercube(len(self.factors), seed=self.seed).random(self.samples))
+        d = len(self.factors) - len(self.grid)
+        return np.asarray(qmc.LatinHypercube(d, seed=self.seed).random(self.vehicles))
 
     @property
     def batch(self) -> int:
@@ -195,7 +210,7 @@ class Campaign:
         try:
             values = parse_json(text)
             commit = values.get("commit", commit)
-            found = cls(**values | {"factors": tuple(Factor(**factor) for factor in values["factors"])})
+            found = cls(**values | {"factors": tuple(_factor(factor) for factor in values["factors"])})
             if found.method not in METHODS:
                 raise ValueError(f"method {found.method!r}")
             scenario, drawn = scenario_at_means(found.table, found.scenario_name)
@@ -221,27 +236,32 @@ class Campaign:
         return ""
 
 
+def _factor(given: dict[str, Any]) -> Factor:
+    return Factor(**given | {"values": tuple(given.get("values", ()))})
+
+
 def plan(
-    scenario_name: str,
+    scenario: str | Scenario,
     *,
     method: str = "uniform",
     samples: int = 1000,
     seed: int = 1,
     scale: float = 1.0,
-    factors: Mapping[str, tuple[object, object]] | None = None,
+    factors: Mapping[str, Sequence[object]] | None = None,
     changes: Mapping[str, object] | None = None,
     with_code: bool = True,
 ) -> Campaign:
     """Return the campaign that varies the vehicle's uncertain parameters, the scenario's distributions and ``factors``.
 
     Args:
-        scenario_name: Name of a shipped scenario, or path of a TOML file.
+        scenario: Name of a shipped scenario, path of a TOML file, or a scenario that was loaded.
         method: One of :data:`METHODS`; ``"corners"`` flies all combinations of the factors' least and largest values.
-        samples: Number of flights, a power of two for ``sobol``; ignored for corners.
+        samples: Number of flights at each point of the grid, a power of two for ``sobol``; ignored for corners.
         seed: Seed from which samples, except corners, are drawn; the seeds of the flights depend on it, too.
         scale: Factor on the vehicle's bounds of uncertain parameters (section 5.1 of the paper), not on distributions.
-        factors: Least and largest value, as in a scenario file, of fields or uncertain parameters, by name.
-        changes: Changes of the scenario's fields in all flights.
+        factors: Fields or uncertain parameters by name: a pair of least and largest value, or a list of the values of
+            a grid, as written in a scenario file.
+        changes: Changes of the fields of a scenario that is given by name or path.
         with_code: Whether a custom controller flies, whose code is then loaded to check its parameters.
 
     Raises:
@@ -250,30 +270,38 @@ def plan(
     for argument, value, kind in (("samples", samples, Integral), ("seed", seed, Integral), ("scale", scale, Real)):
         require(argument, value, kind, "an integer" if kind is Integral else "a number")
     require("factors", {} if factors is None else factors, Mapping, "least and largest values by field")
-    text = scenario_text(scenario_name, changes)
-    name = Path(scenario_name).stem
+    if isinstance(scenario, Scenario):
+        text, name = scenario.text, scenario.name
+        if not text or parse_scenario(text, name) != scenario:
+            raise CampaignError("scenario: changed after it was loaded, expected hsv.load with these changes")
+    else:
+        text, name = scenario_text(scenario, changes), Path(scenario).stem
     table = scenario_table(text, name)
     if factors:
-        for field, ends in factors.items():
+        for field, values in factors.items():
             place = _PERTURBATION + field if field in COEFFICIENT_UNITS else field
-            set_field(table, place, {"uniform": list(ends)}, name)
+            set_field(table, place, {"grid" if isinstance(values, list) else "uniform": list(values)}, name)
         text = tomli_w.dumps(table)
-    scenario, drawn = scenario_at_means(table, name)
-    found = _factors(scenario, drawn, scale)
+    mean, drawn = scenario_at_means(table, name)
+    found = _factors(mean, drawn, scale)
+    grid = [len(factor.values) for factor in found if factor.values]
     if method not in METHODS:
         raise CampaignError(f"method = {method!r}: expected {one_of(METHODS, method)}")
     if method == "corners":
-        samples = 2 ** len(found)
+        samples = 2 ** (len(found) - len(grid))
+    if len(grid) == len(found) and method in ("latin_hypercube", "sobol"):
+        raise CampaignError(f"method = {method!r}: expected a factor that is drawn, or uniform")
     largest = _MAX_HYPERCUBE if method == "latin_hypercube" else MAX_SAMPLES
+    largest //= math.prod(grid)
     if not 1 <= samples <= largest:
         raise CampaignError(f"samples = {samples}: expected 1 to {largest}")
     if method == "sobol" and samples & (samples - 1):
         raise CampaignError(f"samples = {samples}: expected a power of two, where a Sobol sequence is balanced")
     if not 0 <= seed < 2**63:
         raise CampaignError(f"seed = {seed}: expected 0 to 2^63 - 1")
-    with blamed_on(scenario):
-        design, library = design_parameters(scenario), library_digest(scenario.controller)
-    campaign = Campaign(name, text, design, method, samples, seed, found, library=library)
+    with blamed_on(mean):
+        design, library = design_parameters(mean), library_digest(mean.controller)
+    campaign = Campaign(name, text, design, method, samples * math.prod(grid), seed, found, library=library)
     _check_ends(campaign, with_code)
     return campaign
 

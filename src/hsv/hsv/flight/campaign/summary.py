@@ -119,10 +119,21 @@ class Results:
         return _values(self._table[name])
 
     def frame(self) -> DataFrame:
-        """Return the results as a table with one row per flight; ``attrs["units"]`` has the SI units by column."""
+        """Return the results as a table with one row per flight.
+
+        Its ``attrs`` have the SI units by column, the limits (SI) by metric, and of the campaign the seed, the method
+        and the number of flights at each point of the grid (``vehicles``).
+        """
         frame = self._table.to_pandas()
-        fields = self._table.schema
-        frame.attrs["units"] = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in fields}
+        fields, campaign = self._table.schema, self.campaign
+        frame.attrs |= {
+            "units": {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in fields},
+            "limits": limits(self),
+            "title": campaign.scenario.title,
+            "vehicles": campaign.vehicles,
+            "seed": campaign.seed,
+            "method": campaign.method,
+        }
         return frame
 
     @property
@@ -230,6 +241,30 @@ def shares(results: Results) -> list[Share]:
     for name, (limit, judged, kept) in _judged(results).items():
         count, n = int(np.count_nonzero(kept)), int(np.count_nonzero(judged))
         found.append(Share(name, limit, count, n, None if every or not n else clopper_pearson(count, n)))
+    return found
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of the grid: the ``values`` of its factors (SI) by name, and how many of its flights finish."""
+
+    values: dict[str, float]
+    survived: Share
+    within_all: int
+    """Number of flights that finish within every limit that applies to them"""
+
+
+def points(results: Results) -> list[Point]:
+    """Return the points of a campaign's grid in the order of the flights; empty without a grid."""
+    campaign, found = results.campaign, []
+    kept = np.logical_and.reduce([kept | ~judged for _, judged, kept in _judged(results).values()])
+    for start in range(0, campaign.samples, campaign.vehicles) if campaign.grid else ():
+        flights = slice(start, start + campaign.vehicles)
+        count, n = int(np.count_nonzero(results.finished[flights])), campaign.vehicles
+        interval = None if campaign.method == "corners" else clopper_pearson(count, n)
+        values = {factor.name: float(results.column(f"sample_{factor.name}")[start]) for factor in campaign.grid}
+        share = Share("flown_to_the_end", None, count, n, interval)
+        found.append(Point(values, share, int(np.count_nonzero(kept[flights]))))
     return found
 
 
