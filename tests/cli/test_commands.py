@@ -246,7 +246,7 @@ def test_with_strict_a_limit_that_is_not_kept_is_no_success(hsv):
     assert ran.code == 0 and "over 2 ft/s" in ran.out and "within 0.25 deg" in ran.out
     ran = hsv("simulate", "case1_single_k", "--strict", "--all")
     assert ran.code == 1
-    assert "limits not kept" in ran.error
+    assert "limits violated" in ran.error
     assert "not judged" in ran.out and "not judged" not in hsv("simulate", "case1").out
 
 

@@ -168,10 +168,10 @@ DECAY = {"elastic_decay_time": 67.1, "altitude_overshoot": 0.04}
     [
         ({"saturated_steps": 0.0}, True, "within its limit"),
         ({"saturated_steps": 0.0, **DECAY}, True, "within its limit; not judged: elastic decay time (67.1 s), 1 other"),
-        ({"saturated_steps": 3.0}, True, "1 of 1 limits not kept: saturated steps 3 (limit 0)"),
-        ({}, True, "1 of 1 limits not kept: saturated steps not within"),
+        ({"saturated_steps": 3.0}, True, "1 of 1 limits violated: saturated steps 3 (limit 0)"),
+        ({}, True, "1 of 1 limits violated: saturated steps not within"),
         ({"saturated_steps": 0.0}, False, "not flown to the end"),
-        ({"saturated_steps": 3.0}, False, "not flown to the end; 1 of 1 limits not kept: saturated steps 3 (limit 0)"),
+        ({"saturated_steps": 3.0}, False, "not flown to the end; 1 of 1 limits violated: saturated steps 3 (limit 0)"),
     ],
 )
 def test_the_verdict_is_one_sentence(metrics, ended, sentence):

@@ -188,7 +188,7 @@ def test_the_baseline_is_lost_where_the_table_says(all_faults):
         said = float(re.search(r"to (\S+)", first)[1])
         # The table's severities are rounded.
         severity = fault.severity(said)
-        if first.startswith("all"):
+        if first.startswith("survives all"):
             assert said == pytest.approx(fault.worst) and runner.survives(fault, 1.0)
         else:
             assert runner.survives(fault, severity - 0.005)

@@ -49,7 +49,7 @@ def test_verdict_limits_and_metrics_are_those_of_the_run(quiet):
     seen = words(report_page([run]))
     over = sum(not verdict.kept for verdict in run.verdicts.values())
     assert over, "20 s are too short to reach the end error that is asked for"
-    assert f"✗ {over} of {len(run.scenario.limits)} limits not kept" in seen
+    assert f"✗ {over} of {len(run.scenario.limits)} limits violated" in seen
     for name in run.metrics:
         assert name.replace("_", " ") in seen and METRICS[name].meaning in seen
     assert seen.count("✓ within ") + seen.count("✗ over ") == len(run.scenario.limits)

@@ -31,7 +31,7 @@ def inject(
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
-    """Start a fault at the next step that is not flown yet, and print this step. hsv list faults lists the types.
+    """Start a fault from the next step on, and print this step. hsv list faults lists the types.
 
     Example: hsv fault inject elevator_deflection loss_of_effectiveness 0.8 --duration "5 s"
     """
@@ -52,7 +52,7 @@ def clear(
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
-    """End the faults of one channel or of all channels at the next step that is not flown yet.
+    """End the faults of one channel or of all channels from the next step on.
 
     Example: hsv fault clear elevator_deflection
     """
@@ -74,7 +74,7 @@ def set_(
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
-    """Change a parameter of a running flight at the next step that is not flown yet.
+    """Change a parameter of a running flight from the next step on.
 
     Example: hsv set tau 0.8
     """

@@ -217,7 +217,7 @@ def _print_description(description: dict[str, Any], units: UnitSystem) -> None:
         "duration": f"{description['duration_s']:.6g} s",
         "messages": description["messages"],
         "complete": f"no: {'; '.join(description['warnings'])}" if description["warnings"] else "yes",
-        "ending": description["ending"] or "not recorded",
+        "ended": {"broken off": "interrupted"}.get(ending := description["ending"], ending or "not recorded"),
         **description["custom_data"],
         "attached": attached or "nothing",
         "faults": _intervals(description["faults"], partial(_fault, units)),

@@ -99,9 +99,10 @@ def verdict_sentence(
     """
     text = limits_kept(judged, system, margin)
     words = criteria_not_judged(judged, metrics, system)
-    if others := len(not_judged(judged, metrics)) - len(words):
-        plural = "s" if others > 1 else ""
-        words.append(f"{others} other{plural}" if words else f"{others} metric{plural} without a limit")
+    others = len(not_judged(judged, metrics)) - len(words)
+    if others and judged and not words:
+        return f"{text} ({others} further metric{'s have' if others > 1 else ' has'} none)"
+    words += [f"{others} other{'s' if others > 1 else ''}"] if others else []
     return f"{text}; not judged: {', '.join(words)}" if words and judged else text
 
 
@@ -139,7 +140,7 @@ def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem, margin: Mappi
     said = ", ".join(broken(*each) for each in over)
     head = [] if all(verdict.ended for verdict in judged.values()) else ["not flown to the end"]
     return "; ".join(
-        [*head, *([f"{len(over)} of {_counted(applied, every='')} not kept: {said}"] if over else []), *free]
+        [*head, *([f"{len(over)} of {_counted(applied, every='')} violated: {said}"] if over else []), *free]
     )
 
 

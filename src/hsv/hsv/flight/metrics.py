@@ -122,7 +122,15 @@ CRITERIA = (
 
 def spaced(name: str) -> str:
     """Return the ``name`` of a metric, or another identifier, as words separated by spaces."""
-    return name.replace("_", " ")
+    return _TITLES.get(name) or name.replace("_", " ")
+
+
+_TITLES = {
+    "post_fault_attitude_deviation": "attitude change after fault",
+    "post_fault_attitude_from_nominal": "attitude off nominal after fault",
+    "attitude_from_nominal": "attitude off nominal",
+}
+"""Metrics with a plainer name on pages and terminal than in files."""
 
 
 def is_share(name: str) -> bool:

@@ -217,7 +217,7 @@ def _repeated(results: Results, worst: int) -> dict[str, Flight]:
     if results.flyable:
         runner = results.sample_runner
         with suppress(ControllerError):
-            flights["unchanged"] = runner.fly_unchanged()
+            flights["nominal vehicle"] = runner.fly_unchanged()
         with suppress(ControllerError):
             flights[f"flight {worst}"] = runner.fly(worst, runner.sample(worst))
     return flights

@@ -92,7 +92,7 @@ class Results:
 
     @property
     def flyable(self) -> bool:
-        """Whether flights may be repeated: the controller is not code that the file names, or the file is trusted."""
+        """True if flights can be flown again: the controller is built in, or the user passed --trust."""
         return self.trust or not names_code(self.campaign.scenario.controller)
 
     @cached_property

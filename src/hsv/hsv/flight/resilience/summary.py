@@ -164,15 +164,18 @@ class ResilienceResults:
 
 def boundaries_in_words(fault: TriedFault, boundaries: Mapping[Moment, Boundary]) -> list[str]:
     """Return texts on the severities that the nominal vehicle survives: one per moment, or one if they are equal."""
-
-    def boundary_text(boundary: Boundary) -> str:
+    texts = {}
+    for moment in Moment:
+        boundary = boundaries[moment]
         if boundary.survived is None:
-            return f"lost at {fault.values_text(fault.harmless)}"
-        if boundary.lost is None:
-            return f"all, to {fault.values_text(fault.worst)}"
-        return f"to {fault.values_text(fault.value(boundary.survived))}"
-
-    return list(dict.fromkeys(boundary_text(boundaries[moment]) for moment in Moment))
+            texts[moment] = f"lost at {fault.values_text(fault.harmless)}"
+        elif boundary.lost is None:
+            texts[moment] = f"survives all, to {fault.values_text(fault.worst)}"
+        else:
+            texts[moment] = f"survives to {fault.values_text(fault.value(boundary.survived))}"
+    if len({*texts.values()}) == 1:
+        return list(texts.values())[:1]
+    return [f"{text} ({moment.name})" for moment, text in texts.items()]
 
 
 def parameter_words(name: str) -> str:
