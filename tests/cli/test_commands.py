@@ -33,6 +33,15 @@ def test_help_of_every_command_has_an_example_and_json_if_it_prints_numbers(hsv,
     assert command in PRINT_NO_NUMBERS or "--json" in ran.out
 
 
+@pytest.mark.parametrize("command", sorted({*COMMANDS, "montecarlo fly", "fault inject"} - {"montecarlo", "fault"}))
+def test_help_takes_at_most_two_lines_an_option_at_80_columns(hsv, monkeypatch, command):
+    monkeypatch.setenv("COLUMNS", "80")
+    lines = hsv(*command.split(), "--help").out.partition("\nOptions:\n")[2].splitlines()
+    options = [number for number, line in enumerate(lines) if re.match("  -", line)]
+    assert options and max(np.diff([*options, len(lines)])) <= 2
+    assert not any("<bool>" in line for line in lines)
+
+
 def test_help_and_documentation_have_the_same_exit_codes(hsv):
     page = (Path(__file__).parents[2] / "docs" / "exit_codes.md").read_text(encoding="utf-8")
     table = page.split("\n\n")[1].splitlines()[2:]

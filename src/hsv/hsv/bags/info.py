@@ -100,7 +100,7 @@ def describe(bag: Bag) -> dict[str, Any]:
     }
 
 
-def _scenario(bag: Bag) -> Scenario | None:
+def attached_scenario(bag: Bag) -> Scenario | None:
     """Return the scenario attached to ``bag``, or ``None`` if there is none that this version can read."""
     try:
         return parse_scenario(bag.text("scenario.toml"), bag.custom_data.get("scenario", ""))
@@ -110,7 +110,7 @@ def _scenario(bag: Bag) -> Scenario | None:
 
 def _requirements(bag: Bag) -> list[dict[str, Any]] | None:
     """Return the margins of the requirements of the attached scenario; None if no step of the flight is complete."""
-    scenario = _scenario(bag)
+    scenario = attached_scenario(bag)
     if not scenario or not scenario.requirement:
         return []
     try:

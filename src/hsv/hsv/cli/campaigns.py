@@ -74,7 +74,9 @@ def fly(
     scenario: ScenarioArgument = "case1",
     samples: Annotated[int | None, Option(help=f"Flights, for each point of a grid; default: {_SAMPLES}.")] = None,
     seed: Annotated[int, Option(help="Determines all samples.")] = 1,
-    sampling: Annotated[Sampling | None, Option(help="How samples are drawn; default: uniform.")] = None,
+    sampling: Annotated[
+        Sampling | None, Option(help=f"{', '.join(Sampling)}; default: uniform.", metavar="METHOD")
+    ] = None,
     corners: Annotated[bool, Option("--corners", help="Fly all combinations of extreme values.")] = False,
     scale: Annotated[float, Option(help="Factor on the parameters' bounds; 0 leaves them alone.")] = 1.0,
     factor: Annotated[

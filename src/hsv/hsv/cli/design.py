@@ -150,6 +150,7 @@ def verify(
     exact: Annotated[bool, Option("--exact", help="First prove the inequalities in rational numbers.")] = False,
     seed: Annotated[int | None, Option(min=0, help="Seed of drawn flights and sequences; default: a new one.")] = None,
     flights: Annotated[int | None, Option(min=1, help="Number of flights to draw; default: 192.")] = None,
+    verbose: Annotated[bool, Option("--verbose", help="Also print the checks that pass, a line each.")] = False,
     json: JsonOption = False,
 ) -> None:
     """Recompute what a design and its certificate state, and name the first item that fails.
@@ -157,7 +158,7 @@ def verify(
     Inequalities, sets and bounds are computed by other code than in the design. Vehicle, linearisation, trim,
     actuators, notch filter, flights and their corners are the same code, which has tests of its own. The flights that
     measure W are flown again, and others are drawn: the seed is printed, and --seed repeats it. Fields that no check
-    recomputes are listed as "not recomputed", and unknown fields are refused. A design for a share of W fails.
+    recomputes are counted, with --verbose listed, and unknown fields are refused. A design for a share of W fails.
 
     Example: hsv verify baseline --seed 1; hsv verify robust --quick --corners;
     hsv verify baseline --scenario case1_qp
@@ -178,22 +179,23 @@ def verify(
             raise QuantityError(f"{name}: given, expected without --quick and --scenario, which draw no flights")
     subject = load_subject(find_design(file))
     seed = secrets.randbits(32) if seed is None else seed
-    rows = []
     with output.stages() as progress:
         long = {"exact arithmetic": partial(exact_checks, subject)} if exact else {}
         if corners and not scenario:
             long["margins at all corners"] = partial(corner_checks, subject, progress)
+        checks: dict[str, list[Check]] = {}
         # Each of these checks is printed at once, so that an interruption leaves those that are finished.
         for part, find in long.items():
+            checks[part] = []
             for check in gathered(part, find):
-                rows.append((part, check))
-                if not json:
+                checks[part].append(check)
+                if verbose and not json:
                     _say_check(check)
-        checks = recompute(subject, quick, progress, seed=seed, flights=flights or DRAWN)
+        checks |= recompute(subject, quick, progress, seed=seed, flights=flights or DRAWN)
         if scenario:
             over = bounding_corners(subject) if corners else [{}]
             checks["scenario"] = list(scenario_checks(subject, load_scenario(scenario), over, progress))
-    rows += [(part, check) for part, made in checks.items() for check in made]
+    rows = [(part, check) for part, made in checks.items() for check in made]
     failing = [(part, check) for part, check in rows if not check.ok]
     unproved = list(UNPROVED) if exact else []
     if json:
@@ -202,12 +204,13 @@ def verify(
         output.print_json({"claims": claims, "stated": STATED, **others, "ok": not failing})
     else:
         for part, made in checks.items():
+            shown = [check for check in made if (verbose and part not in long) or not check.ok]
             if made:
-                output.say(Text(part, "bold"))
-            for check in made:
+                output.say(Text(f"{part}: {sum(check.ok for check in made)} of {len(made)} checks pass", "bold"))
+            for check in shown:
                 _say_check(check)
         output.say(*(output.folded(f"not proved, {item}") for item in unproved))
-        output.say(output.folded(f"not recomputed: {', '.join(STATED)}"))
+        output.say(output.folded(f"not recomputed: {', '.join(STATED) if verbose else f'{len(STATED)} fields'}"))
         if not quick:
             output.say(f"flights and sequences drawn with --seed {seed}")
         output.say(Text(f"{len(rows) - len(failing)} of {len(rows)} checks pass", "bold"))
@@ -218,8 +221,10 @@ def verify(
 
 
 def _say_check(check: Check) -> None:
-    expected = f", expected {check.expected}" if check.expected else ""
-    line = output.folded(f"{'ok' if check.ok else 'FAIL':4}  {check.name}: {check.shown}{expected}", 8)
+    words = f"{check.shown}{f', expected {check.expected}' if check.expected else ''}"
+    if check.expected == "at most 1 tolerance":
+        words = f"deviation {check.shown} tolerances (at most 1)"
+    line = output.folded(f"{'ok' if check.ok else 'FAIL':4}  {check.name}: {words}", 8)
     output.say(line if check.ok else Text(line, "bold red"))
 
 

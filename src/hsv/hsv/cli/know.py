@@ -139,7 +139,12 @@ def _list_faults(name: str, units: UnitSystem, json: bool) -> None:
 
     _known(Kind.faults, name, FAULT_KINDS)
     kinds: dict[str, dict[str, Any]] = {
-        name: {"side": kind.side, "channels": list(kind.channels), "meaning": kind.meaning}
+        name: {
+            "side": kind.side,
+            "channels": list(kind.channels),
+            "parameters": [parameter.name for parameter in kind.parameters],
+            "meaning": kind.meaning,
+        }
         for name, kind in FAULT_KINDS.items()
     }
     channels = {
@@ -161,7 +166,12 @@ def _list_faults(name: str, units: UnitSystem, json: bool) -> None:
     elif json:
         output.print_json(kinds)
     else:
-        output.print_rows([{"type": name, **kind, "channels": channels[name]} for name, kind in kinds.items()])
+        rows = []
+        for name, kind in kinds.items():
+            own = ", ".join(kind.pop("parameters"))
+            kind["meaning"] += f" (parameters: {own})" if own else ""
+            rows.append({"type": name, **kind, "channels": channels[name]})
+        output.print_rows(rows)
 
 
 def _fault_parameters(type: str, units: UnitSystem) -> Iterator[dict[str, Any]]:

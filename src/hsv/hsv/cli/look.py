@@ -174,10 +174,11 @@ def info(
 def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, Any], RecordingError | None]:
     """Return the contents of a bag, and the error if it is damaged, or None; without ``json``, print the contents."""
     from hsv.bags.flight import MEASURED, flight_data
-    from hsv.bags.info import describe
+    from hsv.bags.info import attached_scenario, describe
     from hsv.bags.steps import completeness
     from hsv.base.errors import RecordingError
     from hsv.cli.summary import print_metrics
+    from hsv.flight.limits import limits_kept, verdicts
     from hsv.flight.metrics import metric_of
 
     description = describe(opened)
@@ -194,15 +195,21 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
         # The other contents help to see what is wrong with the bag.
         problem = error
     quantities = {name: (value, metric_of(name).unit) for name, value in metrics.items()}
+    scenario = None if problem or lacking else attached_scenario(opened)
+    judged = verdicts(scenario, metrics, missing, ended=description["ending"] == "finished") if scenario else {}
     if not json:
         _print_description(description, units)
         if lacking:
             output.say(f"no metrics: they need {', '.join(lacking)}")
         elif not problem:
-            print_metrics(f"Metrics of an incomplete bag: {remark}" if remark else "Metrics", metrics, missing, units)
+            title = f"Metrics of an incomplete bag: {remark}" if remark else "Metrics"
+            print_metrics(title, metrics, missing, units, judged)
+        if scenario:
+            output.say(output.folded(f"verdict {limits_kept(judged, units)}"))
     if not problem:
         output.print_bag_warnings(opened)
-    measured = {"metrics_complete": not remark, "metrics": output.to_json(quantities, units)}
+    within = all(verdict.kept for verdict in judged.values()) if judged else None
+    measured = {"metrics_complete": not remark, "metrics": output.to_json(quantities, units), "within_limits": within}
     return description | ({"metrics": None} if problem or lacking else measured), problem
 
 

@@ -71,6 +71,11 @@ class _StrictCommand(TyperCommand):
                 raise QuantityError(f"{parameter.opts[0]} = '': expected a text that is not empty")
         return super().parse_args(ctx, args)
 
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help without boxes and types of flags, which take half of a narrow terminal."""
+        self.rich_markup_mode = None
+        super().format_help(ctx, formatter)
+
 
 def application(commands: Mapping[str, Command], *, prog: str = "hsv", listed: bool = False) -> typer.Typer:
     """Return a command line, and import the modules of its commands.

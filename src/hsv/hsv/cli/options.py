@@ -30,9 +30,7 @@ SetOption = Annotated[
 SuppliedDesignOption = Annotated[Path | None, Option("--design", help="Design of a bag without attachments.")]
 SuppliedScenarioOption = Annotated[str | None, Option("--scenario", help="Scenario of a bag without attachments.")]
 TrustOption = Annotated[bool, Option("--trust", help="Run code that the file names, such as controllers.")]
-UnitsOption = Annotated[
-    UnitSystem, Option(help="SI with degrees and percent, strict SI, or the paper's ft, ft/s, deg.")
-]
+UnitsOption = Annotated[UnitSystem, Option(help="SI with degrees and percent, strict SI, or ft, ft/s, deg.")]
 
 
 def check_target(path: Path, field: str, *suffixes: str) -> None:
