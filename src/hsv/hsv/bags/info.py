@@ -71,7 +71,7 @@ def describe(bag: Bag) -> dict[str, Any]:
     with suppress(RecordingError):
         fingerprint = flight_fingerprint(bag)
     topics = [_topic(bag, name) for name in sorted(bag.topics)]
-    faults, scenario = _faults(bag) if ACTUATOR in bag.roles else None, _scenario(bag)
+    faults, scenario = _faults(bag) if ACTUATOR in bag.roles else None, attached_scenario(bag)
     return {
         "path": str(bag.path),
         "folder": str(bag.folder),
