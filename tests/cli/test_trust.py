@@ -204,7 +204,7 @@ READERS = {
     "linearise": "--vehicle own.toml --out model.mat",
     "list": "scenarios own.toml",
     "margins": "own.toml",
-    "bench": "--compare own.toml",
+    "bench": "--only own.toml",
     "montecarlo summary": "{campaign}",
     "montecarlo replay": "{campaign} --flight 1",
     "montecarlo scenario": "{campaign} --flight 1",

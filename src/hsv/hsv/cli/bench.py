@@ -1,4 +1,4 @@
-"""The measurements of ``hsv bench``: ratios of two run times, and their change since an earlier ``hsv bench``."""
+"""The measurements of ``hsv bench``: ratios of two run times."""
 
 from __future__ import annotations
 
@@ -11,19 +11,18 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from hsv.bags.description import PLANT, NodeDescription, graph
 from hsv.bags.parameter_sections import ParameterSections
-from hsv.base.errors import DocumentError, QuantityError, RunError
-from hsv.base.files import parse_json, read_text
+from hsv.base.errors import RunError
 from hsv.core import ffi, lanes, lib, loop_memory
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.campaign.campaign import plan
@@ -42,19 +41,6 @@ FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-ffp-contract=off")
 """Fastest flags of the C compiler that keep all bits; fused multiply-adds, which round only once, are excluded."""
 
 _PERIOD = 0.02
-
-
-RESOLUTION = 0.05
-"""Largest relative change of a ratio between two runs of the same commit on an idle machine."""
-
-
-class Recorded(NamedTuple):
-    """A ratio measured by an earlier ``hsv bench``: its group, median, and 10th and 90th percentile."""
-
-    group: str
-    ratio: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -97,18 +83,9 @@ class Figure:
         return f"WORSE than the limit, {limit}" if self.worse else f"{limit}, as promised"
 
     def as_dict(self, group: str) -> dict[str, Any]:
-        """Return the figure with all times, for the JSON file that :func:`read_run` reads."""
+        """Return the figure with all times, for JSON."""
         judged = {"ratio": self.ratio, "spread": self.spread, "verdict": self.verdict}
         return {**asdict(self), "group": group, **judged}
-
-    def slower(self, before: Recorded) -> float:
-        """Return the relative change of the ratio since an earlier ``hsv bench``, positive if it became slower.
-
-        A change counts as zero if it is at most :data:`RESOLUTION`, or if the old and new percentile ranges overlap.
-        """
-        low, high = self.spread
-        change = self.ratio / before.ratio - 1.0
-        return change if abs(change) > RESOLUTION and (low > before.high or high < before.low) else 0.0
 
 
 def interleaved(
@@ -137,25 +114,6 @@ def readable(seconds: float) -> str:
     """Return a time as text with three digits, in s, ms or us."""
     scale, unit = (1.0, "s") if seconds >= 1.0 else (1e3, "ms") if seconds >= 1e-3 else (1e6, "us")
     return f"{scale * seconds:.3g} {unit}"
-
-
-def read_run(path: Path) -> tuple[str, Mapping[str, Recorded]]:
-    """Return the commit, and the ratios by name, from a file with the output of an earlier ``hsv bench --json``.
-
-    Raises:
-        QuantityError: The file cannot be read, or has other contents.
-    """
-    try:
-        run = parse_json(read_text(path))
-        figures = {
-            str(figure["name"]): Recorded(str(figure["group"]), float(figure["ratio"]), *map(float, figure["spread"]))
-            for figure in run["figures"]
-        }
-        if not all(figure.ratio > 0.0 for figure in figures.values()):
-            raise ValueError("a ratio that is not positive")
-        return str(run["commit"]), figures
-    except (DocumentError, KeyError, TypeError, ValueError) as error:
-        raise QuantityError(f"compare = {str(path)!r}: {error}, expected the output of hsv bench --json") from error
 
 
 def groups(scale: float = 1.0) -> dict[str, Callable[[], list[Figure]]]:
