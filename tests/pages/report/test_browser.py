@@ -1,5 +1,8 @@
 """The report in a browser."""
 
+import base64
+import re
+
 import numpy as np
 import pytest
 from page_checks import PageChecks
@@ -150,6 +153,17 @@ def test_the_first_picture_needs_no_script(browser, page):
         assert browser.driver.execute_cdp_cmd("DOM.getBoxModel", {"nodeId": node})["model"]["width"] > 500
     finally:
         browser.driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+
+
+def test_the_printed_page_has_at_most_eight_sheets_and_leaves_out_the_certificate(browser, quiet, tmp_path):
+    page = tmp_path / "report.html"
+    write_report([quiet], page)
+    browser.open(page)
+    printed = browser.driver.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"]
+    assert 1 < len(re.findall(rb"/Type\s*/Page\b", base64.b64decode(printed))) <= 8
+    browser.media(media="print")
+    assert browser.run("return getComputedStyle(document.getElementById('certificate')).display") == "none"
+    browser.media(media="")
 
 
 def test_faults_limits_and_excursions_are_shaded(opened):

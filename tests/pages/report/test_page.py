@@ -12,7 +12,8 @@ from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import supply
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import RecordingError
-from hsv.flight.metrics import METRICS
+from hsv.base.units import UnitSystem
+from hsv.flight.metrics import METRICS, spaced
 from hsv.pages.engine import Numbers
 from hsv.pages.flights import reported_runs
 from hsv.pages.report import report_page, sentence, write_report
@@ -50,8 +51,9 @@ def test_verdict_limits_and_metrics_are_those_of_the_run(quiet):
     over = sum(not verdict.kept for verdict in run.verdicts.values())
     assert over, "20 s are too short to reach the end error that is asked for"
     assert f"✗ {over} of {len(run.scenario.limits)} limits violated" in seen
+    assert seen.count("limits violated") == len(UnitSystem)
     for name in run.metrics:
-        assert name.replace("_", " ") in seen and METRICS[name].meaning in seen
+        assert spaced(name) in seen and METRICS[name].meaning in seen
     assert seen.count("✓ within ") + seen.count("✗ over ") == len(run.scenario.limits)
 
 

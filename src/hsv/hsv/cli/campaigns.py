@@ -301,7 +301,12 @@ def resilience(
             flown = run_campaign(campaign, store, flying, progress=progress)
             complete(store.folder)
         results = ResilienceResults.read(campaign, store)
-        options = [word for pair in (("--controllers", controllers), ("--faults", faults)) if pair[1] for word in pair]
+        given = {
+            "--controllers": controllers,
+            "--faults": faults,
+            "--out": "" if out == Path("resilience") else str(out),
+        }
+        options = [word for pair in given.items() if pair[1] for word in pair]
         written = write_results(results, out, shlex.join(["hsv", "resilience", *options]))
     if json:
         values = {"cases_flown_now": flown.batches, "flown_in_s": flown.wall_time}

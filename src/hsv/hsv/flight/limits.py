@@ -101,7 +101,7 @@ def verdict_sentence(
     words = criteria_not_judged(judged, metrics, system)
     others = len(not_judged(judged, metrics)) - len(words)
     if others and judged and not words:
-        return f"{text} ({others} further metric{'s have' if others > 1 else ' has'} none)"
+        return f"{text}; {others} further metric{'s have' if others > 1 else ' has'} no limit"
     words += [f"{others} other{'s' if others > 1 else ''}"] if others else []
     return f"{text}; not judged: {', '.join(words)}" if words and judged else text
 
