@@ -6,8 +6,8 @@ import pytest
 from changed_bags import changed_bag
 from recorded_flight import record_flight
 
-from hsv.bags.compare import compare
 from hsv.bags.description import ACTUATOR, COMMAND, STATE, TOPICS, checked_namespace, resolved
+from hsv.bags.diff import compare
 from hsv.bags.flight import flight_fingerprint
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import controller_of, flown_parameters

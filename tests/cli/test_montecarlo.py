@@ -126,6 +126,25 @@ def test_a_distribution_is_shown_but_not_flown_alone(drawn, hsv):
         )
 
 
+def test_campaigns_are_compared_and_plotted(campaign, hsv, tmp_path):
+    swept = ("--factor", "fault[0].effectiveness=0.9,0.5", "--samples", "4", "--no-page")
+    assert campaign(*swept, "--out", "a.parquet").code == 0
+    assert campaign(*swept, "--out", "b_c.parquet").code == 0
+    files = ("--csv", "t.csv", "--latex", "t.tex", "--out", "figure.pdf", "--size", "120x90mm")
+    compared = hsv("compare", "a.parquet", "b_c.parquet", *files)
+    assert compared.code == 0 and "b_c: 8 pairs finish" in compared.out
+    assert (tmp_path / "figure.pdf").read_bytes().startswith(b"%PDF")
+    assert r"b\_c" in (tmp_path / "t.tex").read_text() and "tube_level,b_c" in (tmp_path / "t.csv").read_text()
+    assert "95 % interval" in (tmp_path / "comparison.html").read_text()
+    rows = hsv("compare", "a.parquet", "b_c.parquet", "--json", "--metric", "altitude_end_error").json["rows"]
+    assert [row["metric"] for row in rows] == ["flown_to_the_end"] * 2 + ["altitude_end_error"] * 2
+    panels = "survival,altitude_error,altitude_end,altitude_end over mass"
+    assert hsv("plot", "a.parquet", "b_c.parquet", "--panels", panels, "--out", "all.png").code == 0
+    assert (tmp_path / "all.png").stat().st_size > 10_000
+    assert hsv("plot", "a.parquet", "--panels", "height").error.startswith("panels: 'height', expected")
+    assert hsv("compare", "a.parquet").error == "1 campaign: expected at least two to compare"
+
+
 class Failing:
     """A controller that holds the trim and fails if the flight starts above an altitude."""
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast, overload
 
 from hsv import __all__ as __all__
 from hsv.base.errors import ParameterError, require
@@ -73,11 +73,34 @@ def sweep(
     return zip(given, fly_variants(scenarios), strict=True)
 
 
-def compare(flights: Mapping[str, Flight]) -> dict[str, dict[str, float]]:
-    """Return the metrics (SI) of several flights, by name of the metric and then by label of the flight.
+@overload
+def compare(runs: Mapping[str, Flight]) -> dict[str, dict[str, float]]: ...
 
-    A metric that is undefined in a flight, for example because there is no fault, is missing for this flight.
+
+@overload
+def compare(runs: Mapping[str, DataFrame], metrics: Sequence[str] = ()) -> DataFrame: ...
+
+
+def compare(runs: Mapping[str, Flight] | Mapping[str, DataFrame], metrics: Sequence[str] = ()) -> Any:
+    """Compare several flights, or several campaigns.
+
+    Args:
+        runs: Flights by label, or campaigns of :func:`montecarlo` or :func:`read_campaign` by label.
+        metrics: Metrics that are compared between campaigns; empty: those with limits.
+
+    Returns:
+        Of flights, the metrics (SI) by name and then by label; a metric that a flight does not define, for example
+        because there is no fault, is missing for this flight. Of campaigns, the table of ``hsv compare``, see
+        :func:`hsv.flight.campaign.comparison.compare_campaigns`.
+
+    Raises:
+        CampaignError: The campaigns cannot be compared; the message says why.
     """
+    if isinstance(runs, Mapping) and runs and not isinstance(next(iter(runs.values())), Flight):
+        from hsv.flight.campaign.comparison import compare_campaigns
+
+        return compare_campaigns(cast("Mapping[str, DataFrame]", runs), metrics)
+    flights = cast("Mapping[str, Flight]", runs)
     _require_flights(flights)
     measured = {label: flight.metrics for label, flight in flights.items()}
     rows = {name: {label: m[name] for label, m in measured.items() if name in m} for name in METRICS}

@@ -16,7 +16,7 @@ from hsv.cli import output
 from hsv.cli.options import BagArgument, JsonOption, SuppliedDesignOption, SuppliedScenarioOption, TrustOption
 
 if TYPE_CHECKING:
-    from hsv.bags.compare import Comparison, Difference
+    from hsv.bags.diff import Comparison, Difference
     from hsv.bags.replay.engine import ProcessComparison
 
 
@@ -156,8 +156,8 @@ def diff(
 
     Example: hsv diff bags/case1_20260101T000000Z bags/case1_20260102T000000Z
     """
-    from hsv.bags.compare import compare
     from hsv.bags.description import TOPICS
+    from hsv.bags.diff import compare
     from hsv.bags.reader import Bag
 
     if not 0.0 <= tolerance < math.inf:

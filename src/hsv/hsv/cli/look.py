@@ -69,9 +69,9 @@ def report(
 
 
 def plot(
-    bags: Annotated[list[Path], Argument(help="Bags to plot together.")],
+    bags: Annotated[list[Path], Argument(help="Bags, or result files of campaigns, to plot together.")],
     out: Annotated[Path, Option(help="File to write: .png, .svg or .pdf.")] = Path("flight.png"),
-    panels: Annotated[str, Option(help="States and inputs to plot, such as altitude,elevator.")] = "",
+    panels: Annotated[str, Option(help="What to plot, such as altitude,elevator, or survival.")] = "",
     start: Annotated[str, Option("--from", help="First time to plot, with unit.")] = "",
     end: Annotated[str, Option("--to", help="Last time to plot, with unit.")] = "",
     size: Annotated[str, Option(help="Width and height for print, such as 85x60mm.")] = "",
@@ -79,6 +79,9 @@ def plot(
     json: JsonOption = False,
 ) -> None:
     """Plot trajectory, attitude, elastic rates and inputs of recorded flights, or the panels of your choice.
+
+    The panels of a campaign (.parquet): survival, the envelope of a signal such as altitude_error, a metric, and
+    METRIC over FACTOR as a scatter plot.
 
     Example: hsv plot bags/case1_20260101T000000Z --panels altitude,elevator --size 85x60mm --out case1.pdf
     """
@@ -88,7 +91,17 @@ def plot(
     from hsv.pages.plots import Layout, flight_figure, save_figure
 
     check_target(out, "out", ".png", ".svg", ".pdf")
-    layout = Layout.of(panels.split(",") if panels else (), start, end, size)
+    chosen = panels.split(",") if panels else ()
+    if all(path.suffix == ".parquet" for path in bags):
+        from hsv.flight.campaign.summary import Results
+        from hsv.pages.campaign_plots import campaign_figure
+
+        campaigns = {path.stem: Results(path) for path in bags}
+        with writing(out, "out"):
+            save_figure(campaign_figure(campaigns, units, chosen, Layout.of((), start, end, size)), out)
+        output.print_written([out], json)
+        return
+    layout = Layout.of(chosen, start, end, size)
     opened = [Bag(path) for path in bags]
     named = dict(zip(labels(opened), opened, strict=True))
     flights = {name: flight_data(bag) for name, bag in named.items()}

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from hsv.base.errors import DesignError
@@ -17,24 +14,11 @@ from hsv.certificate.loops import INPUTS, SampledLoop, vertex_loops
 from hsv.certificate.margins import grid
 from hsv.flight.margins import VERTICES, MarginResults
 from hsv.pages.engine import render, write_page
+from hsv.pages.plots import INK, inline_svg
 
 SECTIONS = {"curves": "Elevator loop", "margins": "Margins", "terms": "Terms"}
 """Headings in the order of the page."""
 
-_INK, _GRID = "#123456", "#654321"
-"""Colours that the page replaces by its own, which follow the reader's light or dark scheme."""
-
-_STYLE: Any = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "hsv",
-    "font.size": 9,
-    "axes.grid": True,
-    "grid.linewidth": 0.5,
-    **dict.fromkeys(("axes.spines.top", "axes.spines.right"), False),
-    **dict.fromkeys(("figure.facecolor", "axes.facecolor"), "none"),
-    **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), _INK),
-    "grid.color": _GRID,
-}
 _COLOURS = ("#0072b2", "#d55e00", "#009e73")
 
 
@@ -63,16 +47,7 @@ def margin_page(results: MarginResults) -> str:
         "units": UnitSystem.metric,
         "elevator": elevator,
     }
-    return render("margins.html.j2", **values, words=words, curves=_svg(results))
-
-
-def _svg(results: MarginResults) -> Markup:
-    """Return the figure as SVG without the head of a file; its colours are those of the page."""
-    with matplotlib.rc_context(_STYLE):
-        figure, text = figure_of(results), StringIO()
-        figure.savefig(text, format="svg", metadata={"Date": None})
-    svg = text.getvalue().replace(_INK, "currentColor").replace(_GRID, "var(--grid)")
-    return Markup(svg[svg.index("<svg") :])
+    return render("margins.html.j2", **values, words=words, curves=inline_svg(lambda: figure_of(results)))
 
 
 def figure_of(results: MarginResults) -> Figure:
@@ -97,7 +72,7 @@ def figure_of(results: MarginResults) -> Figure:
         low, high = -(2.0 + least) / (2.0 - least), -(2.0 - least) / (2.0 + least)
         disk = 0.5 * (low + high) + 0.5 * (high - low) * np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 200))
         nyquist.fill(disk.real, disk.imag, color="#b3261e", alpha=0.2, linewidth=0.0, label=f"disk of {least:.3f}")
-    nyquist.plot(-1.0, 0.0, "+", color=_INK)
+    nyquist.plot(-1.0, 0.0, "+", color=INK)
     nyquist.set(xlim=(-4.0, 2.0), ylim=(-3.0, 3.0), aspect="equal", xlabel="real part of L", ylabel="imaginary part")
     nyquist.legend(frameon=False, loc="lower left")
     gain.set(ylabel="magnitude [dB]", xlabel="frequency [rad/s]", ylim=(-40.0, 40.0))

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from io import BytesIO
+from io import BytesIO, StringIO
 from itertools import cycle
 from pathlib import Path
 from textwrap import fill
+from typing import Any
 
 import matplotlib
 import numpy as np
+from markupsafe import Markup
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hsv.base.errors import ParameterError, one_of
@@ -26,12 +30,26 @@ _STATES = ("altitude", "velocity", "angle_of_attack", "pitch_rate", "elastic_rat
 _REMARK_WIDTH = 130
 """Maximum number of characters in a line of a remark."""
 
-_DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)))
+DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)))
 """Line styles of the flights, in turn."""
 
 _ONE_COLUMN = 5.0
 """Width (inches) up to which panels lie below each other, in smaller type: a column of a journal."""
 
+INK, _GRID = "#123456", "#654321"
+"""Colours that the page replaces by its own, which follow the reader's light or dark scheme."""
+
+_STYLE: Any = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "hsv",
+    "font.size": 9,
+    "axes.grid": True,
+    "grid.linewidth": 0.5,
+    **dict.fromkeys(("axes.spines.top", "axes.spines.right"), False),
+    **dict.fromkeys(("figure.facecolor", "axes.facecolor"), "none"),
+    **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), INK),
+    "grid.color": _GRID,
+}
 _INCH = 0.0254
 _SMALLEST, _LARGEST = 1.0, 40.0
 """Limits of a figure's sides (inches)."""
@@ -62,13 +80,7 @@ class Layout:
         last = parse_quantity(end, "s", "to") if end else math.inf
         if not first < last:
             raise ParameterError(f"from = {start!r}: expected less than to = {end!r}")
-        chosen = []
-        for given in panels:
-            name = given.strip().replace(" ", "_")
-            found = [name] if name in _NAMES else [known for known in _NAMES if name and known.startswith(name)]
-            if len(found) != 1:
-                raise ParameterError(f"panels: {given!r}, expected {one_of(found or _NAMES, name)}")
-            chosen += found
+        chosen = [chosen_name(given, _NAMES) for given in panels]
         if not size:
             return cls(tuple(chosen), first, last)
         read = re.fullmatch(r"([\d.]+)x([\d.]+) ?(mm|cm|in)", size)
@@ -76,6 +88,43 @@ class Layout:
         if not sides or not all(_SMALLEST <= side <= _LARGEST for side in sides):
             raise ParameterError(f"size = {size!r}: expected width x height from 1 to 40 inches, such as 85x60mm")
         return cls(tuple(chosen), first, last, (sides[0], sides[1]))
+
+
+def chosen_name(given: str, known: Collection[str]) -> str:
+    """Return the ``known`` name that is ``given`` or begins so; a ParameterError if there is none, or several."""
+    name = given.strip().replace(" ", "_")
+    found = [name] if name in known else [each for each in known if name and each.startswith(name)]
+    if len(found) != 1:
+        raise ParameterError(f"panels: {given!r}, expected {one_of(found or known, name)}")
+    return found[0]
+
+
+@contextmanager
+def panel_figure(count: int, layout: Layout, *, sharex: bool = True) -> Iterator[tuple[Figure, list[Axes]]]:
+    """Yield a figure with ``count`` panels in the size and type of ``layout``; draw within the context."""
+    wide = not layout.size or layout.size[0] > _ONE_COLUMN
+    columns = 2 if count > 1 and wide else 1
+    rows, points = -(-count // columns), 9 if wide else 7
+    with matplotlib.rc_context({"font.size": points, "axes.spines.top": False, "axes.spines.right": False}):
+        figure = Figure(figsize=layout.size or (5.0 * columns, 2.25 * rows), layout="constrained")
+        axes = figure.subplots(rows, columns, sharex=sharex, squeeze=False).ravel().tolist()
+        yield figure, axes[:count]
+        for axis in axes[:count]:
+            axis.set_title(axis.get_title(loc="left"), loc="left", fontsize=points)
+            axis.grid(alpha=0.25, linewidth=0.5)
+        for axis in axes[count:]:
+            axis.set_visible(False)
+
+
+def outer_legend(figure: Figure, axes: Sequence[Axes]) -> None:
+    """Add one legend for all ``axes`` above them."""
+    labels = {label: handle for axis in axes for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+    figure.legend(labels.values(), labels, loc="outside upper left", ncols=2 * _columns(axes), frameon=False)
+
+
+def _columns(axes: Sequence[Axes]) -> int:
+    spec = axes[0].get_subplotspec()
+    return spec.get_gridspec().ncols if spec else 1
 
 
 def flight_figure(
@@ -100,16 +149,11 @@ def flight_figure(
         for column in map(_NAMES.index, (*_STATES, *INPUT_NAMES))
         if not _NAMES[column].startswith("elastic") or any(history[:, column].any() for history in histories.values())
     ]
-    columns = 2 if len(panels) > 1 and (not layout.size or layout.size[0] > _ONE_COLUMN) else 1
-    rows = -(-len(panels) // columns)
-    points = 9 if not layout.size or layout.size[0] > _ONE_COLUMN else 7
-    with matplotlib.rc_context({"font.size": points, "axes.spines.top": False, "axes.spines.right": False}):
-        figure = Figure(figsize=layout.size or (5.0 * columns, 2.25 * rows), layout="constrained")
-        axes = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
+    with panel_figure(len(panels), layout) as (figure, axes):
         first = next(iter(flights.values()))
         for axis, column in zip(axes, panels, strict=False):
             factor, shown = in_system(1.0, _UNITS[column], system)
-            for (name, flight), dashes in zip(flights.items(), cycle(_DASHES), strict=False):
+            for (name, flight), dashes in zip(flights.items(), cycle(DASHES), strict=False):
                 drawn = (flight.time >= layout.start) & (flight.time <= layout.end)
                 curve = factor * histories[name][drawn, column]
                 axis.plot(flight.time[drawn], curve, linewidth=1.1, linestyle=dashes, label=name)
@@ -120,26 +164,29 @@ def flight_figure(
             if first.fault_start is not None and first.fault_start < first.time[drawn].max(initial=0.0):
                 begun = max(first.fault_start, layout.start)
                 axis.axvspan(begun, first.time[drawn][-1], color="tab:red", alpha=0.06, linewidth=0)
-            unit = "" if _UNITS[column] == "1" else f" [{_mathtext(shown)}]"
-            axis.set_title(_NAMES[column].replace("_", " ") + unit, loc="left", fontsize=points)
-            axis.grid(alpha=0.25, linewidth=0.5)
+            unit = "" if _UNITS[column] == "1" else f" [{mathtext(shown)}]"
+            axis.set_title(_NAMES[column].replace("_", " ") + unit, loc="left")
             axis.margins(x=0)
             axis.ticklabel_format(useOffset=False)
-        for axis in axes[len(panels) :]:
-            axis.set_visible(False)
         if remarks:
             figure.suptitle("\n".join(fill(remark, _REMARK_WIDTH) for remark in remarks), fontsize=8, color="tab:red")
         if layout.size:
-            labels = {
-                label: handle for axis in axes for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
-            }
-            figure.legend(labels.values(), labels, loc="outside upper left", ncols=2 * columns, frameon=False)
+            outer_legend(figure, axes)
         else:
             axes[0].legend(frameon=False, loc="lower right")
-        for axis in axes[max(len(panels) - columns, 0) : len(panels)]:
+        for axis in axes[max(len(panels) - _columns(axes), 0) :]:
             axis.set_xlabel("time [s]")
             axis.tick_params(labelbottom=True)
     return figure
+
+
+def inline_svg(make: Callable[[], Figure]) -> Markup:
+    """Return the figure that ``make`` draws as SVG for a page, without the head of a file, in the page's colours."""
+    with matplotlib.rc_context(_STYLE):
+        figure, text = make(), StringIO()
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    svg = text.getvalue().replace(INK, "currentColor").replace(_GRID, "var(--grid)")
+    return Markup(svg[svg.index("<svg") :])
 
 
 def save_figure(figure: Figure, path: Path) -> None:
@@ -155,5 +202,6 @@ def save_figure(figure: Figure, path: Path) -> None:
     path.write_bytes(whole.getvalue())
 
 
-def _mathtext(unit: str) -> str:
+def mathtext(unit: str) -> str:
+    """Return a unit in the notation of matplotlib."""
     return unit.replace("^0.5", "$^{1/2}$")

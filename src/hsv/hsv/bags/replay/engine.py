@@ -9,8 +9,8 @@ from functools import partial
 from rosbags.typesys.store import Typestore
 
 from hsv.bags.columns import Track, expecting_fields
-from hsv.bags.compare import Comparison, compare
 from hsv.bags.description import COMMAND, STATE, TOPICS, NodeDescription, graph, step_topics
+from hsv.bags.diff import Comparison, compare
 from hsv.bags.messages import StepMessages, stamp_in, stamp_of
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -33,7 +34,7 @@ CRASHED, DIVERGED = ENDED = ("crashed", "diverged")
 _NAN = pa.Array.from_buffers(pa.float64(), 1, [None, pa.py_buffer(np.array([math.nan]))])[0]
 
 _NEVER, _LATE = 1e200, 1e100
-"""A number in place of a time that was not reached, and the number above which a statistic is made of it."""
+"""A number in place of an infinite one, and the magnitude above which a statistic is made of it."""
 
 TUBE_LIMIT = 1.0
 """Tube level on the boundary of the invariant set."""
@@ -121,14 +122,16 @@ class Results:
     def frame(self) -> DataFrame:
         """Return the results as a table with one row per flight.
 
-        Its ``attrs`` have the SI units by column, the limits (SI) by metric, and of the campaign the seed, the method
-        and the number of flights at each point of the grid (``vehicles``).
+        Its ``attrs`` have the SI units by column, the limits (SI) by metric, the names of the margins of requirements
+        (``required``), and of the campaign the title, the seed, the method and the number of flights at each point of
+        the grid (``vehicles``).
         """
         frame = self._table.to_pandas()
         fields, campaign = self._table.schema, self.campaign
         frame.attrs |= {
             "units": {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in fields},
             "limits": limits(self),
+            "required": required(self),
             "title": campaign.scenario.title,
             "vehicles": campaign.vehicles,
             "seed": campaign.seed,
@@ -320,19 +323,37 @@ class Distribution:
     @property
     def title(self) -> str:
         """The name in words, between bars if the statistics are those of the magnitude."""
-        signed = self.name in METRICS and METRICS[self.name].signed
-        return f"|{spaced(self.name)}|" if signed else spaced(self.name)
+        return title_of(self.name)
+
+
+def title_of(name: str) -> str:
+    """Return the name of an outcome in words, between bars if its statistics are those of the magnitude."""
+    return f"|{spaced(name)}|" if name in METRICS and METRICS[name].signed else spaced(name)
 
 
 def distributions(results: Results) -> list[Distribution]:
     """Return the statistics of every outcome that applies to at least one finished flight."""
     found = []
     for name, unit in outcomes_of(results.campaign.scenario).items():
-        late = int(np.count_nonzero(results.finished & results.not_reached(name)))
-        values = results.column(name)[results.finished]
-        values = np.sort(np.abs(values) if name in METRICS and METRICS[name].signed else values)
-        values = np.append(values[np.isfinite(values)], np.full(late, _NEVER))
+        values = sizes(results, name)
+        values = values[~np.isnan(values)]
         if len(values):
-            numbers = [*np.percentile(values, (0.0, 50.0, 95.0, 100.0)).tolist(), float(values.mean())]
-            found.append(Distribution(name, unit, len(values), late, *(math.inf if n > _LATE else n for n in numbers)))
+            numbers = [*percentiles(values, (0.0, 50.0, 95.0, 100.0)), float(values.mean())]
+            found.append(Distribution(name, unit, len(values), int(np.isinf(values).sum()), *numbers))
     return found
+
+
+def sizes(results: Results, name: str) -> np.ndarray:
+    """Return an outcome of all flights, shape (flights,), errors with a sign by their magnitude.
+
+    A time that was not reached is infinite; NaN if the flight is lost or the outcome does not apply.
+    """
+    values = results.column(name)
+    values = np.abs(values) if name in METRICS and METRICS[name].signed else values
+    return np.where(results.finished, np.where(results.not_reached(name), np.inf, values), np.nan)
+
+
+def percentiles(values: np.ndarray, shares: Sequence[float]) -> list[float]:
+    """Return the percentiles of ``values``, shape (n,), some of which may be infinite, but none NaN."""
+    found = np.percentile(np.nan_to_num(values, posinf=_NEVER, neginf=-_NEVER), shares)
+    return [math.copysign(math.inf, number) if abs(number) > _LATE else number for number in found.tolist()]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hsv.bags.columns import Track
-from hsv.bags.compare import compare
+from hsv.bags.diff import compare
 
 KIND = "hsv_msgs/msg/VehicleForces"
 
