@@ -55,7 +55,7 @@ def compare_campaigns(frames: Mapping[str, DataFrame], metrics: Sequence[str] = 
             known = [column for column, unit in frame.attrs["units"].items() if unit and "sample_" not in column]
             if name not in known:
                 raise CampaignError(f"metric {name!r}: not in {each}, expected {one_of(known, name)}")
-    limits = {name: limit for frame in reversed(frames.values()) for name, limit in frame.attrs["limits"].items()}
+    limits = {name: limit for frame in reversed([*frames.values()]) for name, limit in frame.attrs["limits"].items()}
     pairs = {other: _pairs(label, first, other, frame) for other, frame in others}
     rows = []
     for name in (ENDED, *chosen):
