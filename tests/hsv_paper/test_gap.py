@@ -3,13 +3,14 @@
 import json
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from marking import long
 
 from hsv.certificate.checks import load_subject
 from hsv.control.design_file import find_design
 from hsv.flight.flown_checks import OUTPUTS, flight_checks
-from hsv_paper.gap import KINDS, bounds, needed_rows
+from hsv_paper.gap import KINDS, bounds, held, needed_rows
 
 
 @pytest.mark.parametrize("name", [long("tight"), "adjustable"])
@@ -21,6 +22,11 @@ def test_bounds_become_smaller_from_the_certificate_to_the_worst_sequence(name):
     assert all((a >= b).all() for a, b in pairwise(values))
     if name == "tight":  # its certificate has these bounds, rounded outwards
         assert found["at limited rates"] == pytest.approx(subject.stated("tube.invariant_set.rated.half_range"), 1e-8)
+
+
+@pytest.mark.parametrize(("name", "degrees"), [("baseline", (0.566, 0.797)), ("derived", (0.686, 0.982))])
+def test_constant_disturbances_move_farther_on_the_way_than_in_the_end(name, degrees):
+    assert np.degrees(held(load_subject(find_design(name)), 3)) == pytest.approx(degrees, abs=5e-4)
 
 
 def test_w_grows_faster_than_the_part_of_the_tube():

@@ -21,7 +21,7 @@ from hsv.flight.flown_checks import OUTPUTS, region, share_of
 from hsv.model.dynamics import advance
 from hsv.model.lpv.linearisation import acceleration_channels
 from hsv.model.lpv.polytope import evaluate
-from hsv.model.signals import ACCELERATED, CHANNELS, N_RIGID
+from hsv.model.signals import ACCELERATED, CHANNELS, N_RIGID, STATE_NAMES
 from hsv_paper.plots import BLUE, DEGREES, GREEN, GREY, RED, new_figure
 
 RATES = (30.48, 9.144)
@@ -40,17 +40,19 @@ KINDS = {
 
 
 def flown(path: Path) -> dict[str, float]:
-    """Return the level, the ratio to W and the outputs of the flights in the JSON that ``hsv verify`` has printed.
+    """Return number, level, ratio to W and outputs of the drawn flights in the JSON that ``hsv verify`` has printed.
 
     Raises:
         DesignError: The file is not such JSON.
     """
     try:
-        claims = parse_json(read_text(path))["claims"]
-        drawn = (claim for claim in claims if " drawn flights: " in claim["name"])
-        found = {claim["name"].partition(" drawn flights: ")[2]: float(claim["value"]) for claim in drawn}
-        return {name: found[name] for name in ("level", "ratio to W", *OUTPUTS)}
-    except (LookupError, TypeError, ValueError) as error:
+        found: dict[str, float] = {}
+        for claim in parse_json(read_text(path))["claims"]:
+            number, drawn, name = claim["name"].partition(" drawn flights: ")
+            if drawn:
+                found |= {"number": float(number), name: float(claim["value"])}
+        return {name: found[name] for name in ("number", "level", "ratio to W", *OUTPUTS)}
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise DesignError(f"{path}: {error}, expected the output of hsv verify NAME --json") from error
 
 
@@ -63,6 +65,21 @@ def bounds(subject: Subject, flights: Mapping[str, float]) -> dict[str, np.ndarr
     found["worst sequence"] = np.array(subject.stated("tube.invariant_set.counter_examples.half_range"))
     found["worst flight"] = np.array([flights[name] for name in OUTPUTS])
     return found
+
+
+def held(subject: Subject, row: int, steps: int = 3000) -> tuple[float, float]:
+    """Return the largest output ``row`` of disturbances in W that are constant, at one vertex.
+
+    The first number is that of the steady state, the second the largest on the way there, within ``steps``.
+    """
+    tube = Tube(subject, subject.design, "tube")
+    A, columns, c = tube.A, tube.G * tube.half, tube.rows[row]
+    steady = np.abs(c @ np.linalg.solve(np.eye(A.shape[1]) - A, columns)).sum(axis=-1).max()
+    moved, largest = np.zeros_like(columns), 0.0
+    for _ in range(steps):
+        moved = A @ moved + columns
+        largest = max(largest, float(np.abs(c @ moved).sum(axis=-1).max()))
+    return float(steady), largest
 
 
 Gap = dict[str, tuple[dict[str, float], dict[str, np.ndarray]]]
@@ -90,11 +107,21 @@ def bound_rows(found: Gap) -> list[dict[str, str]]:
 
 
 def flight_rows(found: Gap) -> list[dict[str, str]]:
-    """Return the rows of the table of levels and ratios to W."""
-    return [
-        {"design": f"`{name}`", "largest level": f"{f['level']:.3f}", "largest ratio to W": f"{f['ratio to W']:.3f}"}
-        for name, (f, _) in found.items()
-    ]
+    """Return the rows of the table of flights, and of the pitch angle under constant disturbances."""
+    rows = []
+    for name, (flights, _) in found.items():
+        steady, largest = np.degrees(held(load_subject(find_design(name)), STATE_NAMES.index("pitch_angle")))
+        rows.append(
+            {
+                "design": f"`{name}`",
+                "drawn flights": f"{flights['number']:.0f}",
+                "largest level": f"{flights['level']:.3f}",
+                "largest ratio to W": f"{flights['ratio to W']:.3f}",
+                "constant disturbances, steady": f"{steady:.3f}",
+                "on the way there": f"{largest:.3f}",
+            }
+        )
+    return rows
 
 
 def draw(found: Gap) -> Figure:

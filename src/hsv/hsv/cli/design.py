@@ -133,7 +133,7 @@ def _summary(report: dict[str, Any]) -> None:
         "feedback gain": f"spectral radius of A + BF at most {max(feedback['spectral_radii']):.6f} (rigid states)",
         "(24)": f"least eigenvalue {min(feedback['lmi_smallest_eigenvalues']):.3g}",
         "nominal gains": len(report["nominal"]),
-        "invariant set": f"{tube['invariant_set']['kind']}, certified at every vertex",
+        "invariant set": f"{tube['invariant_set']['kind']}, certified at every vertex, given W",
         "worst level": f"{flights['worst_level']:.3f} of 1, in {flights['flights']} flights",
     }
     if adjustable := report.get("adjustable"):
@@ -278,7 +278,7 @@ def certify(
     else:
         output.say(*(output.folded(f"not covered by the certificate: {item}") for item in uncovered))
         rows = [(verdict.name, _half_widths(verdict.half_width, verdict.feedback)) for verdict in verdicts]
-        output.console.print(output.quantity_table("Half-widths of the invariant set", HALF_WIDTHS, rows, units))
+        output.console.print(output.quantity_table("Half-widths of the invariant set, given W", HALF_WIDTHS, rows, units))
         for verdict in verdicts:
             state = "certified" if verdict.certified else "not certified"
             output.say(output.folded(f"{verdict.name}: {state}, {verdict.said(units)}"))

@@ -115,7 +115,7 @@ def _list_designs(name: str, units: UnitSystem, json: bool) -> None:
             stated[known] = output.to_json({key: (value, unit) for (key, unit), value in pairs}, units)
         output.print_json(stated)
         return
-    output.console.print(output.quantity_table("Half-widths of the invariant sets", HALF_WIDTHS, sets, units))
+    output.console.print(output.quantity_table("Half-widths of the invariant sets, given W", HALF_WIDTHS, sets, units))
     output.console.print(output.quantity_table("Room of the plan, and flights", _FLOWN, flown, units))
 
 
