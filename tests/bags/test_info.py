@@ -66,5 +66,6 @@ def test_description(described):
         "uncertified_steps": 0,
         "uncertified_hardware_steps": 0,
         "uncertified_rate_steps": 0,
+        "uncertified_disturbance_steps": 0,
     }
     assert described["not_covered"] is None  # without parameters there is nothing to compare

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 
 from hsv.base.errors import DesignError
+from hsv.certificate.checks import load_subject
 from hsv.certificate.coverage import uncovered_rates
 from hsv.control.design_file import find_design, read_design
 from hsv.control.hardware import uncovered_hardware
 from hsv.control.tube_law import TubeStatusCode
-from hsv.flight.assembly import assemble_flight, uncovered_of
+from hsv.flight.assembly import assemble, assemble_flight, flight_parameters, uncovered_of
 from hsv.flight.blocks import steps
 from hsv.flight.scenario import load_scenario
 from hsv.model.signals import INPUT_NAMES
@@ -128,6 +129,17 @@ def test_the_status_tells_of_rates():
     slow = replace(BASELINE, tube=replace(BASELINE.tube, rates=np.full(2, 1e-9)))
     flown = [step.diagnostics.status for step in islice(steps(assemble_flight(load_scenario("case1"), slow)), 3)]
     assert flown[0] is TubeStatusCode.OK and flown[2] is TubeStatusCode.UNCERTIFIED_RATE
+
+
+def test_the_status_tells_of_disturbances_outside_w():
+    """The declared loss of effectiveness is in W, a larger one is not."""
+    step = load_subject(find_design("baseline")).stated("tube.disturbance.step")
+    watched = {"tube.disturbance": [*step["lower"], *step["upper"]]}
+    for effectiveness, status in ((0.9, TubeStatusCode.OK), (0.7, TubeStatusCode.UNCERTIFIED_DISTURBANCE)):
+        lost = {"channel": "elevator_deflection", "type": "loss_of_effectiveness", "effectiveness": effectiveness}
+        values = flight_parameters(load_scenario("case1", {"fault": [lost | {"start": "2 s"}]}))
+        flown = [step.diagnostics.status for step in islice(steps(assemble(values | watched)), 120)]
+        assert flown[:101] == [TubeStatusCode.OK] * 101 and flown[101] is status
 
 
 def test_where_no_tube_is_certified_nothing_is_covered():

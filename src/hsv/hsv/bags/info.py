@@ -263,14 +263,16 @@ def _tube(bag: Bag) -> dict[str, Any]:
     checked = columns["status"] != bag.constant(TUBE_STATUS, "NO_SET")
     outside = checked & ~columns["inside"]
     levels = columns["level"][checked & np.isfinite(columns["level"])]
+    uncertified = {"steps": "VEHICLE"} | {f"{name.lower()}_steps": name for name in ("HARDWARE", "RATE", "DISTURBANCE")}
     return {
         "checked_steps": int(checked.sum()),
         "outside_steps": int(outside.sum()),
         "largest_level": float(levels.max()) if len(levels) else None,
         "excursions": intervals(columns["header.stamp"], outside),
-        "uncertified_steps": int((columns["status"] == constants.get("UNCERTIFIED_VEHICLE", -1)).sum()),
-        "uncertified_hardware_steps": int((columns["status"] == constants.get("UNCERTIFIED_HARDWARE", -1)).sum()),
-        "uncertified_rate_steps": int((columns["status"] == constants.get("UNCERTIFIED_RATE", -1)).sum()),
+        **{
+            f"uncertified_{steps}": int((columns["status"] == constants.get(f"UNCERTIFIED_{name}", -1)).sum())
+            for steps, name in uncertified.items()
+        },
     }
 
 

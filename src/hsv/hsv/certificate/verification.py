@@ -748,6 +748,19 @@ def _star_checks(subject: Subject, tube: Tube) -> Checks:
     yield recomputed(subject, f"{inside}.certificate.star_norms.level_of_zero_error", start, "eigenvalues")
 
 
+def step_checks(subject: Subject) -> Checks:
+    """Recompute what disturbances in W add to the rigid states in a step, which the status in flight watches.
+
+    The plan's filtered pitch rate is known in flight, so that its channel is left out.
+    """
+    tube, field = Tube(subject, subject.design, "tube"), "tube.disturbance.step"
+    kept = [j for j, channel in enumerate(CHANNELS) if channel.name != "filtered_nominal_rate"]
+    ends = np.stack([(tube.G * side)[:, :N_RIGID, kept] for side in (tube.lower, tube.upper)])
+    lower, upper = ends.min(axis=0).sum(axis=2), ends.max(axis=0).sum(axis=2)
+    yield recomputed(subject, f"{field}.lower", lower.min(axis=0), "disturbance bounds")
+    yield recomputed(subject, f"{field}.upper", upper.max(axis=0), "disturbance bounds")
+
+
 def rated_checks(subject: Subject) -> Checks:
     """Recompute the bounds for flights at limited rates of altitude and velocity, where a design has them."""
     tube, inside = Tube(subject, subject.design, "tube"), "tube.invariant_set"
@@ -929,6 +942,7 @@ RECOMPUTED: dict[str, Part] = {
     "adjustable design": adjustable_checks,
     "counter-examples": counter_example_checks,
     "limited rates": rated_checks,
+    "disturbances in a step": step_checks,
 }
 """Checks by part that take a few seconds."""
 

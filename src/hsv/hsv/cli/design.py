@@ -278,7 +278,9 @@ def certify(
     else:
         output.say(*(output.folded(f"not covered by the certificate: {item}") for item in uncovered))
         rows = [(verdict.name, _half_widths(verdict.half_width, verdict.feedback)) for verdict in verdicts]
-        output.console.print(output.quantity_table("Half-widths of the invariant set, given W", HALF_WIDTHS, rows, units))
+        output.console.print(
+            output.quantity_table("Half-widths of the invariant set, given W", HALF_WIDTHS, rows, units)
+        )
         for verdict in verdicts:
             state = "certified" if verdict.certified else "not certified"
             output.say(output.folded(f"{verdict.name}: {state}, {verdict.said(units)}"))

@@ -21,7 +21,7 @@ import numpy as np
 from hsv.base.errors import SignalError
 from hsv.base.parameters import Parameter, validate
 from hsv.control.controller import Controller, ControllerInput, ControllerResult
-from hsv.control.design import TAU, TAU_CHANGE_PARAMETERS, ControlDesign, certified, compact, scheduled_changes
+from hsv.control.design import TAU, TAU_CHANGE_PARAMETERS, ControlDesign, certified, compact, scheduled_changes, shaped
 from hsv.control.effectiveness import (
     EFFECTIVENESS_PARAMETERS,
     WATCHED_PARAMETERS,
@@ -48,6 +48,7 @@ class TubeStatusCode(IntEnum):
     UNCERTIFIED_VEHICLE = 4
     UNCERTIFIED_HARDWARE = 5
     UNCERTIFIED_RATE = 6
+    UNCERTIFIED_DISTURBANCE = 7
 
 
 TUBE_PARAMETERS = (
@@ -59,8 +60,13 @@ TUBE_PARAMETERS = (
     Parameter("vehicle.digest", "", "digest of the vehicle flown; empty: the default one"),
     *FLOWN_NOTCH_PARAMETERS,
     *HARDWARE_PARAMETERS,
+    Parameter(
+        "tube.disturbance",
+        [],
+        "lower, then upper bounds of what W adds to the rigid states in a step; empty: not watched",
+    ),
 )
-"""Parameters of the tube law besides those of the design; those of the hardware affect only the status."""
+"""Parameters of the tube law besides those of the design; hardware and disturbance affect only the status."""
 
 
 def tube_data(
@@ -164,6 +170,29 @@ class TubeResult(ControllerResult):
     effectiveness: Effectiveness | None = None
 
 
+class DisturbanceMonitor:
+    """A monitor of the disturbance Delta = e(k+1) - A(p) e(k) - B(p) (u - u_r - u_n) of each step (eq. 13 to 18)."""
+
+    def __init__(self, design: ControlDesign, bounds: np.ndarray) -> None:
+        """Watch flights of ``design``; ``bounds`` (2, 5) are the lower and upper ones of Delta, SI."""
+        self._polytope, self._bounds = design.polytope.data(), bounds
+        self.reset()
+
+    def reset(self) -> None:
+        """Prepare a new flight, whose first step has no disturbance yet."""
+        self._expected = np.full(N_STATES, np.nan)
+
+    def leaves(self, inputs: ControllerInput, u: np.ndarray) -> bool:
+        """Return whether the disturbance that led to this step is outside W; predict e for the next, with input u."""
+        error = (inputs.estimate - inputs.reference - inputs.deviation)[:N_RIGID]
+        delta, (lower, upper) = error - self._expected[:N_RIGID], self._bounds
+        self._expected[:] = 0.0
+        self._expected[:N_RIGID] = error
+        given = map(doubles, (self._expected, u - inputs.reference_input - inputs.nominal_input, np.zeros(N_STATES)))
+        lib.hsv_nominal_advance(self._polytope.pointer, *inputs.estimate[:2], *given)
+        return bool(np.any((delta < lower) | (delta > upper)))
+
+
 class TubeLaw(Controller):
     """The Tube-MPC law, with a monitor of whether the error is in the invariant set."""
 
@@ -173,6 +202,8 @@ class TubeLaw(Controller):
     design: ControlDesign
     factors: list[tuple[int, np.ndarray]]
     """First step and tau (5) of each gain of the kernel."""
+    monitor: DisturbanceMonitor | None = None
+    """The monitor of W, if the bounds are given."""
 
     def __init__(
         self,
@@ -218,7 +249,10 @@ class TubeLaw(Controller):
         covered = not uncovered_hardware(values, design)
         watch = effectiveness_data(values, design.period)
         sections, rate = flown_sections(values), v["integral.rate"]
-        return cls(design, v["vehicle.coupling"], sections, changes, rate, vehicle, covered, watch)
+        law = cls(design, v["vehicle.coupling"], sections, changes, rate, vehicle, covered, watch)
+        if v["tube.disturbance"]:
+            law.monitor = DisturbanceMonitor(design, shaped(v, "tube.disturbance", (2, N_RIGID)))
+        return law
 
     @property
     def gain(self) -> np.ndarray:
@@ -231,6 +265,8 @@ class TubeLaw(Controller):
         Until the first of them, tau is that of the last :meth:`change_tau`, or of the design if there was none.
         """
         self._next, self._before = 0, np.full(2, np.nan)
+        if self.monitor:
+            self.monitor.reset()
         self._arrange([(0, self._tau), *self._scheduled])
 
     def change_tau(self, values: Sequence[float]) -> int:
@@ -283,6 +319,7 @@ class TubeLaw(Controller):
         if in_loop:
             error, tube = np.concatenate((error, filter_state - planned)), self._tube
         tube_level = ellipsoid_level(tube.shape, error - tube.centre) if tube else math.nan
+        leaves_w = self.monitor is not None and self.monitor.leaves(inputs, u)
         valid = math.isfinite(total[0]) and math.isfinite(total[1])
         inside = valid and tube_level <= 1.0
         if not valid:
@@ -295,6 +332,8 @@ class TubeLaw(Controller):
             status = TubeStatusCode.UNCERTIFIED_VEHICLE
         elif not self._hardware_covered:
             status = TubeStatusCode.UNCERTIFIED_HARDWARE
+        elif leaves_w:
+            status = TubeStatusCode.UNCERTIFIED_DISTURBANCE
         else:
             fast = tube.too_fast(inputs.estimate[:2] - self._before, self.design.period)
             status = TubeStatusCode.UNCERTIFIED_RATE if any(fast) else TubeStatusCode.OK

@@ -139,7 +139,9 @@ def certified_tube(
         "highest_flight": highest.argmax(axis=0).tolist(),
     }
     report = tube.report()
+    lower, upper = found.problem.step_bounds()
     report["disturbance"] |= {
+        "step": {"lower": lower.tolist(), "upper": upper.tolist()},
         "flights": tube.measured.flights,
         "measured": {name: extreme.tolist() for name, extreme in vars(tube.measured.channels).items()},
     }

@@ -10,7 +10,7 @@ from hsv.certificate.verification import extreme_factors
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import ChannelModel, DisturbanceSet
 from hsv.design.error_system import ErrorSystem, error_system, union
-from hsv.model.signals import N_RIGID
+from hsv.model.signals import CHANNELS, N_RIGID
 from hsv.model.vehicle import Vehicle
 
 
@@ -38,6 +38,16 @@ class TubeProblem:
         A, G = self.system.A, self.system.G
         drift = A @ centre + G @ self.disturbance.centre - centre
         return np.concatenate((G * self.disturbance.half_width, drift[:, :, None]), axis=2)
+
+    def step_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return lower and upper bounds (5 each) of what W adds to the rigid states in a step, at any vertex.
+
+        The channel that is known in flight, the plan's filtered pitch rate, is left out.
+        """
+        unknown = np.array([channel.name != "filtered_nominal_rate" for channel in CHANNELS])
+        G = self.system.G[:, :N_RIGID] * unknown
+        middle, reach = G @ self.disturbance.centre, np.abs(G) @ self.disturbance.half_width
+        return (middle - reach).min(axis=0), (middle + reach).max(axis=0)
 
     def output_rows(self) -> np.ndarray:
         """Return the rows (7, n) of the bounded outputs of e: the five rigid states, then F e for both inputs."""

@@ -15,14 +15,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hsv.bags.description import COMPOSED, CONTROLLER, LIVE, NodeDescription, controller_node, graph
+from hsv.bags.description import COMPOSED, CONTROLLER, LIVE, TUBE_MPC, NodeDescription, controller_node, graph
 from hsv.bags.infrastructure_parameters import STEP_TIMEOUT
 from hsv.bags.parameter_sections import ParameterSections
-from hsv.base.errors import DocumentError, ParameterError, QuantityError, RecordingError, RunError
+from hsv.base.errors import DesignError, DocumentError, ParameterError, QuantityError, RecordingError, RunError
 from hsv.base.files import open_regular
 from hsv.control.controller import NODE
 from hsv.control.design import DESIGN_PARAMETERS, NO_DESIGN, digest
-from hsv.control.design_file import attached_certificate, design_files, find_certificate, find_design, read_design
+from hsv.control.design_file import (
+    attached_certificate,
+    design_files,
+    find_certificate,
+    find_design,
+    read_certificate,
+    read_design,
+)
 from hsv.flight.assembly import assemble_flight, blamed_on, own_parameters
 from hsv.flight.scenario import Scenario, parse_scenario, scenario_text, with_controller
 from hsv.flight.tables import read_changes
@@ -152,9 +159,12 @@ def prepare(
         folder = Path(temporary.name)
     folder = folder.absolute()
     folder.mkdir(parents=True, exist_ok=True)
+    sections = {CONTROLLER.name: own} if own else {}
+    if scenario.controller == TUBE_MPC.name and design and design.tube and not design.actuators:
+        sections[TUBE_MPC.name] = _watched(find_certificate(scenario.design))
     files = {
         "scenario.toml": text,
-        "scenario.yaml": ParameterSections(scenario.parameters(), {CONTROLLER.name: own} if own else {}).to_yaml(),
+        "scenario.yaml": ParameterSections(scenario.parameters(), sections).to_yaml(),
         "design.yaml": ParameterSections({"design.name": NO_DESIGN}).to_yaml(),
         **(design_files(design_file) if design_file else {}),
     }
@@ -199,6 +209,18 @@ def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:
             raise ParameterError(f"controller = {controller!r}: {error}") from None
     nodes = ((node,) if node.foreign else ()) + (COMPOSED,) if composed else graph(controller)
     return tuple(node for node in nodes if node.executable)
+
+
+def _watched(certificate: Path | None) -> dict[str, Any]:
+    """Return the parameter with which the tube law watches W; none without a certificate, or if it is malformed.
+
+    The controller's node refuses a malformed certificate, with a message.
+    """
+    with suppress(DesignError, LookupError, TypeError):
+        if certificate:
+            step = read_certificate(certificate)["tube"]["disturbance"]["step"]
+            return {"tube.disturbance": [*step["lower"], *step["upper"]]}
+    return {}
 
 
 def provenance(controller: str, name: str, design_hash: str, seed: int) -> dict[str, str]:

@@ -58,6 +58,7 @@ def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
             "uncertified_rate_steps",
             "in some steps, altitude or velocity change faster than the bounds are certified for",
         ),
+        ("uncertified_disturbance_steps", "in some steps, the measured disturbance is outside W"),
     ):
         if tube.get(steps):
             events.append(_instant(description["start_s"], "warning", text, "tube_mpc"))
