@@ -4,6 +4,7 @@ import copy
 import multiprocessing
 import os
 import pickle
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +16,8 @@ from gymnasium.utils.env_checker import check_env
 from page_blocks import blocks, indented
 
 import hsv.gym
-from hsv.base.errors import CampaignError, ControllerError, RunError, ScenarioError
+from hsv.base.errors import CampaignError, ControllerError, ParameterError, RunError, ScenarioError
+from hsv.control.design_file import find_design, read_design
 from hsv.core import lanes
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
@@ -29,7 +31,60 @@ DRAWN = {"scale": 1.0, "factors": {"fault[0].effectiveness": (0.5, 1.0)}}
 @pytest.mark.filterwarnings("ignore:.*Box observation space m")
 @pytest.mark.parametrize("options", [{}, DRAWN, {"scenario": "case1_realistic"}], ids=["case1", "drawn", "realistic"])
 def test_gymnasium_finds_no_fault(options):
-    check_env(gymnasium.make("hsv/Track-v0", **options).unwrapped, skip_render_check=True)
+    check_env(gymnasium.make("hsv/Track-v0", render_mode="rgb_array", **options).unwrapped, skip_render_check=True)
+
+
+@pytest.mark.parametrize("scenario", ["case1", "winged_cone"])
+def test_the_side_view_follows_the_vehicle(scenario):
+    env = gymnasium.make("hsv/Track-v0", scenario=scenario, render_mode="rgb_array").unwrapped
+    env.reset(seed=1)
+    first = env.render()
+    assert first.shape == (400, 640, 3) and first.dtype == np.uint8 and len(np.unique(first)) > 10
+    for _ in range(100):
+        env.step([0.0, 0.1])
+    assert not np.array_equal(env.render(), first)
+    assert np.array_equal(copy.deepcopy(env).render(), env.render())
+    env.close()
+    assert hsv.gym.TrackEnv().render() is None
+    with pytest.raises(ParameterError, match="render_mode = 'ansi': expected one of human, rgb_array"):
+        hsv.gym.TrackEnv(render_mode="ansi")
+
+
+def test_observations_are_normalised_by_the_scales_of_a_design():
+    single, vector = hsv.gym.TrackEnv(), hsv.gym.TrackVectorEnv(3)
+    plain, own = single.reset()[0], hsv.gym.normalised(hsv.gym.TrackEnv()).reset()[0]
+    scale = read_design(find_design("baseline")).nominal_state_scale
+    np.testing.assert_allclose(own[9:14], plain[9:14] / scale, rtol=1e-12)
+    np.testing.assert_allclose(own[:9], own[9:], atol=1e-9)  # the flight begins at the trim
+    assert np.array_equal(hsv.gym.normalised(vector).reset()[0], [own] * 3)
+    assert gymnasium.spaces.Box(-10.0, 10.0, (18,), float).contains(own)
+
+
+def test_a_mask_resets_some_environments_and_the_others_fly_on():
+    count, random = lanes() + 3, np.random.default_rng(1)
+    masked, kept, begun = (hsv.gym.TrackVectorEnv(count, scale=1.0) for _ in range(3))
+    for env in (masked, kept):
+        env.reset(seed=5)
+    mask = np.zeros(count, bool)
+    mask[[1, 2, -1]] = True
+    for env, actions in ((env, a) for a in random.uniform(-0.1, 0.1, (5, count, 2)) for env in (masked, kept)):
+        env.step(actions)
+    observations = masked.reset(seed=100, options={"reset_mask": mask})[0]
+    assert np.array_equal(observations[mask], begun.reset(seed=100)[0][mask])
+    for actions in random.uniform(-0.1, 0.1, (20, count, 2)):
+        found, others, new = (env.step(actions) for env in (copy.deepcopy(masked), kept, begun))
+        masked.step(actions)
+        for one, other, third in zip(found[:4], others[:4], new[:4], strict=True):
+            assert np.array_equal(one[~mask], other[~mask]) and np.array_equal(one[mask], third[mask])
+    for wrong in (mask[1:], np.zeros(count, bool)):
+        with pytest.raises(ControllerError, match="reset_mask: expected"):
+            masked.reset(options={"reset_mask": wrong})
+
+
+def test_the_example_of_the_page_trains(capsys):
+    program = runpy.run_path(str(ROOT / "examples" / "gymnasium" / "train.py"))
+    before, after = program["main"](8)
+    assert before < 5.0 and after > 9.0
 
 
 def test_the_example_of_the_page_flies_the_flight_of_its_controller(tmp_path, monkeypatch):
@@ -94,12 +149,14 @@ def test_a_seed_draws_the_same_flights_and_another_seed_others():
     assert draws[0] == draws[1] and len({*draws[0], *draws[2]}) == 4
 
 
-def test_a_step_after_the_end_begins_a_flight_of_its_own():
+def test_a_finished_episode_is_reset_not_stepped():
     env = hsv.gym.TrackEnv()
     env.reset()
     while not env.step(np.ones(2))[2]:
         pass
-    env.step(np.zeros(2))
+    with pytest.raises(RunError, match="the episode is over, expected reset"):
+        env.step(np.zeros(2))
+    env.reset()
     with pytest.raises(RunError, match=r"flight: no step since the episode began, expected step\(\) first"):
         _ = env.flight
     env.step(np.zeros(2))
@@ -162,6 +219,7 @@ def test_a_copy_begins_the_next_episode_after_the_end_of_its_own():
     while not env.step(np.ones(2))[2]:
         pass
     copied = copy.deepcopy(env)
+    copied.reset(), env.reset()
     assert _flown(copied, 3, 1) == _flown(env, 3, 1)
 
 

@@ -1,15 +1,17 @@
 """A flight under the ROS 2 standard for simulators: its client pauses, steps and resets the flight."""
 
 import json
+import re
 import sys
 import textwrap
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 from marking import long
 from node_processes import short_scenario
-from waiting import exit_code_of, output_of
+from waiting import exit_code_of, output_of, used
 
 from hsv.bags.flight import flight_fingerprint
 from hsv.bags.reader import Bag
@@ -73,6 +75,23 @@ def assert_each_has_its_own(*bags):
         assert len(ready) == 5 and {message.run_id for message in ready} == {run.run_id}
         assert bag.custom_data["run_id"] == run.run_id
     assert len({run.run_id for [(_, run)] in runs}) == len(bags)
+
+
+@pytest.mark.fuzz
+def test_random_requests_are_answered_and_the_flight_goes_on(processes, request):
+    count = min(request.config.getoption("--fuzz-inputs"), 300)
+    words = ("--bag", processes.folder / "flown", "--paused", "--real-time-factor", "1", "--no-report")
+    run = processes.start("hsv", "run", "case1", *words, output=(processes.folder / "said").open("w"))
+    fuzz = processes.run(sys.executable, CLIENT.with_name("simulation_fuzz.py"), count)
+    said = (processes.folder / "said").read_text()
+    assert fuzz.returncode == 0 and run.poll() is None, fuzz.stdout + said
+    assert sum(json.loads(fuzz.stdout.splitlines()[-1]).values()) == count
+    nodes = [psutil.Process(run.pid), *psutil.Process(run.pid).children(recursive=True)]
+    for node in nodes:
+        peak = re.search(r"VmHWM:\s*(\d+)", Path(f"/proc/{node.pid}/status").read_text())
+        assert int(peak[1]) <= 512 * 1024, node.cmdline()
+    assert used([run.pid]) <= 10.0 * count
+    assert "Traceback" not in said, said
 
 
 RESET_BEFORE_A_STEP = textwrap.dedent(

@@ -38,6 +38,9 @@ _FEATURES = [
 _VEHICLE = "vehicle"
 """Name of the one entity."""
 
+_MAX_FILTER = 100
+"""Maximum length of a filter of names, a regular expression"""
+
 _WAITING_REQUESTS = 1000
 """Requests to step that wait in the queue of their service; the middleware drops more than that."""
 
@@ -111,7 +114,9 @@ class SimulationControl:
 
     def _get_entity_state(self, request: Any, response: Any) -> Any:
         if request.entity != _VEHICLE:
-            return _answered(response, Result.RESULT_NOT_FOUND, f"entity = {request.entity!r}: expected {_VEHICLE!r}")
+            return _answered(
+                response, Result.RESULT_NOT_FOUND, f"entity = {request.entity!r:.80}: expected {_VEHICLE!r}"
+            )
         response.state = self._entity_state()
         return _answered(response)
 
@@ -119,9 +124,13 @@ class SimulationControl:
         """Write the names of the entities that the filters admit; return result code and message."""
         if filters.categories or filters.tags.tags or filters.bounds.type:
             return Result.RESULT_FEATURE_UNSUPPORTED, "filters: expected a filter of names only"
+        # Each choice multiplies the work of the search, which stops the flight.
+        if len(filters.filter) > _MAX_FILTER or "{" in filters.filter or sum(map(filters.filter.count, "*+?|")) > 4:
+            expected = f"expected at most {_MAX_FILTER} characters, 4 of them among * + ? |, and no {{"
+            return Result.RESULT_FEATURE_UNSUPPORTED, f"filters.filter: {expected}"
         try:
             admitted = not filters.filter or re.search(filters.filter, _VEHICLE)
-        except re.error as error:
+        except (re.error, RecursionError) as error:
             return Result.RESULT_OPERATION_FAILED, f"filters.filter = {filters.filter!r}: {error}"
         response.entities = [_VEHICLE] if admitted else []
         return Result.RESULT_OK, ""
