@@ -43,7 +43,7 @@ def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
     """
     row, runner = results.row(flight), results.sample_runner
     try:
-        flown = runner.fly(flight, runner.sample(flight))
+        flown = runner.fly(flight, [*results.sample(flight).values()])
         repeated = runner.outcome((flown, runner.tube_level(flown)))
     except ControllerError as error:
         repeated = runner.outcome(error)

@@ -219,7 +219,7 @@ def _repeated(results: Results, worst: int) -> dict[str, Flight]:
         with suppress(ControllerError):
             flights["nominal vehicle"] = runner.fly_unchanged()
         with suppress(ControllerError):
-            flights[f"flight {worst}"] = runner.fly(worst, runner.sample(worst))
+            flights[f"flight {worst}"] = runner.fly(worst, [*results.sample(worst).values()])
     return flights
 
 

@@ -30,6 +30,9 @@ from hsv.plugins.library import library_digest
 
 METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
 
+WORST, RARE = SEARCHES = ("worst", "rare")
+"""Methods of searches, whose samples are not drawn but chosen flight by flight (:mod:`hsv.flight.search`)."""
+
 MAX_SAMPLES = 10**7
 
 _MAX_HYPERCUBE = 10**6
@@ -79,13 +82,17 @@ class Campaign:
     design: Mapping[str, Any]
     """All parameters of the controller's design by name, stored because the design file may change later."""
     method: str
-    """Sampling method, one of :data:`METHODS`."""
+    """Sampling method, one of :data:`METHODS` or :data:`SEARCHES`."""
     samples: int
     """Number of flights: the same samples fly at each point of the grid, point after point."""
     seed: int
     factors: tuple[Factor, ...]
     commit: str = "unknown"
     """Git commit of the program; results of different commits are not mixed."""
+    goal: str = ""
+    """Of a search: the metric whose largest value or smallest margin is searched"""
+    budget: int = 0
+    """Of a search: largest number of flights"""
     library: str = ""
     """SHA-256 of the controller's shared library, empty without one; results of different builds are not mixed."""
 
@@ -125,8 +132,12 @@ class Campaign:
         return self.samples // math.prod(len(factor.values) for factor in self.grid)
 
     def flight_seed(self, flight: int) -> int:
-        """Return the seed for the random numbers within a flight, from the campaign's seed and the sample's number."""
-        return (self.seed * MAX_SAMPLES + int(flight) % self.vehicles) % _SEEDS
+        """Return the seed for the random numbers within a flight, from the campaign's seed and the sample's number.
+
+        All flights of a search for the worst one have the seed of flight 0, so that they differ in their samples only.
+        """
+        number = 0 if self.method == WORST else int(flight) if self.method == RARE else int(flight) % self.vehicles
+        return (self.seed * MAX_SAMPLES + number) % _SEEDS
 
     def _flown_table(self, flight: int, sample: Sequence[float]) -> dict[str, Any]:
         flown = copy.deepcopy(self.table) | {"seed": self.flight_seed(flight)}
@@ -211,7 +222,7 @@ class Campaign:
             values = parse_json(text)
             commit = values.get("commit", commit)
             found = cls(**values | {"factors": tuple(_factor(factor) for factor in values["factors"])})
-            if found.method not in METHODS:
+            if found.method not in (*METHODS, *SEARCHES):
                 raise ValueError(f"method {found.method!r}")
             scenario, drawn = scenario_at_means(found.table, found.scenario_name)
             known = (*scenario.vehicle.described.uncertainty, *drawn)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache, partial
 from io import BytesIO
@@ -85,11 +85,6 @@ class SampleRunner:
         """The controller of the scenario without samples; that of a flight may have other parameters."""
         return self._variants.unchanged.controller
 
-    def sample(self, flight: int) -> list[float]:
-        """Return the sample of a flight: one value per factor, in the factor's unit."""
-        [sample], _ = self.campaign.draw(range(flight, flight + 1))
-        return list(sample.tolist())
-
     def fly(self, flight: int, sample: Sequence[float]) -> Flight:
         """Fly a flight with its sample, one value per factor."""
         return fly(self._components(flight, sample))
@@ -144,9 +139,17 @@ class SampleRunner:
         }
 
     def fly_batch(self, batch: int) -> bytes:
-        """Fly a batch, given by its number; return its table of results and its envelope as a Parquet file."""
-        flights, envelope, outcomes = self.campaign.flights(batch), Envelope.empty(), []
-        samples, seeds = self.campaign.draw(flights)
+        """Fly a batch, given by its number; return the same as :meth:`table`."""
+        flights = self.campaign.flights(batch)
+        return self.table(flights, *self.campaign.draw(flights))
+
+    def table(self, flights: range, samples: np.ndarray, seeds: np.ndarray | None = None) -> bytes:
+        """Fly ``flights`` with their ``samples``, shape (flights, factors), and ``seeds``, by default the campaign's.
+
+        Return the table of results and the envelope as a Parquet file.
+        """
+        envelope, outcomes = Envelope.empty(), []
+        seeds = np.full(len(flights), self.campaign.seed, np.uint64) if seeds is None else seeds
         for flown in self.fly_all(flights, samples):
             outcomes.append(self.outcome(flown))
             if not isinstance(flown, ControllerError) and not outcomes[-1]["diverged"]:
@@ -232,11 +235,15 @@ def fly_batch(text: str, batch: int) -> bytes:
     If the controller is in a shared library, the batch is flown in the child process that loads it. If the library
     crashes there, all flights of the batch are flown again one by one, in a new child process after each crash.
     """
-    runner = sample_runner(text)
+    return in_child_of(sample_runner(text), _fly_batch, text, batch)
+
+
+def in_child_of(runner: SampleRunner, job: Callable[[str, int], bytes], text: str, batch: int) -> bytes:
+    """Return ``job(text, batch)``, called in the child process of the runner's shared library if it has one."""
     if isinstance(runner.controller, LibraryController):
         with suppress(ControllerError), watched(runner.controller, runner.steps + 1) as (_, request):
-            return bytes(request("call", bytes, _fly_batch, text, batch))
-    return _fly_batch(text, batch)
+            return bytes(request("call", bytes, job, text, batch))
+    return job(text, batch)
 
 
 def _fly_batch(text: str, batch: int) -> bytes:

@@ -35,7 +35,7 @@ class ResultStore(Store):
         if restart:
             shutil.rmtree(self.folder, ignore_errors=True)
             self.out.unlink(missing_ok=True)
-        batches = range(len(self._campaign.batches))
+        batches = self.numbers()
         if self.out.exists():
             self._check(read_result(self.out).campaign, self.out)
             shutil.rmtree(self.folder, ignore_errors=True)
@@ -62,7 +62,7 @@ class ResultStore(Store):
         columns = schema(self._campaign)
         with writing(self.out, temporary):
             with pq.ParquetWriter(temporary, columns, **WRITTEN) as writer:
-                for batch in range(len(self._campaign.batches)):
+                for batch in self.numbers():
                     part, its_envelope = self._read(batch)
                     envelope.merge(its_envelope)
                     writer.write_table(part.cast(columns))
@@ -70,6 +70,10 @@ class ResultStore(Store):
                 writer.add_key_value_metadata(kept | {DIGEST: result_digest(kept), FORMAT: b"%d" % LATEST})
             replace_file(temporary, self.out)
         shutil.rmtree(self.folder)
+
+    def numbers(self) -> range:
+        """Return the numbers of the batches."""
+        return range(len(self._campaign.batches))
 
     def _is_whole(self, batch: int) -> bool:
         try:
