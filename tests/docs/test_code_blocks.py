@@ -13,7 +13,7 @@ import pytest
 from marking import long
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = ["python.md", long("vehicle.md"), "hardware.md"]
+PAGES = ["python.md", long("vehicle.md"), "hardware.md", long("worst.md")]
 MODULES = {"python.md": ("mine", "class Mine")}
 """Pages that ask the reader to save a block as a module: the module's name, and a text that the block contains."""
 

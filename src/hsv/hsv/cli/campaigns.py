@@ -35,6 +35,9 @@ WorkersOption = Annotated[int, Option(help="Processes on this machine; 0: one pe
 SchedulerOption = Annotated[str, Option(help="Address of a Dask scheduler whose workers are used instead.")]
 ResultArgument = Annotated[Path, Argument(help="Result file of a campaign (.parquet).")]
 FlightOption = Annotated[int, Option("--flight", help="Number of the flight.")]
+ScaleOption = Annotated[float, Option(help="Factor on the parameters' bounds; 0 leaves them alone.")]
+FactorOption = Annotated[list[str] | None, Option(help="Vary a field, e.g. 'fault[0].start=90 s..110 s'; repeatable.")]
+RestartOption = Annotated[bool, Option("--restart", help="Discard existing results.")]
 PageOption = Annotated[bool, Option(help="Write a page next to the results.")]
 
 
@@ -78,15 +81,13 @@ def fly(
         Sampling | None, Option(help=f"{', '.join(Sampling)}; default: uniform.", metavar="METHOD")
     ] = None,
     corners: Annotated[bool, Option("--corners", help="Fly all combinations of extreme values.")] = False,
-    scale: Annotated[float, Option(help="Factor on the parameters' bounds; 0 leaves them alone.")] = 1.0,
-    factor: Annotated[
-        list[str] | None, Option(help="Vary a field: 'FIELD=90 s..110 s', or a grid, FIELD=0.9,0.8,0.7.")
-    ] = None,
+    scale: ScaleOption = 1.0,
+    factor: FactorOption = None,
     changes: SetOption = None,
     out: Annotated[Path | None, Option(help="Result file; default: campaigns/<scenario>_<method>.parquet.")] = None,
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
-    restart: Annotated[bool, Option("--restart", help="Discard existing results.")] = False,
+    restart: RestartOption = False,
     page: PageOption = True,
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
@@ -113,15 +114,7 @@ def fly(
         if corners and value is not None:
             raise CampaignError(f"{name} = {value}: expected no --{name} with --corners, which defines the flights")
     method = "corners" if corners else (sampling or Sampling.uniform).value
-    factors: dict[str, Sequence[object]] = {}
-    for text in factor or ():
-        field, values = (part.strip() for part in text.partition("=")[::2])
-        low, dots, high = values.partition("..")
-        if not dots and "," not in values:
-            raise CampaignError(f"factor = {text!r}: expected FIELD=LEAST..LARGEST or FIELD=VALUE,VALUE,...")
-        if field in factors:
-            raise CampaignError(f"factor = {text!r}: a field is given twice, expected once")
-        factors[field] = (low.strip(), high.strip()) if dots else [value.strip() for value in values.split(",")]
+    factors = read_factors(factor or ())
     count = _SAMPLES if samples is None else samples
     changed = read_changes(changes or ())
     campaign = plan(scenario, method=method, samples=count, seed=seed, scale=scale, factors=factors, changes=changed)
@@ -147,6 +140,20 @@ def fly(
         output.say(f"flown in {significant(flown.wall_time)} s")
     if results.crashed.all():
         raise RunError(f"all {campaign.samples} flights crashed, the first: {results.row(0)['crashed']}")
+
+
+def read_factors(texts: Sequence[str]) -> dict[str, Sequence[object]]:
+    """Return a pair of least and largest value, or a list of grid values, by field, from the texts of ``--factor``."""
+    factors: dict[str, Sequence[object]] = {}
+    for text in texts:
+        field, values = (part.strip() for part in text.partition("=")[::2])
+        low, dots, high = values.partition("..")
+        if not dots and "," not in values:
+            raise CampaignError(f"factor = {text!r}: expected FIELD=LEAST..LARGEST or FIELD=VALUE,VALUE,...")
+        if field in factors:
+            raise CampaignError(f"factor = {text!r}: a field is given twice, expected once")
+        factors[field] = (low.strip(), high.strip()) if dots else [value.strip() for value in values.split(",")]
+    return factors
 
 
 @montecarlo.command()

@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from hsv.base.errors import CampaignError, ControllerError
 from hsv.base.units import UnitSystem
-from hsv.flight.campaign.campaign import Factor
+from hsv.flight.campaign.campaign import WORST, Factor
 from hsv.flight.campaign.envelope import SIGNALS, signals, window_starts
 from hsv.flight.campaign.sample_runner import OUTCOMES
 from hsv.flight.campaign.summary import (
@@ -33,6 +33,7 @@ from hsv.flight.metrics import Group, is_share, metric_of, spaced
 from hsv.model.plant import Plant
 from hsv.pages.engine import Numbers, Plot, render, write_page
 from hsv.pages.picture import Picture, picture
+from hsv.pages.search import search_section
 from hsv.pages.text import capitalised, quantity, units_of
 
 POINTS = 2000
@@ -49,6 +50,7 @@ PICTURED = ("altitude_error", "velocity_error", "angle_of_attack", "elevator_def
 
 SECTIONS = {
     "summary": "Summary",
+    "search": "Search for the worst flight",
     "worst": "Worst flights",
     "envelopes": "Envelopes",
     "distributions": "Distributions",
@@ -82,6 +84,8 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
     pictured = [plot for name in PICTURED for plot in envelopes if plot.name == f"envelope_{name}"]
     starts = [fault.start for fault in results.campaign.scenario.fault]
     shades = [(start, end) for start in starts if start < end]
+    search = search_section(results, numbers) if results.campaign.method == WORST else None
+    absent = [name for name, there in (("scatter", differing), ("search", search)) if not there]
     return render(
         "campaign.html.j2",
         plots=[
@@ -104,7 +108,8 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
         numbers=numbers,
         campaign=results.campaign,
         units=units,
-        sections={name: heading for name, heading in SECTIONS.items() if differing or name != "scatter"},
+        sections={name: heading for name, heading in SECTIONS.items() if name not in absent},
+        search=search,
         sentence=sentence(results),
         failed=failed and spaced(failed.name),
         lost=lost,

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 from hsv.base.errors import CampaignError
 from hsv.control.design import design_of
 from hsv.flight.assembly import require_trust
-from hsv.flight.campaign.campaign import Campaign
+from hsv.flight.campaign.campaign import SEARCHES, Campaign
 from hsv.flight.campaign.envelope import Envelope
 from hsv.flight.campaign.sample_runner import SampleRunner, outcomes_of
 from hsv.flight.campaign.store import read_result
@@ -239,7 +239,7 @@ def within_all(results: Results) -> int:
 
 def shares(results: Results) -> list[Share]:
     """Return the share of the flights that finish, then for each limit the share of those that finish within it."""
-    every = results.campaign.method == "corners"
+    every = results.campaign.method in ("corners", *SEARCHES)
     found = []
     for name, (limit, judged, kept) in _judged(results).items():
         count, n = int(np.count_nonzero(kept)), int(np.count_nonzero(judged))

@@ -76,7 +76,7 @@ class Rows(ResultStore):
         self.flown = self.flown_now = self._parts = 0
 
     def run(self, search: Callable[[Callable[[np.ndarray], np.ndarray]], object], *, restart: bool = False) -> None:
-        """Call ``search`` with :meth:`fly` and write the result file, unless the file exists and holds this search.
+        """Call ``search`` with :meth:`evaluate` and write the result file, unless the file of this search exists.
 
         Raises:
             CampaignError: The results belong to another search, are in use or damaged, or cannot be written.
@@ -84,7 +84,7 @@ class Rows(ResultStore):
         """
         with self.opened(restart=restart):
             if not self.out.exists():
-                search(self.fly)
+                search(self.evaluate)
                 self._campaign = replace(self._campaign, samples=self.flown)
                 self.finish()
 
@@ -99,7 +99,7 @@ class Rows(ResultStore):
         """Return the numbers of the parts."""
         return range(self._parts)
 
-    def fly(self, samples: np.ndarray) -> np.ndarray:
+    def evaluate(self, samples: np.ndarray) -> np.ndarray:
         """Return how bad the flights with these ``samples``, shape (n, factors), are, shape (n,)."""
         first, n, begin = self.flown, len(samples), self._parts
         width = _SMALL if n < _LARGE * 4 else _LARGE
@@ -116,7 +116,8 @@ class Rows(ResultStore):
         return np.concatenate([self._badness(self._read(begin + number)[0]) for number in range(len(cuts))])
 
     def _badness(self, part: pa.Table) -> np.ndarray:
-        lost = np.array(part["diverged"].to_pylist()) | np.array([why is not None for why in part["crashed"].to_pylist()])
+        ended = zip(part["diverged"].to_pylist(), part["crashed"].to_pylist(), strict=True)
+        lost = np.array([diverged or crashed is not None for diverged, crashed in ended])
         return badness(self._campaign, lambda name: _numbers(part[name]), lost)
 
     def _has(self, number: int, samples: np.ndarray) -> bool:
@@ -134,8 +135,8 @@ def _numbers(column: pa.ChunkedArray) -> np.ndarray:
 
 
 def recorded(results: Results) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function in place of :meth:`Rows.fly` that repeats a finished search with its stored flights."""
-    found, first = badness(results.campaign, results.column, ~results.finished), 0
+    """Return a function in place of :meth:`Rows.evaluate` that repeats a finished search with its stored flights."""
+    found, first = recorded_badness(results), 0
 
     def fly(samples: np.ndarray) -> np.ndarray:
         nonlocal first
@@ -143,6 +144,11 @@ def recorded(results: Results) -> Callable[[np.ndarray], np.ndarray]:
         return found[first - len(samples) : first]
 
     return fly
+
+
+def recorded_badness(results: Results) -> np.ndarray:
+    """Return how bad the flights of a finished search are, shape (flights,), in their order."""
+    return badness(results.campaign, results.column, ~results.finished)
 
 
 def fly_given(text: str, batch: int) -> bytes:

@@ -17,13 +17,15 @@ import numpy as np
 
 from hsv.base.units import rounded
 from hsv.flight.campaign.campaign import Factor
+from hsv.flight.campaign.summary import Results
+from hsv.flight.search.rows import is_margin, recorded
 
 Point = tuple[float, ...]
 """A sample: one value per factor, in the factor's unit."""
 
-GRID, REFINED, REFINEMENTS = 16, 8, 3
+GRID, REFINED, REFINEMENTS = 64, 8, 2
 """Intervals of the grid over a factor's range; intervals of each refinement of the two around the worst point; number
-of refinements, after which a range of 150 s is resolved to 0.15 s"""
+of refinements, after which a range of 150 s is resolved to 0.15 s. A coarser grid misses peaks of a few seconds."""
 
 RESTARTS = 4
 """Largest number of restarts"""
@@ -53,6 +55,10 @@ class Worst:
     influences: dict[str, float]
     """By how much the worst flight is less bad if a factor alone moves to its other end, by factor, sorted"""
     flights: int
+
+    def broken(self, goal: str) -> bool:
+        """Whether the worst flight breaks a requirement, if the ``goal`` of the search is a margin."""
+        return is_margin(goal) and self.badness > 0.0
 
 
 class _BudgetSpentError(Exception):
@@ -91,13 +97,17 @@ class _Search:
 
     def climb(self, point: Point, lines: Sequence[int]) -> Point:
         """Return the point that flips and line searches reach from ``point``, which none of them makes worse."""
+        grid = {index: (high - low) / GRID for index in lines for low, high in [self.ends(index)]}
+        over = {index: (step, self.ends(index)) for index, step in grid.items()}
         while True:
             start = point
             point = self.flips(point)
             self.note("flips")
-            for index in lines:
-                point = self.line(point, index)
+            for index, (step, ends) in over.items():
+                point = self.line(point, index, step, ends)
             self.note("line searches")
+            # The next searches are only around the place that the whole grid gave.
+            over = {index: (2.0 * step / REFINED, self.around(point, index, step)) for index, step in grid.items()}
             if point == start or not lines:
                 return point
 
@@ -115,23 +125,27 @@ class _Search:
                 together = [m if m != p else t for m, p, t in zip(move, point, together, strict=True)]
             point = self.worst_of([*helpful, tuple(together)])
 
-    def line(self, point: Point, index: int) -> Point:
-        """Return the worst point along one factor: on a grid over its range, refined around the worst point."""
-        low, high = self.ends(index)
-        for intervals in (GRID, *[REFINED] * REFINEMENTS):
-            values = [low + (high - low) * k / intervals for k in range(intervals + 1)]
-            values = [math.floor(v) for v in values] if self.factors[index].whole else [rounded(v) for v in values]
-            point = self.worst_of([point, *(self.moved(point, index, float(value)) for value in values)])
-            step, (least, largest) = (high - low) / intervals, self.ends(index)
-            low, high = max(least, point[index] - step), min(largest, point[index] + step)
+    def line(self, point: Point, index: int, step: float, ends: tuple[float, float]) -> Point:
+        """Return the worst point along one factor: in steps between ``ends``, refined around the worst point."""
+        for _ in range(REFINEMENTS + 1):
+            low, high = ends
+            values = [low + step * k for k in range(round((high - low) / step) + 1)]
+            values = [float(np.floor(v)) if self.factors[index].whole else rounded(v) for v in values]
+            point = self.worst_of([point, *(self.moved(point, index, min(value, high)) for value in values)])
+            ends, step = self.around(point, index, step), 2.0 * step / REFINED
         return point
+
+    def around(self, point: Point, index: int, step: float) -> tuple[float, float]:
+        """Return the values of a factor one ``step`` below and above its value at ``point``, within its range."""
+        low, high = self.ends(index)
+        return max(low, point[index] - step), min(high, point[index] + step)
 
     def worst_of(self, points: Sequence[Point]) -> Point:
         """Return the worst of ``points``, the first one of several."""
         values = self.evaluate(points)
         return points[values.index(max(values))]
 
-    def ends(self, index: int) -> Point:
+    def ends(self, index: int) -> tuple[float, float]:
         """Return the least and the largest value of a factor."""
         return self.factors[index].low, self.factors[index].high
 
@@ -150,9 +164,7 @@ class _Search:
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
-def find_worst(
-    fly: Callable[[np.ndarray], np.ndarray], factors: Sequence[Factor], budget: int, seed: int = 1
-) -> Worst:
+def find_worst(fly: Callable[[np.ndarray], np.ndarray], factors: Sequence[Factor], budget: int, seed: int = 1) -> Worst:
     """Return the worst flight within the bounds of ``factors``.
 
     The search is deterministic: it depends on how bad the flights are, not on the order in which they are flown.
@@ -202,6 +214,12 @@ def find_worst(
         search.influences(worst),
         len(points),
     )
+
+
+def repeated(results: Results) -> Worst:
+    """Return the result of a finished search, which is repeated with the stored flights."""
+    campaign = results.campaign
+    return find_worst(recorded(results), campaign.factors, campaign.budget, campaign.seed)
 
 
 def least_budget(factors: Sequence[Factor]) -> int:

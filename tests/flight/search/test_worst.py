@@ -1,0 +1,174 @@
+"""The search for the worst flight: on functions whose largest value is known, and on flights."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hsv.base.errors import CampaignError
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.campaign.campaign import WORST, Factor, plan
+from hsv.flight.campaign.executors import Executor
+from hsv.flight.campaign.sample_runner import SampleRunner
+from hsv.flight.campaign.summary import Results
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import parse_scenario
+from hsv.flight.search.rows import Rows, badness, check_goal
+from hsv.flight.search.worst import find_worst, least_budget, repeated
+
+FACTORS = [Factor(name=f"p{i}", unit="1", low=-1.0, high=1.0 + i) for i in range(6)]
+ANY_TIME = {"fault[0].start": ("0.5 s", "150 s")}
+
+
+def search(name, goal, budget=64, **others):
+    """Return the campaign of a search."""
+    return replace(plan(name, samples=1, **others), method=WORST, goal=goal, budget=budget, samples=0)
+
+
+def in_memory(campaign):
+    """Return a function that flies samples and returns how bad the flights are."""
+    runner, flown = SampleRunner(campaign), itertools.count()
+
+    def evaluate(samples):
+        rows = [runner.outcome(f) for f in runner.fly_all([next(flown) for _ in samples], samples)]
+        lost = np.array([row["diverged"] or row["crashed"] is not None for row in rows])
+        return badness(campaign, lambda name: np.array([row.get(name, math.nan) for row in rows], float), lost)
+
+    return evaluate
+
+
+def found(campaign):
+    return find_worst(in_memory(campaign), campaign.factors, campaign.budget, campaign.seed)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_worst_corner_of_a_function_with_interactions_is_found(seed):
+    random = np.random.default_rng(seed)
+    single, pairs = random.normal(size=6), 0.2 * random.normal(size=(6, 6))
+
+    def evaluate(points):
+        return points @ single + np.einsum("ni,ij,nj->n", points, pairs, points)
+
+    corners = np.array(list(itertools.product(*((f.low, f.high) for f in FACTORS))))
+    worst = find_worst(evaluate, FACTORS, 200)
+    assert worst.badness >= evaluate(corners).max() - 1e-12
+    assert worst.flights <= 200 and worst.random <= worst.badness
+    assert sum(phase.flights for phase in worst.phases) == worst.flights
+
+
+def test_a_time_is_searched_between_its_ends_and_the_search_is_the_same_for_any_budget_that_suffices():
+    factors = [*FACTORS[:2], Factor(name="t", unit="s", low=0.0, high=150.0)]
+    known = []
+
+    def evaluate(points):
+        known.extend(map(tuple, points.tolist()))
+        return points[:, 0] + np.exp(-(((points[:, 2] - 2.5) / 4.0) ** 2))
+
+    worst = find_worst(evaluate, factors, 300)
+    assert known[worst.flight][2] == pytest.approx(2.5, abs=0.1) and known[worst.flight][0] == 1.0
+    assert next(iter(worst.influences)) == "p0" and len(set(known)) == len(known)
+    count, first = len(known), list(known)
+    known.clear()
+    assert find_worst(evaluate, factors, 300) == worst and known == first
+    known.clear()
+    assert find_worst(evaluate, factors, 40).flights == 40 and known == first[:40] and count <= 300
+
+
+def test_lost_flights_are_the_worst_and_undefined_metrics_the_least():
+    worst = find_worst(lambda p: np.where(p[:, 0] > 0.5, math.inf, p[:, 1]), FACTORS, 60)
+    assert worst.badness == math.inf and worst.influences == {}
+    assert find_worst(lambda p: np.full(len(p), -math.inf), FACTORS, 60).badness == -math.inf
+
+
+@pytest.mark.parametrize(
+    ("goal", "value"), [("post_fault_attitude_from_nominal", math.radians(0.47393)), ("tube_level", 0.38956)]
+)
+def test_64_flights_find_the_worst_of_the_1024_corners(goal, value):
+    worst = found(search("case1", goal))
+    assert worst.badness == pytest.approx(value, rel=1e-4) and worst.flights == 64
+    assert worst.random < worst.badness
+
+
+def test_the_time_of_the_fault_makes_the_worst_flight_worse():
+    worst = found(search("case1", "post_fault_attitude_from_nominal", 145, factors=ANY_TIME))
+    assert math.degrees(worst.badness) == pytest.approx(0.7278, abs=2e-4)
+    assert {*list(worst.influences)[:2]} == {"mass", "fault[0].start"}
+
+
+METRICS = (
+    "post_fault_attitude_from_nominal",
+    "tube_level",
+    "altitude_end_error",
+    "elevator_deflection_maximum",
+    "altitude_integral_absolute_error",
+)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "factors"),
+    [("case1", ANY_TIME), ("case2", ANY_TIME), ("winged_cone", {"fault[0].start": ("0.5 s", "150 s")})],
+)
+def test_no_random_flight_of_20000_is_worse(name, factors):
+    campaign = plan(name, samples=20_000, seed=11, factors=factors)
+    runner, numbers = SampleRunner(campaign), range(campaign.samples)
+    drawn, _ = campaign.draw(numbers)
+    rows = [runner.outcome(flown) for flown in runner.fly_all(numbers, drawn)]
+    for goal in METRICS:
+        values = np.abs([row[goal] for row in rows if not row["diverged"]])
+        worst = found(search(name, goal, 400, factors=ANY_TIME))
+        assert worst.badness >= values.max()
+        assert worst.badness >= values[: worst.flights].max()
+
+
+def test_a_goal_is_a_requirement_or_a_metric():
+    scenario = plan("case1", samples=1).scenario
+    assert check_goal("tube_level", scenario) == "tube_level"
+    with pytest.raises(CampaignError, match="has no requirement"):
+        check_goal("", scenario)
+    with pytest.raises(CampaignError, match="of = 'attitude': expected"):
+        check_goal("attitude", scenario)
+
+
+class Reversed(Executor):
+    """Flies batches in the opposite order, and none after the number ``left``."""
+
+    def __init__(self, left=10**9):
+        self.left = left
+
+    def fly(self, job, text, batches, label="batch {}".format):
+        for batch in reversed([*batches]):
+            if self.left == 0:
+                raise KeyboardInterrupt
+            self.left -= 1
+            yield batch, job(text, batch)
+
+
+def test_an_interrupted_search_resumes_to_the_same_bytes_and_its_worst_flight_flies_alone(tmp_path):
+    campaign = search("case1", "tube_level", 64, changes={"duration": "120 s"})
+
+    def run(out, executor):
+        rows = Rows(out, campaign, executor, lambda done: None)
+        rows.run(lambda evaluate: find_worst(evaluate, campaign.factors, campaign.budget, campaign.seed))
+        return rows
+
+    assert run(tmp_path / "whole.parquet", Executor()).flown_now == 64
+    with pytest.raises(KeyboardInterrupt):
+        run(tmp_path / "parts.parquet", Reversed(5))
+    assert run(tmp_path / "parts.parquet", Reversed()).flown_now < 64
+    assert (tmp_path / "whole.parquet").read_bytes() == (tmp_path / "parts.parquet").read_bytes()
+    assert run(tmp_path / "parts.parquet", Executor()).flown_now == 0
+    with pytest.raises(CampaignError, match="holds another campaign"):
+        Rows(tmp_path / "parts.parquet", replace(campaign, budget=65), Executor(), print).run(lambda evaluate: None)
+    results = Results(tmp_path / "whole.parquet")
+    worst = repeated(results)
+    assert worst == found(campaign) and worst.badness == results.row(worst.flight)["tube_level"]
+    alone = fly(assemble_flight(parse_scenario(results.file(worst.flight), "alone")))
+    assert alone.fingerprint == results.row(worst.flight)["fingerprint"]
+
+
+def test_the_least_budget_suffices_for_signs_corner_and_flips():
+    assert least_budget(FACTORS) == 20
+    assert find_worst(lambda p: p.sum(axis=1), FACTORS, 20).badness == sum(f.high for f in FACTORS)
