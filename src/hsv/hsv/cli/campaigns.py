@@ -36,7 +36,9 @@ SchedulerOption = Annotated[str, Option(help="Address of a Dask scheduler whose 
 ResultArgument = Annotated[Path, Argument(help="Result file of a campaign (.parquet).")]
 FlightOption = Annotated[int, Option("--flight", help="Number of the flight.")]
 ScaleOption = Annotated[float, Option(help="Factor on the parameters' bounds; 0 leaves them alone.")]
-FactorOption = Annotated[list[str] | None, Option(help="Vary a field, e.g. 'fault[0].start=90 s..110 s'; repeatable.")]
+FactorOption = Annotated[
+    list[str] | None, Option(help="Vary a field: 'FIELD=90 s..110 s', or a grid, FIELD=0.9,0.8,0.7.")
+]
 RestartOption = Annotated[bool, Option("--restart", help="Discard existing results.")]
 PageOption = Annotated[bool, Option(help="Write a page next to the results.")]
 
