@@ -65,10 +65,13 @@ def margins(
             results.corners[case] = found
             if found.count < len(at_ends.corners()):
                 break
+    interrupted = any(found.count < len(vehicles[case].corners()) for case, found in results.corners.items())
     first = next(iter(vehicles.values()))
-    if flown:
+    if flown and not interrupted:
         results.borders = flown_borders(values, design, first)
-    if worst and of_scenario:
+    if interrupted:
+        worst = None  # the worst of the corners that are done need not be the worst of all
+    if worst:
         corner = next(iter(results.corners.values())).corner
         with writing(worst, "worst"):
             worst.write_text(corner_file(scenario, first, corner), encoding="utf-8")
@@ -81,7 +84,7 @@ def margins(
     else:
         _print(results)
         output.say(*(f"written {path}" for path in (worst, out) if path))
-    if any(found.count < len(vehicles[case].corners()) for case, found in results.corners.items()):
+    if interrupted:
         raise output.Interrupted("interrupted; the corners are those that were done")
     if not all(border.agrees for border in results.borders):
         raise RunError("flown: a flight does not agree with the computed border")
@@ -91,7 +94,7 @@ def _subject(name: str, find: Any, load: Any) -> Any:
     try:
         return load(find(name))
     except HsvError as error:
-        if is_path(name) or "expected" not in str(error):
+        if is_path(name) or name.endswith(".yaml") or "expected" not in str(error):
             raise
         raise ParameterError(f"{str(error).partition(':')[0]}: expected a scenario or a design") from error
 

@@ -296,8 +296,9 @@ def margin_verdict(
         if design is None or np.any(design.tau < 1.0):
             raise ScenarioError(f"scenario {scenario.name!r}: no margins: no design with tau = 1")
         if all(is_proved(loop.broken("elevator"), m) for loop, m in zip(vertex_loops(design), stated, strict=True)):
-            words = f"disk margin {min(stated):.3f} (limit {scenario.disk_margin:g})"
-            return {"kept": min(stated) >= scenario.disk_margin, "words": words}
+            kept = min(stated) >= scenario.disk_margin
+            words = f"disk margin {min(stated):.3f}{'' if kept else ' violated'} (limit {scenario.disk_margin:g})"
+            return {"kept": kept, "words": words}
     return {"kept": None, "words": f"disk margin not judged: hsv margins {scenario.name}"}
 
 
@@ -344,8 +345,13 @@ def flown_borders(values: Mapping[str, Any], design: ControlDesign, loops: Vehic
     The margins are those of the same trim. The flights begin with a pitch-angle error of :data:`DEVIATION`; what grows
     is their difference from a flight without it. ``values`` are the flat parameters of the flight whose commands and
     faults are omitted. The gain is that of a design in memory with a scaled row of F.
+
+    Raises:
+        ScenarioError: The loop is unstable, so that it has no border.
     """
     loop, feedback, place = loops.loop("", "start"), loops.feedback, loops.places["start"]
+    if loop.growth >= 0.0:
+        raise ScenarioError("flown: the loop is unstable at the start, expected a stable one")
     margins = classical_margins(loop.broken("elevator"))
     found = []
     for kind, border in (("gain up", margins.gain_up), ("gain down", margins.gain_down)):
