@@ -19,7 +19,8 @@ from hsv.model.vehicle import VEHICLE_PARAMETERS
 _HEADER = """# Parameters of the nodes
 Made by `python3 tools/parameter_page.py` from the tables that the nodes declare. All values are in SI units. A value of
 the wrong type or outside its range ends the node before it joins the graph, with one line and exit code 2; floats need
-a decimal point (`-p duration:=200.0`). So does an unknown parameter, and the line names the most similar one; a file,
+a decimal point (`-p duration:=200.0`). So does an unknown parameter, and the line names the most similar one, unless a
+file gives it to all nodes (`/**`): then it is ignored with a warning. A file,
 unlike `-p`, may contain parameters of other nodes.
 Parameters cannot be changed once a node runs, unless the last column says otherwise.
 

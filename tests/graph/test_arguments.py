@@ -1,9 +1,11 @@
 """Errors on the command line of a node end it with a one-line message and exit code 2."""
 
+import sys
 from pathlib import Path
 
 import pytest
 from marking import long
+from waiting import wait_until
 
 pytestmark = pytest.mark.graph
 
@@ -14,6 +16,22 @@ FILES = {
 
 PLANT, TUBE_MPC = ("hsv_plant", "plant"), ("hsv_ctrl", "tube_mpc")
 RECORDER = ("hsv_bringup", "recorder")
+
+
+def test_an_unknown_parameter_for_all_nodes_is_ignored_with_one_warning(processes):
+    parameters, output = processes.folder / "all.yaml", processes.folder / "output"
+    parameters.write_text("/**:\n  ros__parameters:\n    use_sim: true\n    feedback.tua: [0.8]\n")
+    words = ("ros2", "run", *TUBE_MPC, "--ros-args", "--params-file", parameters)
+    tube = processes.start(*words, output=output.open("w"))
+    wait_until(lambda: tube.poll() is not None or "waiting for" in output.read_text(), [tube.pid])
+    [line] = [line for line in output.read_text().splitlines() if "ignored" in line]
+    assert "parameter use_sim: tube_mpc has none" in line and "parameter feedback.tua:" in line
+
+
+def test_a_clock_that_ros_stamps_cannot_hold_is_named(shared_processes):
+    program = "import sys, time; time.time = lambda: 2.0**31; from hsv_ctrl.tube_mpc import main; sys.exit(main())"
+    done = shared_processes.run(sys.executable, "-c", program)
+    assert done.returncode == 2 and ": expected a date before 2038-01-19" in done.stdout, done.stdout
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from itertools import pairwise
@@ -43,6 +44,9 @@ def run_node(
         others = remove_ros_args(words)[1:]
         if others and not own_arguments:
             raise ParameterError(f"argument {others[0]!r}: expected only those that follow --ros-args")
+        if time.time() >= 2**31:
+            date = time.strftime("%F")
+            raise ParameterError(f"clock = {date}: expected a date before 2038-01-19, which ROS stamps can hold")
         ros_domain()
         prefer_profiles()
         choose_log_folder()
@@ -54,6 +58,7 @@ def run_node(
     if not several:
         given = (value.partition(":=")[0] for flag, value in pairwise(words) if flag in ("-p", "--param"))
         ProcessNode.own_only = frozenset(given)
+    ProcessNode.parameter_files = tuple(value for flag, value in pairwise(words) if flag == "--params-file")
     # The handler only requests the end; the loop checks the request at least four times a second.
     stop: list[int] = []
     take_signals(lambda received, _frame: stop.append(received))

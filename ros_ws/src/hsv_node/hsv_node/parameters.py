@@ -7,6 +7,7 @@ import math
 import sys
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -107,7 +108,8 @@ def given(node: Node, name: str) -> bool:
 def refuse_unknown(node: ProcessNode, role: str) -> None:
     """Raise a ParameterError if ``node`` was given an unknown parameter.
 
-    A parameter given in a file may be that of another node or of a custom controller.
+    A parameter given in a file may be that of another node or of a custom controller. One that a file gives to all
+    nodes (``/**``) is ignored with a warning, as in ROS 2.
 
     Args:
         node: A new node, which has not declared its parameters yet.
@@ -126,6 +128,7 @@ def refuse_unknown(node: ProcessNode, role: str) -> None:
     # Only its class knows the parameters of a custom controller.
     known = controller in ("", *CONTROLLERS)
     own = {*node.get_parameters_by_prefix(""), *(p.name for p in LOCKSTEP_PARAMETERS if role), *tables.get(role, ())}
+    ignored: list[str] = []
     for name in node._parameter_overrides:
         owner = next((other for other, names in tables.items() if name in names), "")
         if name in own or (name not in node.own_only and (owner or not known)):
@@ -133,7 +136,21 @@ def refuse_unknown(node: ProcessNode, role: str) -> None:
         admitted = own if name in node.own_only else own.union(*tables.values())
         [nearest] = difflib.get_close_matches(name, admitted, 1, 0.0)
         of = f", {owner} has" if owner else ""
-        raise ParameterError(f"parameter {name}: {node.get_name()} has none of this name{of}; nearest is {nearest}")
+        words = f"parameter {name}: {node.get_name()} has none of this name{of}; nearest is {nearest}"
+        if name in node.own_only or not _for_all_nodes(node, name):
+            raise ParameterError(words)
+        ignored.append(words)
+    if ignored:
+        node.get_logger().warning(f"ignored: {'; '.join(ignored)}")
+
+
+def _for_all_nodes(node: ProcessNode, name: str) -> bool:
+    """Return whether a parameter file of the process gives the parameter ``name`` in a section with wildcards."""
+    from hsv.base.files import read_text
+    from hsv.control.design_file import parse_sections
+
+    files = [parse_sections(read_text(Path(file)), file) for file in node.parameter_files]
+    return any("*" in section and name in flat for sections in files for section, flat in sections.items())
 
 
 def _descriptor(parameter: Parameter, kind: RosParameter.Type | None = None) -> ParameterDescriptor:

@@ -25,6 +25,8 @@ class ProcessNode(Node):
 
     own_only: ClassVar[frozenset[str]] = frozenset()
     """Names of the parameters given with ``-p`` to a process of one node, which must be parameters of that node."""
+    parameter_files: ClassVar[tuple[str, ...]] = ()
+    """The parameter files given to the process."""
 
     def __init__(self, name: str, namespace: str | None = None, **options: Any) -> None:
         """Create the node with further ``options`` of rclpy."""
