@@ -1,8 +1,9 @@
 """The data of a flight that the live page receives."""
 
 import numpy as np
+from recorded_flight import record_flight
 
-from hsv.bags.description import TUBE_STATUS
+from hsv.bags.description import TOPICS, TUBE_STATUS
 from hsv.pages.flights import flight_curves
 from hsv.pages.live import hub as hub_module
 from hsv.pages.panels import LIVE_CURVES
@@ -48,6 +49,30 @@ def test_faults_come_and_the_end_is_told(hub, messages):
     assert (event["time"], event["words"]) == (2.0, f"{fault['words']} begins")
     hub.end(1, 200)
     assert hub.status()["ending"] == {"how": "finished", "time": 4.0}
+
+
+def test_a_replaced_fault_is_one_event_and_every_fault_that_acted_is_shaded(hub, decode, tmp_path):
+    flown = record_flight(
+        tmp_path / "replaced",
+        duration=4.0,
+        fault=2.0,
+        fault__channels=["elevator_deflection"] * 2,
+        fault__types=["loss_of_effectiveness"] * 2,
+        fault__parameters=["effectiveness=0.9", "effectiveness=0.8"],
+        fault__starts=[1.0, 2.0],
+        fault__stops=[2.0, 3.0],
+    )
+    by_step = {}
+    for topic in TOPICS:
+        for time, data in flown.messages(topic):
+            by_step.setdefault(time, []).append((topic, time, data))
+    offer(hub, [message for time in sorted(by_step) for message in by_step[time]])
+    kind = "elevator_deflection", "loss_of_effectiveness"
+    shades = [(shade["channel"], shade["type"], shade["from"], shade["to"]) for shade in hub.status()["shades"]]
+    assert shades == [(*kind, 50, 100), (*kind, 100, 150)]
+    first, second = (f"loss_of_effectiveness {share} of elevator_deflection" for share in (0.9, 0.8))
+    events = [(event["step"], event["words"]) for event in hub.status()["events"]]
+    assert events == [(50, f"{first} begins"), (100, f"{second} replaces {first}"), (150, f"{second} has ended")]
 
 
 def test_a_long_flight_is_thinned_and_keeps_its_beginning(hub, messages, monkeypatch):

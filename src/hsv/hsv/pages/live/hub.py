@@ -23,7 +23,7 @@ _KEPT = 16
 """Number of messages kept per topic, enough to find the newest complete step."""
 
 _EVENTS = 200
-"""Maximum number of events."""
+"""Maximum number of events, and of shaded intervals with a fault."""
 
 
 class Hub:
@@ -50,7 +50,7 @@ class Hub:
         self._count = 0
         self._sampled = -1
         self._period = 0.0
-        self._status |= {"faults": [], "diagnostics": {}, "events": [], "ending": None, "tau": None}
+        self._status |= {"faults": [], "shades": [], "diagnostics": {}, "events": [], "ending": None, "tau": None}
         self._status |= {"tube_status": None, "nominal_status": 0}
 
     def start_run(self, run_id: str, period: float, last_step: int) -> None:
@@ -140,13 +140,26 @@ class Hub:
             {"words": str(fault_in(fault)), "channel": fault.channel, "type": fault.type, "since": int(since)}
             for fault, since in zip(actuator.active, actuator.since, strict=True)
         ]
-        # Every start and end of a fault, scheduled or injected, is an event.
-        before = self._status["faults"]
-        for fault in (fault for fault in faults if fault not in before):
-            self._note(f"{fault['words']} begins", fault["since"], True)
-        for fault in (fault for fault in before if fault not in faults):
-            self._note(f"{fault['words']} has ended", int(messages[STATE].step), False)
-        status = {"faults": faults, "nominal_status": messages[NOMINAL].status}
+        # Every start and end of a fault, scheduled or injected, is an event; a replacement is one event.
+        before, step = self._status["faults"], int(messages[STATE].step)
+        begun = {(fault["channel"], fault["type"]): fault for fault in faults if fault not in before}
+        ended = {(fault["channel"], fault["type"]): fault for fault in before if fault not in faults}
+        for kind, fault in begun.items():
+            words = f"replaces {ended[kind]['words']}" if kind in ended else "begins"
+            self._note(f"{fault['words']} {words}", fault["since"], True)
+        for kind, fault in ended.items():
+            if kind not in begun:
+                self._note(f"{fault['words']} has ended", step, False)
+        shades = [dict(shade) for shade in self._status["shades"]]
+        for shade in shades:
+            kind = shade["channel"], shade["type"]
+            if shade["to"] is None and kind in ended:
+                shade["to"] = begun[kind]["since"] if kind in begun else step
+        shades += (
+            {"channel": channel, "type": type, "from": begun[channel, type]["since"], "to": None}
+            for channel, type in begun
+        )
+        status = {"faults": faults, "shades": shades[-_EVENTS:], "nominal_status": messages[NOMINAL].status}
         if TUBE_STATUS in messages:
             tube = messages[TUBE_STATUS]
             status |= {"tau": [round(float(value), 12) for value in tube.tau], "tube_status": tube.status}

@@ -14,13 +14,18 @@ from hsv.pages.panels import GROUPS, LIVE_CURVES
 from hsv.pages.side_view import geometry
 
 
+BESIDE = ("altitude", "elevator_deflection", "level")
+"""Panels next to the vehicle, which a screen shows without scrolling."""
+
+
 def live_page(hub: Hub, port: int) -> str:
     """Return the HTML page for the flight of ``hub``, served on ``port``."""
     plots = []
     for panel, numbered in groupby(enumerate(LIVE_CURVES, 1), lambda numbered: numbered[1][0]):
         # The page's script keeps the rows of the flight as arrays: array 0 is the time, the curves follow.
         curves = [{"kind": c.kind, "label": c.label, "run": 0, "x": 0, "y": number} for number, (_, c) in numbered]
-        plots.append(Plot(panel.name, panel.title, panel.unit, panel.group, curves))
+        group = "now" if panel.name in BESIDE else panel.group
+        plots.append(Plot(panel.name, panel.title, panel.unit, group, curves))
     groups = {key: heading for key, heading in GROUPS.items() if any(plot.group == key for plot in plots)}
     return render(
         "live.html.j2",
@@ -43,7 +48,7 @@ def _kinds() -> dict[str, dict[str, Any]]:
             parameters = [
                 {
                     "name": p.name,
-                    "range": f"{p.of(channel).minimum:.4g} to {p.of(channel).maximum:.4g} {p.of(channel).unit}".strip(),
+                    "range": f"{p.of(channel).minimum:.6g} to {p.of(channel).maximum:.6g} {p.of(channel).unit}".strip(),
                     "due": p.default is None,
                 }
                 for p in kind.parameters

@@ -7,13 +7,16 @@ const ROWS = 1024; // initial capacity of the arrays, rows
 /* Return an identifier in words. */
 const words = (name) => name.replaceAll("_", " ");
 
+/* Return a number in a text with four digits, whole numbers and other texts unchanged. */
+const rounded = (text) => (/^-?\d*\.\d+(e[-+]?\d+)?$/.test(text) ? String(Number(Number(text).toPrecision(4)) + 0) : text);
+
 class Flight {
   constructor(charts, toolbar) {
     Object.assign(this, { charts, toolbar, status: null, over: false, dirty: false });
     this.width = 1 + charts.panels.reduce((sum, panel) => sum + panel.curves.length, 0);
     this.form = document.getElementById("controls").elements;
     this.token = toolbar.form.elements.token.value;
-    this.shades = new Map(); // shaded intervals of faults, by first step and text
+    this.shades = []; // shaded intervals of faults
     this.waiting = new Map(); // functions that take the answers to pending requests, by request number
     this.number = 0;
     this.forget();
@@ -104,12 +107,11 @@ class Flight {
   }
 
   tell(status) {
-    if (this.status?.run?.id !== status.run?.id) this.shades.clear();
     this.status = status;
     for (const panel of this.charts.panels) panel.limits = status.limits[panel.name] || (panel.name === "level" ? [1] : []);
     this.shade();
     this.fill("diagnostics", Object.entries(status.diagnostics).map(([node, said]) => [
-      node, { text: said.words, bad: said.level > 0 }, Object.entries(said.values).map((pair) => pair.join(" ")).join(", "),
+      words(node), { text: said.words, bad: said.level > 0 }, Object.entries(said.values).filter((pair) => pair[1] !== "").map(([name, value]) => `${words(name)} ${rounded(value)}`).join(", "),
     ]));
     this.fill("events", [...status.events].reverse().map((event) => [event.time.toFixed(2), String(event.step), { text: words(event.words), bad: event.warning }]));
     const faults = document.getElementById("faults");
@@ -121,14 +123,11 @@ class Flight {
 
   /* Shade active faults up to now, and others up to their end. */
   shade() {
-    const period = this.status.run?.period || 0, key = (fault) => `${fault.since} ${fault.words}`;
-    const acting = new Set(this.status.faults.map(key));
-    for (const fault of this.status.faults.filter((each) => !this.shades.has(key(each)))) {
-      const text = words(`${fault.channel}: ${fault.type}`);
-      this.shades.set(key(fault), { kind: "fault", from: fault.since * period, to: Infinity, runs: [0], channel: fault.channel, text });
-    }
-    for (const [name, shade] of this.shades) if (!acting.has(name)) shade.to = Math.min(shade.to, Math.max(shade.from, this.now));
-    this.charts.runs[0].faults = [...this.shades.values()];
+    const period = this.status.run?.period || 0;
+    this.shades = this.status.shades.map(({ channel, type, from, to }) => ({
+      kind: "fault", from: from * period, to: to === null ? Infinity : to * period, runs: [0], channel, text: words(`${channel}: ${type}`),
+    }));
+    this.charts.runs[0].faults = this.shades;
   }
 
   tellState() {
@@ -141,6 +140,9 @@ class Flight {
     const state = document.getElementById("state");
     state.textContent = said.join(" · ");
     state.classList.toggle("bad", Boolean(ending && ending.how !== "finished"));
+    const repeat = document.getElementById("repeat");
+    repeat.hidden = !(ending && bag);
+    repeat.firstChild.textContent = `hsv info ${/^[\w./-]+$/.test(bag) ? bag : `'${bag.replaceAll("'", "'\\''")}'`}`;
   }
 
   /* Enable the controls if a flight is in progress and the address has the token. */
@@ -173,7 +175,7 @@ class Flight {
   draw() {
     if (!this.dirty) return;
     this.dirty = false;
-    const { charts } = this, shades = [...this.shades.values()].map((shade) => ({ ...shade, to: Math.min(shade.to, this.now) }));
+    const { charts } = this, shades = this.shades.map((shade) => ({ ...shade, to: Math.min(shade.to, this.now) }));
     for (const panel of charts.panels) {
       panel.shades = shades;
       // Hide plots without data: a custom controller has no tube, and a design may have no invariant set.

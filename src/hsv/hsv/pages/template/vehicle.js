@@ -9,7 +9,7 @@ const ACTUAL = ["effector", "actuator", "actual"];
 /* Frames per second for users who prefer reduced motion. */
 const CALM_RATE = 2;
 
-const fixed = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits).replace("-", "\u2212") : "–");
+const fixed = (value, digits) => (Number.isFinite(value) ? value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "\u2212") : "–");
 const degrees = (angle) => `${fixed(angle / DEGREE, 2)}°`;
 const outline = (points) => `M${points.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`).join("L")}Z`;
 
@@ -103,7 +103,7 @@ class SideView {
 class Vehicle {
   constructor(charts, toolbar, slider) {
     Object.assign(this, { charts, time: 0, views: [] });
-    for (const figure of document.querySelectorAll("#vehicle figure")) {
+    for (const figure of document.querySelectorAll("#vehicle figure:has(.side-view)")) {
       const run = Number(figure.dataset.run), view = new SideView(figure.querySelector(".side-view"), charts.airframe);
       this.views.push({ view, run, own: this.series(run, ACTUAL), nominal: this.series(run, ["nominal"]), at: figure.querySelector(".at") });
     }
