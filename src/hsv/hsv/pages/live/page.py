@@ -13,7 +13,6 @@ from hsv.pages.live.hub import Hub
 from hsv.pages.panels import GROUPS, LIVE_CURVES
 from hsv.pages.side_view import geometry
 
-
 BESIDE = ("altitude", "elevator_deflection", "level")
 """Panels next to the vehicle, which a screen shows without scrolling."""
 
