@@ -60,9 +60,9 @@ def test_a_corner_is_a_scenario():
 
 def test_a_required_disk_margin_is_judged_by_the_certificate():
     design, scenario = read_design(find_design("robust")), load_scenario("case1_robust")
-    assert margin_verdict(scenario, design) == {"kept": True, "words": "disk margin 0.900 (limit 0.85)"}
+    assert margin_verdict(scenario, design) == {"kept": True, "words": "disk margin at the vertices 0.900 (limit 0.85)"}
     missed = margin_verdict(load_scenario("case1_robust", {"limits.disk_margin": 0.95}), design)
-    assert missed == {"kept": False, "words": "disk margin 0.900 violated (limit 0.95)"}
+    assert missed == {"kept": False, "words": "disk margin at the vertices 0.900 violated (limit 0.95)"}
     assert margin_verdict(load_scenario("case1"), design) is None
     unknown = {"kept": None, "words": "disk margin not judged: hsv margins case1_robust"}
     other = read_certificate(find_certificate("tight"))  # margins above those of this design, and a block without any

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from hsv.cli.bench import Figure
 
 
-_FLOWN = {"room, fuel": "1", "room, elevator": "rad", "largest level": "1"}
-"""Least distance of the nominal inputs from the bounds of U minus F Z, and largest tube level of a design's flights."""
+_FLOWN = {"room, fuel": "1", "room, elevator": "rad", "largest level": "1", "disk margin": "1"}
+"""Least distance of the nominal inputs from the bounds of U minus F Z, largest tube level of the flights of a design,
+and disk margin of its elevator loop at the worst vertex."""
 
 
 class Kind(StrEnum):
@@ -102,11 +103,12 @@ def _list_designs(name: str, units: UnitSystem, json: bool) -> None:
     _known(Kind.designs, name, dict.fromkeys(names))
     sets, flown = [], []
     for known in [name] if name else names:
-        tube = read_certificate(certificate_path(find_design(known)))["tube"]
+        certificate = read_certificate(certificate_path(find_design(known)))
+        tube, margin = certificate["tube"], min(certificate["margins"]["vertices"]["elevator"]["margin"])
         plan = tube["tightening"]["plan"]
         sets.append((known, [*tube["invariant_set"]["half_width"][:5], *tube["invariant_set"]["feedback_half_range"]]))
         room = map(min, plan["margin_to_lower"], plan["margin_to_upper"])
-        flown.append((known, [*room, tube["flights"]["worst_level"]]))
+        flown.append((known, [*room, tube["flights"]["worst_level"], margin]))
     if json:
         units_of = {key.replace(", ", "_").replace(" ", "_"): unit for key, unit in (HALF_WIDTHS | _FLOWN).items()}
         stated = {}
@@ -116,7 +118,7 @@ def _list_designs(name: str, units: UnitSystem, json: bool) -> None:
         output.print_json(stated)
         return
     output.console.print(output.quantity_table("Half-widths of the invariant sets, given W", HALF_WIDTHS, sets, units))
-    output.console.print(output.quantity_table("Room of the plan, and flights", _FLOWN, flown, units))
+    output.console.print(output.quantity_table("Room of the plan, flights, and elevator loop", _FLOWN, flown, units))
 
 
 def _list_controllers(name: str, json: bool) -> None:

@@ -80,7 +80,8 @@ class MarginResults:
                 "gain dB": f"{20.0 * np.log10(each.disk.gain):.2f}",
                 "phase deg": f"{np.degrees(each.disk.phase):.1f}",
                 "at rad/s": f"{each.disk.frequency:.4g}",
-                "worst at": each.where + (f", reached: {each.disk.attained:.3f}" if each.name == "both" else ""),
+                "worst at": each.where
+                + (f", reached: {each.disk.attained:.3f}" if each.name == "both" and each.disk.margin else ""),
             }
             for each in self.loops[title]
         ]
@@ -108,14 +109,32 @@ class MarginResults:
         return rows
 
     def as_dict(self) -> dict[str, Any]:
-        """Return all numbers for JSON: SI, factors of the gain, no margin as null."""
+        """Return all numbers for JSON, units in the keys: SI, factors of the gain, no margin as null."""
         return {
             "name": self.name,
             "design": self.design.name,
-            "loops": {title: [asdict(each) for each in found] for title, found in self.loops.items()},
-            "corners": {case: asdict(worst) for case, worst in self.corners.items()},
-            "flown": [asdict(border) | {"agrees": border.agrees} for border in self.borders],
+            "loops": {title: [_loop_dict(each) for each in found] for title, found in self.loops.items()},
+            "corners": {case: _with_units(asdict(worst)) for case, worst in self.corners.items()},
+            "flown": [_with_units(asdict(border)) | {"agrees": border.agrees} for border in self.borders],
         }
+
+
+_JSON_UNITS = {
+    **dict.fromkeys(("frequency", "flown_frequency", "gain_crossover", "phase_crossover"), "rad_per_s"),
+    **dict.fromkeys(("growth", "flown_growth"), "1_per_s"),
+    "phase": "rad",
+    "delay": "s",
+}
+
+
+def _with_units(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {f"{name}_{_JSON_UNITS[name]}" if name in _JSON_UNITS else name: value for name, value in values.items()}
+
+
+def _loop_dict(each: LoopMargins) -> dict[str, Any]:
+    disk = asdict(each.disk) | {"gain": each.disk.gain, "phase": each.disk.phase}
+    classical = _with_units(asdict(each.classical)) if each.classical else None
+    return asdict(each) | {"disk": _with_units(disk), "classical": classical}
 
 
 VERTICES = "vertices"
@@ -297,7 +316,7 @@ def margin_verdict(
             raise ScenarioError(f"scenario {scenario.name!r}: no margins: no design with tau = 1")
         if all(is_proved(loop.broken("elevator"), m) for loop, m in zip(vertex_loops(design), stated, strict=True)):
             kept = min(stated) >= scenario.disk_margin
-            words = f"disk margin {min(stated):.3f}{'' if kept else ' violated'} (limit {scenario.disk_margin:g})"
+            words = f"disk margin at the vertices {min(stated):.3f}{'' if kept else ' violated'} (limit {scenario.disk_margin:g})"
             return {"kept": kept, "words": words}
     return {"kept": None, "words": f"disk margin not judged: hsv margins {scenario.name}"}
 
