@@ -70,7 +70,7 @@ def test_the_verdict_has_its_numbers_in_the_units_shown(quiet):
 
 def test_a_required_disk_margin_is_judged_by_the_attached_certificate(quiet, tmp_path):
     scenario = tmp_path / "required.toml"
-    for required, words_of_it, mark in ((0.6, "Disk margin 0.640 (limit 0.6)", "✓"), (0.7, "(limit 0.7)", "✗")):
+    for required, words_of_it, mark in ((0.6, "at the vertices 0.640 (limit 0.6)", "✓"), (0.7, "(limit 0.7)", "✗")):
         scenario.write_text(f'extends = "case1"\nlimits = {{ disk_margin = {required} }}\n')
         bag = Bag(quiet.path)
         supply(bag, None, str(scenario))

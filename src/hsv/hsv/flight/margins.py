@@ -316,7 +316,8 @@ def margin_verdict(
             raise ScenarioError(f"scenario {scenario.name!r}: no margins: no design with tau = 1")
         if all(is_proved(loop.broken("elevator"), m) for loop, m in zip(vertex_loops(design), stated, strict=True)):
             kept = min(stated) >= scenario.disk_margin
-            words = f"disk margin at the vertices {min(stated):.3f}{'' if kept else ' violated'} (limit {scenario.disk_margin:g})"
+            verdict = "" if kept else " violated"
+            words = f"disk margin at the vertices {min(stated):.3f}{verdict} (limit {scenario.disk_margin:g})"
             return {"kept": kept, "words": words}
     return {"kept": None, "words": f"disk margin not judged: hsv margins {scenario.name}"}
 
