@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from hsv.flight.campaign.summary import (
     Share,
     distributions,
     limits,
+    points,
     required,
     shares,
     within_all,
@@ -31,8 +33,10 @@ from hsv.flight.flight import Flight
 from hsv.flight.limits import missed
 from hsv.flight.metrics import Group, is_share, metric_of, spaced
 from hsv.model.plant import Plant
+from hsv.pages.campaign_plots import SURVIVAL, campaign_figure
 from hsv.pages.engine import Numbers, Plot, render, write_page
 from hsv.pages.picture import Picture, picture
+from hsv.pages.plots import Layout, inline_svg
 from hsv.pages.search import search_section
 from hsv.pages.text import capitalised, quantity, units_of
 
@@ -82,6 +86,8 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
     failed = most_failed(judged)
     envelopes = _envelopes(results, flights, numbers)
     pictured = [plot for name in PICTURED for plot in envelopes if plot.name == f"envelope_{name}"]
+    factors = sorted(results.campaign.factors, key=lambda factor: (not factor.values, factor.is_perturbation))
+    survival = partial(campaign_figure, {results.path.stem: results}, panels=[SURVIVAL], layout=Layout(size=(7.0, 2.5)))
     starts = [fault.start for fault in results.campaign.scenario.fault]
     shades = [(start, end) for start in starts if start < end]
     search = search_section(results, numbers) if results.campaign.method == WORST else None
@@ -91,7 +97,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
         plots=[
             *envelopes,
             *(_histogram(results, d, numbers) for found in grouped.values() for d in found),
-            *(_scatter(results, factor, drawn, numbers) for factor in results.campaign.factors if differing),
+            *(_scatter(results, factor, drawn, numbers) for factor in factors if differing),
         ],
         described={
             "runs": [{"label": label, "end": end} for label in flights],
@@ -111,6 +117,11 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
         sections={name: heading for name, heading in SECTIONS.items() if name not in absent},
         search=search,
         sentence=sentence(results),
+        factors=factors,
+        points=points(results),
+        survival={system: inline_svg(partial(survival, system)) for system in UnitSystem}
+        if len(results.campaign.grid) == 1
+        else {},
         failed=failed and spaced(failed.name),
         lost=lost,
         old=results.format == 1,
