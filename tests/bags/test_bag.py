@@ -1,5 +1,7 @@
 """Written bags are read back, by our reader and by those of other tools."""
 
+from pathlib import Path
+
 import pytest
 import yaml
 from full_disk import files_no_larger_than
@@ -198,3 +200,11 @@ def test_two_channels_of_a_topic_are_one(kit, tmp_path):
     assert bag.times("/hsv/other").tolist() == bag.columns("/hsv/other")["step"].tolist() == list(range(10))
     with pytest.raises(RecordingError, match="/hsv/other: recorded with two definitions"):
         Bag(_two_channels(tmp_path / "mixed.mcap", kit, (state, forces)))
+
+
+def test_a_topic_is_a_table_with_units():
+    bag = Bag(Path(__file__).parents[2] / "bags" / "reference" / "case1")
+    frame = bag.to_frame("hsv/state")
+    assert frame.index.name == "time" and len(frame) == len(bag.times("hsv/state"))
+    assert frame["altitude"].tolist() == bag.columns("hsv/state")["altitude"].tolist()
+    assert frame.attrs["units"].keys() == {"time", *frame.columns} and frame.attrs["units"]["altitude"] == "m"

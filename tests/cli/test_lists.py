@@ -69,6 +69,23 @@ def test_a_fault_at_either_end_of_the_ranges_that_are_printed_can_be_injected(hs
             assert injector.parameters()["fault.types"] == [kind]
 
 
+def test_the_bags_of_a_folder_are_a_table(hsv, tmp_path):
+    reference = ROOT / "bags" / "reference"
+    words = ("list", "bags", str(reference), "--metric", "altitude_end_error", "--csv", "bags.csv")
+    shown = hsv(*words).out
+    assert "v1:511c80d1" in shown and "altitude end error" in shown
+    rows = {row["bag"]: row for row in hsv(*words, "--json").json["bags"]}
+    assert rows["case1"]["scenario"] == "case1" and rows["case1"]["altitude_end_error"] == pytest.approx(
+        2.684, abs=1e-3
+    )
+    assert rows["case1"]["fingerprint"] in (tmp_path / "bags.csv").read_text()
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "broken.mcap").write_bytes(b"none")
+    [row] = hsv("list", "bags", str(tmp_path), "--json").json["bags"]
+    assert "broken" in row["verdict"] and row["time_s"] is None
+    assert hsv("list", "bags", "nowhere").error == "folder = 'nowhere': expected a folder with bags"
+
+
 @pytest.mark.parametrize("name", SETS)
 def test_a_scenario_may_name_the_set_in_the_table_that_is_printed(hsv, name):
     described = hsv("list", "equipment", name, "--json").json

@@ -191,6 +191,19 @@ def test_what_a_healthy_flight_lacks_does_not_apply_and_breaks_no_limit():
     assert not lost["elastic_decay_time"].words.startswith("does not apply")
 
 
+def test_the_table_says_what_each_metric_needs():
+    steps = {"altitude": lambda t: 9.0 * np.exp(-t), "velocity": lambda t: 9.0 * np.exp(-t)}
+    elastic = {"rate_1": lambda t: np.exp(-t), "rate_2": lambda t: np.exp(-t)}
+    for given, lacking in (
+        ({"fault": 50.0, **steps, **elastic}, ()),
+        ({"fault": 50.0, **elastic}, ("step of altitude", "step of velocity")),
+        ({"fault": 50.0, **steps}, ("fault, and an elastic vehicle",)),
+        ({**steps, **elastic}, ("fault", "fault, and a step before it", "fault, and an elastic vehicle")),
+    ):
+        assert flight(**given).missing.keys() == {name for name, m in METRICS.items() if m.needs in lacking}
+    assert all(metric.formula for metric in METRICS.values())
+
+
 def test_a_time_that_was_not_reached_has_no_number_and_breaks_its_limit():
     ringing = flight(fault=50.0, altitude=lambda t: 100.0 + 0 * t, rate_1=lambda t: np.cos(15.0 * t))
     for name, why in (("altitude_rise_time", "not within 50 s"), ("elastic_decay_time", "not within 50 s")):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from heapq import merge
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
@@ -26,6 +26,9 @@ from hsv.bags.roles import TYPES, namespace_of, roles
 from hsv.bags.scan import Scan
 from hsv.bags.units import Units, units_of
 from hsv.base.errors import RecordingError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 _OURS = "/hsv/"
 """Part of the full name of this project's topics in any namespace, unless they are remapped."""
@@ -141,6 +144,24 @@ class Bag:
         if name not in self._columns:
             self._columns[name] = self.track(topic).columns()
         return self._columns[name]
+
+    def to_frame(self, topic: str) -> DataFrame:
+        """Return the messages of a topic as a pandas table; the index is the simulated time (s).
+
+        There is a column for each number, such as ``altitude`` or ``values[0]``. ``attrs["units"]`` has their units as
+        recorded. Nothing that the bag contains is run.
+        """
+        from pandas import DataFrame, Index
+
+        columns, units, recorded = {}, {}, self.units(topic)
+        for name, values in self.columns(topic).items():
+            rows = values.T if values.ndim > 1 else [values]
+            for index, row in enumerate(rows):
+                key = f"{name}[{index}]" if values.ndim > 1 else name
+                columns[key], units[key] = row, recorded[name].of(index)
+        frame = DataFrame(columns, index=Index(self.times(topic) * 1e-9, name="time"))
+        frame.attrs["units"] = {"time": "s", **units}
+        return frame
 
     def units(self, topic: str) -> dict[str, Units]:
         """Return the units of the fields of a topic, by field path as in :meth:`columns`."""

@@ -35,19 +35,22 @@ class Kind(StrEnum):
     equipment = "equipment"
     controllers = "controllers"
     designs = "designs"
+    bags = "bags"
 
 
 def list_(
     kind: Annotated[Kind, Argument(help="What to list.", metavar="|".join(Kind))],
-    name: Annotated[str, Argument(help="Print this one; scenarios and vehicles may be files.")] = "",
+    name: Annotated[str, Argument(help="Print this one; a file, or of bags their folder.")] = "",
+    metric: Annotated[list[str] | None, Option(help="Of bags: a metric to list, repeatable.")] = None,
+    csv: Annotated[Path | None, Option(help="Of bags: write the table, in SI, to this file.")] = None,
     units: UnitsOption = UnitSystem.metric,
     json: ListJsonOption = False,
 ) -> None:
-    """List scenarios, vehicles, types of faults, published actuators and sensors, controllers, designs; or print one.
+    """List scenarios, vehicles, faults, equipment, controllers, designs, the bags of a folder; or print one.
 
     A scenario or vehicle is printed with everything that it inherits from the one it extends, a fault with the units,
     ranges and defaults of its parameters, equipment with its numbers and source. Designs are listed with what their
-    certificates state.
+    certificates state, bags with scenario, time, verdict, fingerprint and the metrics that you name.
 
     Example: hsv list scenarios case2_derived
     """
@@ -60,6 +63,10 @@ def list_(
         _list_faults(name, system, json)
     elif kind is Kind.equipment:
         _list_equipment(name, system, json)
+    elif kind is Kind.bags:
+        from hsv.cli.bag_list import list_bags
+
+        list_bags(Path(name or "bags"), metric or (), csv, units, json)
     elif kind is Kind.designs:
         _list_designs(name, system, json)
     else:

@@ -47,6 +47,10 @@ class Metric:
     unit: str
     meaning: str
     group: Group
+    formula: str = ""
+    """The definition in the symbols of docs/metrics.md, where the table is printed"""
+    needs: str = ""
+    """What a flight must have for the metric to apply; empty: it applies to every flight"""
     share: bool = False
     """Whether the metric is a share, displayed in percent"""
     counted: bool = False
@@ -63,15 +67,22 @@ def _tracking(axis: str, symbol: str, unit: str, integral: str) -> dict[str, Met
     error = f"{symbol} - {symbol}_r"
     settled = f"last time before the fault that {axis} is more than 2 % of the step off"
     over = f"largest excess over the {axis} step before the fault, share of the step"
+    step = f"step of {axis}"
     return {
-        f"{axis}_rise_time": Metric("s", f"10 % to 90 % of the {axis} step", Group.tracking),
-        f"{axis}_settling_time": Metric("s", settled, Group.tracking),
-        f"{axis}_overshoot": Metric("1", over, Group.tracking, share=True),
-        f"{axis}_integral_absolute_error": Metric(integral, f"integral of |{error}|", Group.tracking),
-        f"{axis}_error_maximum": Metric(unit, f"largest |{error}|", Group.tracking),
-        f"{axis}_end_error": Metric(unit, f"{error} at the end", Group.tracking, signed=True),
+        f"{axis}_rise_time": Metric(
+            "s", f"10 % to 90 % of the {axis} step", Group.tracking, "t(0.9) - t(0.1), t(s): first t with r >= s", step
+        ),
+        f"{axis}_settling_time": Metric("s", settled, Group.tracking, "first t from which |r - 1| <= 0.02", step),
+        f"{axis}_overshoot": Metric("1", over, Group.tracking, "max(0, max r - 1)", step, share=True),
+        f"{axis}_integral_absolute_error": Metric(
+            integral, f"integral of |{error}|", Group.tracking, "integral of |e| dt, trapezoidal"
+        ),
+        f"{axis}_error_maximum": Metric(unit, f"largest |{error}|", Group.tracking, "max |e|"),
+        f"{axis}_end_error": Metric(unit, f"{error} at the end", Group.tracking, "e at the last step", signed=True),
     }
 
+
+_DECAY, _ELASTIC = "first s with |rate {}| <= 0.05 of its maximum for t > t_f + s", "fault, and an elastic vehicle"
 
 METRICS = {
     **_tracking("altitude", "h", "m", "m s"),
@@ -80,27 +91,44 @@ METRICS = {
         "rad",
         "largest change of angle of attack or pitch angle after the fault from its mean over the 5 s before",
         Group.after_the_fault,
+        "max |a - mean of a over [t_f - 5 s, t_f)|, t >= t_f, a: alpha, theta",
+        needs="fault, and a step before it",
     ),
     "post_fault_attitude_from_nominal": Metric(
         "rad",
         "largest difference of angle of attack or pitch angle after the fault from reference + nominal",
         Group.after_the_fault,
+        "max |a - a_r - a_n|, t >= t_f, a: alpha, theta",
+        needs="fault",
     ),
     "attitude_from_nominal": Metric(
         "rad",
         "largest difference of angle of attack or pitch angle from reference + nominal, over the whole flight",
         Group.tracking,
+        "max |a - a_r - a_n|, a: alpha, theta",
     ),
     "elastic_rate_1_decay_time": Metric(
-        "s", "time after the fault from which |rate| stays within 5 % of its peak", Group.modes
+        "s",
+        "time after the fault from which |rate| stays within 5 % of its peak",
+        Group.modes,
+        "first s with |rate 1| <= 0.05 of its maximum for all t > t_f + s",
+        needs="fault, and an elastic vehicle",
     ),
-    "elastic_rate_2_decay_time": Metric("s", "the same for the second mode", Group.modes),
-    "elastic_decay_time": Metric("s", "the slower of the two", Group.modes),
-    "fuel_equivalence_ratio_minimum": Metric("1", "smallest command", Group.inputs),
-    "fuel_equivalence_ratio_maximum": Metric("1", "largest command", Group.inputs),
-    "elevator_deflection_minimum": Metric("rad", "smallest command", Group.inputs),
-    "elevator_deflection_maximum": Metric("rad", "largest command", Group.inputs),
-    "saturated_steps": Metric("1", "steps in which a command was limited", Group.inputs, counted=True),
+    "elastic_rate_2_decay_time": Metric(
+        "s",
+        "the same for the second mode",
+        Group.modes,
+        "first s with |rate 2| <= 0.05 of its maximum for all t > t_f + s",
+        needs="fault, and an elastic vehicle",
+    ),
+    "elastic_decay_time": Metric("s", "the slower of the two", Group.modes, "max of both", _ELASTIC),
+    "fuel_equivalence_ratio_minimum": Metric("1", "smallest command", Group.inputs, "min Phi"),
+    "fuel_equivalence_ratio_maximum": Metric("1", "largest command", Group.inputs, "max Phi"),
+    "elevator_deflection_minimum": Metric("rad", "smallest command", Group.inputs, "min delta_e"),
+    "elevator_deflection_maximum": Metric("rad", "largest command", Group.inputs, "max delta_e"),
+    "saturated_steps": Metric(
+        "1", "steps in which a command was limited", Group.inputs, "number of k with u(k) clipped", counted=True
+    ),
 }
 """The definitions of all metrics by name, in the order in which files contain them."""
 

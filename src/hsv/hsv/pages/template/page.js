@@ -160,11 +160,24 @@ class Charts {
     const traces = panel.curves.filter((curve) => this.shown(curve)).map((curve) => this.trace(panel, curve));
     Plotly.react(panel.element, traces, this.layout(panel), {
       displaylogo: false, responsive: true, doubleClick: "autosize",
-      modeBarButtons: [["zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "autoScale2d", "toImage"]],
-      toImageButtonOptions: { filename: panel.name, scale: 2 },
+      modeBarButtons: [["zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "autoScale2d", "toImage",
+        { name: "csv", title: "Download as CSV", icon: Plotly.Icons.disk, click: () => this.save(panel) }]],
+      toImageButtonOptions: { filename: panel.name, format: "svg" },
     });
     if (!panel.drawn && !panel.across) panel.element.on("plotly_relayout", (change) => this.zoomed(panel, change));
     panel.drawn = true;
+  }
+
+  /* Save what a panel shows as CSV, in the displayed units: a row for each point of each curve. */
+  save(panel) {
+    const head = (units, name) => `"${name} [${plain(units[this.units].unit) || "1"}]"`;
+    const rows = [`curve,${panel.across ? head(panel.across, "x") : '"time [s]"'},${head(panel.units, "y")}`];
+    for (const { name, x, y } of panel.element.data) y.forEach((value, i) => rows.push(`"${name}",${x[i]},${value}`));
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([`${rows.join("\n")}\n`], { type: "text/csv" }));
+    link.download = `${panel.name}.csv`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   }
 
   shown(curve) {
