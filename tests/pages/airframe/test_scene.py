@@ -6,8 +6,9 @@ from bag_readers import by_foxglove
 from mcap.reader import make_reader
 from recorded_flight import record_flight
 
+from hsv.pages.airframe.geometry import airframe
 from hsv.pages.airframe.pose import BODY, LEVEL, Sample, transforms
-from hsv.pages.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC
+from hsv.pages.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC, scene
 from hsv.pages.airframe.scene_file import write_scene
 from hsv.pages.airframe.solids import solids
 
@@ -43,6 +44,17 @@ def test_everything_recorded_is_in_it_byte_by_byte(case1_bag, written):
     with written.open("rb") as stream:
         attached = {each.name: each.data for each in make_reader(stream).iter_attachments()}
     assert attached == case1_bag.attachments
+
+
+def test_a_rigid_vehicle_is_drawn_as_a_plain_shape(tmp_path):
+    flown = record_flight(tmp_path / "flown", "winged_cone", duration=1.0, fault=0.5)
+    write_scene(flown, tmp_path / "cone.mcap")
+    [(_, _, message)] = messages(tmp_path / "cone.mcap", SCENE_TOPIC)
+    plain, parker = scene(0, plain=True), scene(0)
+    assert message.data == scene(message.log_time, plain=True).encode()
+    assert len(plain.encode()) < 0.2 * len(parker.encode())
+    [cone] = solids(plain=True)
+    assert np.ptp(cone.triangles[..., 0]) == pytest.approx(airframe().length)
 
 
 @pytest.mark.viewer

@@ -22,7 +22,7 @@ def geometry(plain: bool = False) -> dict[str, Any]:
     Points are ``[x, z, mode, shape, slope]``: x and z in body axes (m), the index of the elastic coordinate (kg^0.5 m)
     that bends the vehicle there, and, per unit of it, the deflection (kg^-0.5) and its slope along x (kg^-0.5/m).
     Points of the elevator's outline are ``[x, z]``, relative to the hinge (m). The airframe is that of the paper's
-    vehicle, or, if it is to be ``plain``, a cone of the same length for a vehicle whose shape is not known.
+    vehicle with, under ``plain``, the cone that is drawn for a rigid vehicle, whose shape is not known.
     """
     frame = airframe()
     chord, thickness = frame.elevator_chord, frame.elevator_thickness
@@ -53,7 +53,7 @@ def geometry(plain: bool = False) -> dict[str, Any]:
         found |= {"body": [_point(frame, frame.fore_body, 0.0), top, bottom], "engine": [bottom]}
         found["elevator"] |= {"hinge": hinge}
         found["flame"] |= {"roof": roof, "cowl": lip}
-    return found
+    return found if plain else found | {"plain": geometry(plain=True)}
 
 
 class Image:

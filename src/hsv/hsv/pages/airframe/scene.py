@@ -32,10 +32,13 @@ _ARROWS: dict[str, Colour] = {FLIGHT_PATH: (0.1, 0.5, 0.25, 1.0), BODY: (0.0, 0.
 """Frames that have an arrow along their x axis, with the colour of the arrow."""
 
 
-def scene(time_ns: int, exaggeration: float | None = None) -> SceneUpdate:
-    """Return the scene, stamped ``time_ns``; send it to each client once, and again when the exaggeration changes."""
+def scene(time_ns: int, exaggeration: float | None = None, plain: bool = False) -> SceneUpdate:
+    """Return the scene, stamped ``time_ns``; send it to each client once, and again when the exaggeration changes.
+
+    It shows the paper's vehicle, or a ``plain`` shape for another one, as :func:`hsv.pages.airframe.solids.solids`.
+    """
     stamp = _stamp(time_ns)
-    entities = [_entity(solid, stamp) for solid in solids()]
+    entities = [_entity(solid, stamp) for solid in solids(plain)]
     length = 0.7 * airframe().length
     for frame, colour in _ARROWS.items():
         arrow = ArrowPrimitive(

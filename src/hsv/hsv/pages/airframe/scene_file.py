@@ -15,7 +15,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.steps import joined
 from hsv.bags.writer import Schemas, register
 from hsv.base.errors import RecordingError
-from hsv.model.signals import INPUT_NAMES, STATE_NAMES
+from hsv.model.signals import INPUT_NAMES, N_RIGID, STATE_NAMES
 from hsv.pages.airframe.pose import Sample
 from hsv.pages.airframe.scene import RATE, SCENE_TOPIC, TRANSFORMS_TOPIC, frame_transforms, scene
 
@@ -83,8 +83,9 @@ def _pictures(bag: Bag, exaggeration: float | None) -> list[Message]:
     for name, positions in effectors(columns).items():
         inputs[name] = np.where(np.isfinite(positions), positions, inputs[name])
     states = dict(zip(STATE_NAMES, state_columns(columns[STATE]).T, strict=True))
+    plain = not any(states[name].any() for name in STATE_NAMES[N_RIGID:])  # a rigid vehicle
     drawn = np.stack([(states | inputs)[name] for name in Sample._fields], axis=1)
-    found: list[Message] = [(stamps[0], SCENE_TOPIC, scene(stamps[0], exaggeration).encode())]
+    found: list[Message] = [(stamps[0], SCENE_TOPIC, scene(stamps[0], exaggeration, plain).encode())]
     due = stamps[0]
     for row, stamp in enumerate(stamps):
         if stamp >= due and np.isfinite(drawn[row]).all():

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from hsv.pages.airframe.geometry import Airframe, Point, airframe
-from hsv.pages.airframe.pose import ELEVATOR, ENGINE, FLAMES, segments
+from hsv.pages.airframe.pose import BODY, ELEVATOR, ENGINE, FLAMES, segments
 
 Colour = tuple[float, float, float, float]
 
@@ -45,9 +45,18 @@ def label(exaggeration: float | None = None) -> str:
 
 
 @cache
-def solids() -> tuple[Solid, ...]:
-    """Return the solids of the vehicle."""
+def solids(plain: bool = False) -> tuple[Solid, ...]:
+    """Return the solids of the vehicle; ``plain``: a pyramid of the same length for one whose shape is not known."""
     frame = airframe()
+    if plain:
+        base = 0.06 * frame.length
+        section = [(frame.fore_body, 0.0), (-frame.aft_body, base), (-frame.aft_body, -base)]
+
+        def sides(x: float) -> tuple[float, float]:
+            half = base * (frame.fore_body - x) / frame.length
+            return -half, half
+
+        return (Solid(BODY, "body", _prism(section, sides), BODY_COLOUR),)
     found = []
     for name, stations in segments(frame).items():
         for number, (inner, outer) in enumerate(pairwise(stations), start=1):

@@ -17,7 +17,7 @@ const outline = (points) => `M${points.map(([x, y]) => `${x.toFixed(2)} ${y.toFi
    units, is {time, QUANTITIES, elastic: [eta_1, eta_2], faults: [{channel, text}], nominal: another sample}. */
 class SideView {
   constructor(element, geometry) {
-    Object.assign(this, { element, geometry, exaggeration: geometry.exaggeration, units: "metric" });
+    Object.assign(this, { element, airframe: geometry, geometry, exaggeration: geometry.exaggeration, units: "metric" });
     this.centre = [301, 165];
     this.metre = 460.8 / geometry.length;
   }
@@ -66,6 +66,8 @@ class SideView {
   }
 
   draw(sample) {
+    // The shape of a rigid vehicle is not known.
+    this.geometry = sample.elastic.some(Boolean) ? this.airframe : this.airframe.plain;
     const { geometry, units } = this, place = this.placed(sample), gamma = sample.pitch_angle - sample.angle_of_attack;
     this.find(".ghost").style.display = sample.nominal ? "" : "none";
     if (sample.nominal) this.body(this.placed(sample.nominal), sample.nominal, ".ghost");
