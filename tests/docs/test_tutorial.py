@@ -15,6 +15,7 @@ PAGES = {
     "own_controller": pytest.mark.long,
     "reading_a_bag": pytest.mark.long,
     "campaign": pytest.mark.long,
+    "comparison": pytest.mark.long,
 }
 """The pages with their marks. Those that fly over DDS or many flights take longer than all others together."""
 
