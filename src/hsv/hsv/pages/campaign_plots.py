@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import cycle
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -106,7 +107,8 @@ def _distribution(axis: Axes, results: Results, name: str, system: UnitSystem, l
     axis.step(_of(name, values, system), share, where="post", ls=dashes, lw=1.1, label=label)
     limit = 0.0 if name in required(results) else limits(results).get(name)
     if limit is not None:
-        axis.axvline(float(_of(name, np.array(limit), system)), color="k", lw=0.8, ls=":")
+        ink = matplotlib.rcParams["text.color"]  # visible in a dark page, too
+        axis.axvline(float(_of(name, np.array(limit), system)), color=ink, lw=0.8, ls=":")
     axis.set_title("flights up to this value [%]", loc="left")
     axis.set_ylim(0, 104)
 
