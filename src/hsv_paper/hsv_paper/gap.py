@@ -100,7 +100,7 @@ def gap_of(paths: Sequence[Path], progress: Progress) -> Gap:
 def bound_rows(found: Gap) -> list[dict[str, str]]:
     """Return the rows of the table of all bounds, in m, m/s and deg."""
     return [
-        {"design": f"`{name}`", "bound": kind} | dict(zip(HEADS, map("{:.3g}".format, values * _UNITS), strict=True))
+        {"design": f"`{name}`", "bound": kind} | dict(zip(HEADS, map("{:#.3g}".format, values * _UNITS), strict=True))
         for name, (_, kinds) in found.items()
         for kind, values in kinds.items()
     ]
@@ -110,10 +110,13 @@ def flight_rows(found: Gap) -> list[dict[str, str]]:
     """Return the rows of the table of flights, and of the pitch angle under constant disturbances."""
     rows = []
     for name, (flights, _) in found.items():
-        steady, largest = np.degrees(held(load_subject(find_design(name)), STATE_NAMES.index("pitch_angle")))
+        subject = load_subject(find_design(name))
+        steady, largest = np.degrees(held(subject, STATE_NAMES.index("pitch_angle")))
+        declared = subject.stated("inputs.disturbance")
         rows.append(
             {
                 "design": f"`{name}`",
+                "fault at, s": " to ".join(map("{:g}".format, declared["fault_window"] or [declared["fault_start"]])),
                 "drawn flights": f"{flights['number']:.0f}",
                 "largest level": f"{flights['level']:.3f}",
                 "largest ratio to W": f"{flights['ratio to W']:.3f}",
