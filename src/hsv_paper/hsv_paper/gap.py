@@ -116,7 +116,9 @@ def flight_rows(found: Gap) -> list[dict[str, str]]:
         rows.append(
             {
                 "design": f"`{name}`",
-                "fault at, s": " to ".join(map("{:g}".format, declared["fault_window"] or [declared["fault_start"]])),
+                "fault at, s": " to ".join(
+                    map("{:g}".format, sorted({*(declared["fault_window"] or [declared["fault_start"]])}))
+                ),
                 "drawn flights": f"{flights['number']:.0f}",
                 "largest level": f"{flights['level']:.3f}",
                 "largest ratio to W": f"{flights['ratio to W']:.3f}",
