@@ -113,17 +113,16 @@ def flight_rows(found: Gap) -> list[dict[str, str]]:
         subject = load_subject(find_design(name))
         steady, largest = np.degrees(held(subject, STATE_NAMES.index("pitch_angle")))
         declared = subject.stated("inputs.disturbance")
+        window = {*(declared["fault_window"] or [declared["fault_start"]])}
         rows.append(
             {
                 "design": f"`{name}`",
-                "fault at, s": " to ".join(
-                    map("{:g}".format, sorted({*(declared["fault_window"] or [declared["fault_start"]])}))
-                ),
+                "fault at, s": " to ".join(map("{:g}".format, sorted(window))),
                 "drawn flights": f"{flights['number']:.0f}",
                 "largest level": f"{flights['level']:.3f}",
                 "largest ratio to W": f"{flights['ratio to W']:.3f}",
-                "constant disturbances, steady": f"{steady:.3f}",
-                "on the way there": f"{largest:.3f}",
+                "constant, steady: deg": f"{steady:.3f}",
+                "on the way: deg": f"{largest:.3f}",
             }
         )
     return rows
