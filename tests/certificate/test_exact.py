@@ -173,7 +173,9 @@ def test_sums_of_roots_are_compared_exactly(squares, limit, holds):
 
 
 def test_an_interruption_leaves_what_is_proved():
-    code = "import sys; from hsv.cli.entry import main; sys.argv[1:] = ['verify', 'tight', '--exact']; main()"
+    code = (
+        "import sys; from hsv.cli.entry import main; sys.argv[1:] = ['verify', 'tight', '--exact', '--verbose']; main()"
+    )
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     with process:
         proved = process.stdout.readline()

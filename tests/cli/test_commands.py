@@ -132,7 +132,7 @@ def test_a_flight_that_diverges_is_reported_and_is_no_success(hsv):
     assert ran.json["diverged_at_s"] == pytest.approx(17.6, abs=0.4)
     assert ran.error.startswith("flight diverged at t = 17.")
     table = hsv("simulate", "case1_derived_no_notch").out
-    assert "not flown" in table and "over 0" in table and "within" not in table
+    assert "not flown" in table and "over 0" in table and "verdict within" not in table
 
 
 def test_json_has_no_numbers_that_json_lacks(capsys):

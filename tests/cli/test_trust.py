@@ -204,6 +204,7 @@ READERS = {
     "linearise": "--vehicle own.toml --out model.mat",
     "list": "scenarios own.toml",
     "margins": "own.toml",
+    "compare": "{campaign} {campaign}",
     "bench": "--only own.toml",
     "montecarlo summary": "{campaign}",
     "montecarlo replay": "{campaign} --flight 1",
@@ -216,6 +217,7 @@ FLYING = {
     "check": "own.toml",
     "prepare": "own.toml",
     "montecarlo fly": "own.toml",
+    "worst": "own.toml",
 }
 IN_THE_GRAPH = ("set", "command", "watch", "topic", "fault inject", "fault clear", "fault list")
 OTHERS = ("include", "play")  # one prints a folder, the other publishes the messages of a bag

@@ -96,7 +96,7 @@ def compare(runs: Mapping[str, Flight] | Mapping[str, DataFrame], metrics: Seque
     Raises:
         CampaignError: The campaigns cannot be compared; the message says why.
     """
-    if isinstance(runs, Mapping) and runs and not isinstance(next(iter(runs.values())), Flight):
+    if isinstance(runs, Mapping) and any(hasattr(run, "columns") for run in runs.values()):
         from hsv.flight.campaign.comparison import compare_campaigns
 
         return compare_campaigns(cast("Mapping[str, DataFrame]", runs), metrics)

@@ -39,7 +39,10 @@ def test_a_required_disk_margin_is_judged_once_for_all_flights(results):
     required = Results(results.path)
     text = tomli_w.dumps(results.campaign.table | {"limits": {"disk_margin": 0.7}})
     required.campaign = replace(results.campaign, scenario_text=text)
-    assert sentence(required).endswith(" Disk margin 0.640 violated (limit 0.7).") and results.disk_margin is None
+    assert (
+        sentence(required).endswith(" Disk margin at the vertices 0.640 violated (limit 0.7).")
+        and results.disk_margin is None
+    )
     assert '<p class="lead bad">' in campaign_page(required)
 
 

@@ -273,7 +273,7 @@ def _with_named_vehicle(table: dict[str, Any], name: str) -> dict[str, Any]:
         raise refused(name, f"vehicle = {vehicle!r}: expected a name, a path, or a table")
     if not isinstance(vehicle.get("name", ""), str):
         raise refused(name, f"vehicle.name = {vehicle['name']!r}: expected a name or a path")
-    if not isinstance(vehicle.get("definition", {}), dict):
+    if not isinstance(vehicle.get("definition") or {}, dict):
         raise refused(name, f"vehicle.definition = {vehicle['definition']!r}: expected the tables of a vehicle file")
     return {**table, "vehicle": vehicle} if vehicle else table
 
