@@ -73,7 +73,10 @@ class Browser:
 
     def click(self, selector):
         """Click on the first matching element and wait until the plots have been redrawn."""
-        self.driver.find_element("css selector", selector).click()
+        element = self.driver.find_element("css selector", selector)
+        # At the edge of the window another element may cover it.
+        self.run("arguments[0].scrollIntoView({ block: 'center', behavior: 'instant' })", element)
+        element.click()
         self.settle()
 
     def press(self, key):

@@ -56,13 +56,14 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
     browser.press(" ")
     until(browser, flight, "!live.status.settings.paused")
     driver.find_element("css selector", "[name=parameters]").send_keys("80 %")
-    driver.find_element("css selector", "[name=inject]").click()
+    browser.click("[name=inject]")
     # The page may show the active fault before the answer has arrived.
     until(browser, flight, "live.status.faults.length === 1 && document.getElementById('answer').className")
     answer = browser.run("return document.getElementById('answer').textContent")
     assert answer.startswith("loss of effectiveness 0.8 of elevator deflection from step ")
     step = int(answer.partition("from step ")[2].split()[0])
     until(browser, flight, f"live.now > {step * 0.02 + 6.0}")
+    browser.run("scrollTo({ top: 0, behavior: 'instant' })")
     browser.picture(pictures / "live.png")
     shade = browser.run("return document.getElementById('plot-altitude').layout.shapes[0]")
     assert shade["x0"] == pytest.approx(step * 0.02) and shade["x1"] > shade["x0"]
@@ -135,7 +136,7 @@ def test_with_another_token_every_button_is_answered_with_a_reason(browser, endl
     flight, page = endless
     look(browser, flight, f"{page}x")
     browser.driver.find_element("css selector", "[name=parameters]").send_keys("80 %")
-    browser.driver.find_element("css selector", f"[name={button}]").click()
+    browser.click(f"[name={button}]")
     assert_refused(browser, flight)
 
 
