@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 import tomli_w
 
+from hsv.flight.campaign.executors import Executor
+from hsv.flight.campaign.run import run_campaign
+from hsv.flight.campaign.store import ResultStore
 from hsv.flight.campaign.summary import Results, Share, limits, shares, within_all
 from hsv.pages.campaign import campaign_page, histogram, sentence, share_interval
 
@@ -51,3 +54,12 @@ def test_a_required_disk_margin_is_judged_once_for_all_flights(results):
 )
 def test_intervals_have_the_digits_that_the_flights_can_tell(flights, text):
     assert share_interval(Share("x", None, flights, flights, (0.94378, 1.0))) == text
+
+
+def test_a_swept_factor_comes_first(planned, tmp_path):
+    campaign = planned(samples=4, factors={"fault[0].effectiveness": [0.9, 0.5]})
+    run_campaign(campaign, ResultStore(tmp_path / "swept.parquet", campaign), Executor())
+    page = campaign_page(Results(tmp_path / "swept.parquet"))
+    assert page.index("<svg") < page.index('class="opening"')
+    assert page.index('id="plot-scatter_fault[0].effectiveness"') < page.index('id="plot-scatter_mass"')
+    assert len(re.findall(r"<td>0\.[95]</td><td class=\"number\">4 of 4", page)) == 2
