@@ -189,7 +189,7 @@ def verify(
             checks[part] = []
             for check in gathered(part, find):
                 checks[part].append(check)
-                if verbose and not json:
+                if not json:
                     _say_check(check)
         checks |= recompute(subject, quick, progress, seed=seed, flights=flights or DRAWN)
         if scenario:
@@ -204,7 +204,7 @@ def verify(
         output.print_json({"claims": claims, "stated": STATED, **others, "ok": not failing})
     else:
         for part, made in checks.items():
-            shown = [check for check in made if (verbose and part not in long) or not check.ok]
+            shown = [check for check in made if (verbose or not check.ok) and part not in long]
             if made:
                 output.say(Text(f"{part}: {sum(check.ok for check in made)} of {len(made)} checks pass", "bold"))
             for check in shown:
