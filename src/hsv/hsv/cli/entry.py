@@ -13,7 +13,7 @@ DESCRIPTION = "Fly a flexible air-breathing hypersonic vehicle under Tube-MPC, s
 TREE = (
     ("Fly", "hsv.cli.fly", "run simulate"),
     ("Fly", "hsv.cli.campaigns", "montecarlo resilience"),
-    ("Fly", "hsv.cli.search", "worst"),
+    ("Fly", "hsv.cli.search", "worst rare"),
     ("Look at flights", "hsv.cli.look", "report plot info view"),
     ("Look at flights", "hsv.cli.compare", "compare"),
     ("In flight", "hsv.cli.in_flight", "fault set command watch topic"),

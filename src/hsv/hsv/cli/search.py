@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from hsv.base.errors import CampaignError
+from hsv.base.errors import CampaignError, RunError
 from hsv.base.units import UnitSystem
 from hsv.cli import output
 from hsv.cli.campaigns import (
@@ -148,3 +148,64 @@ def _show_worst(results: Results, units: UnitSystem, json: bool, page: bool, flo
     )
     if written:
         output.say(f"page        {written}")
+
+
+def rare(
+    scenario: ScenarioArgument = "case1",
+    goal: Annotated[str, Option("--of", help="Requirement; default: all requirements of the scenario.")] = "",
+    budget: Annotated[int, Option(help="Largest number of flights, at least 5500.")] = 20_000,
+    seed: SeedOption = 1,
+    scale: ScaleOption = 1.0,
+    factor: FactorOption = None,
+    changes: SetOption = None,
+    out: OutOption = None,
+    workers: WorkersOption = 0,
+    scheduler: SchedulerOption = "",
+    restart: RestartOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Estimate the probability that a requirement breaks, with an interval from independent runs.
+
+    The method is subset simulation, or plain sampling if it is cheaper. The exit code is 1 if there is no interval,
+    because some runs did not reach a failure within the budget. After an interruption, the same command continues.
+
+    Example: hsv rare mine.toml --of "attitude after the fault" --budget 20000
+    """
+    from hsv.flight.campaign.campaign import RARE, plan
+    from hsv.flight.campaign.executors import make_executor
+    from hsv.flight.campaign.summary import CONFIDENCE, Results
+    from hsv.flight.search.rare import RUNS, estimate, least_budget, of_flights, repeated
+    from hsv.flight.search.rows import Rows, is_margin
+    from hsv.flight.tables import read_changes
+
+    changed, factors = read_changes(changes or ()), read_factors(factor or ())
+    planned = plan(scenario, samples=1, seed=seed, scale=scale, factors=factors, changes=changed)
+    campaign = _search(planned, RARE, goal, budget)
+    if not is_margin(campaign.goal):
+        raise CampaignError(f"of = {goal!r}: a metric, expected a requirement of the scenario")
+    if budget < least_budget():
+        raise CampaignError(f"budget = {budget}: expected at least {least_budget()} flights, for independent runs")
+    target = _target(out, campaign)
+    with output.resumable(target.with_name(target.name + ".parts")) as complete:
+        with (
+            make_executor(workers, scheduler, output.errors.print) as flying,
+            output.flights(campaign.scenario_name, budget) as progress,
+        ):
+            rows = Rows(target, campaign, flying, progress)
+            d = len(campaign.factors)
+            rows.run(lambda fly: estimate(of_flights(fly, campaign.factors), d, budget, seed), restart=restart)
+            complete(target)
+        found = repeated(Results(target, trust=True))
+    if json:
+        values = asdict(found) | {"confidence": CONFIDENCE, "goal": campaign.goal, "flown_now": rows.flown_now}
+        output.print_json({"result": str(target), **values})
+    else:
+        shown = " to ".join(f"{end:.3g}" for end in found.interval) if found.interval else "not measured"
+        output.say(f"probability {found.probability:.3g}, 95 % interval {shown}")
+        if found.runs:
+            output.say(f"runs        {', '.join(f'{p:.2g}' for p in found.runs)}; at most {found.levels} levels")
+        output.say(f"flights     {found.samples}, {found.method}", f"results     {target}")
+        for warning in found.warnings:
+            output.report_line("hsv: warning", warning, "bold yellow")
+    if not found.interval:
+        raise RunError(f"no interval: {len(found.runs)} of {RUNS} runs reached the failure with {budget} flights")

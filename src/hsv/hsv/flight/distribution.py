@@ -15,7 +15,7 @@ import numpy as np
 
 from hsv.base.errors import QuantityError
 from hsv.base.units import parse_quantity, rounded
-from hsv.core.arithmetic import logarithm, of_each
+from hsv.core.arithmetic import exponential, logarithm, of_each
 
 KINDS = {"uniform": "[least, largest]", "normal": "[mean, standard deviation]", "grid": "[value, value, ...]"}
 """Kinds of distributions by their key in a file, each with the meaning of its values. A grid is not drawn but swept."""
@@ -64,6 +64,20 @@ def standard_quantiles(shares: np.ndarray) -> np.ndarray:
         numerator = numerator * r + np.where(middle, above, tail_above)
         denominator = denominator * r + np.where(middle, below, tail_below)
     return np.where(middle, q, np.where(q < 0.0, -1.0, 1.0)) * (numerator / denominator)
+
+
+def standard_shares(values: np.ndarray) -> np.ndarray:
+    """Return the probabilities that a standard normal variable is below ``values``, both of shape (n,).
+
+    The error is below 1e-15, by Marsaglia's series of the normal distribution. Values beyond 8 count as 8.
+    """
+    x = np.clip(values, -8.0, 8.0)
+    term = total = x
+    for k in range(3, 200, 2):
+        term = term * (x * x / k)
+        total = total + term
+    density = 0.3989422804014327 * of_each(exponential, -0.5 * x * x)
+    return np.clip(0.5 + density * total, 0.0, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
