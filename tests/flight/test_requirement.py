@@ -152,6 +152,8 @@ def test_margins_agree_with_the_metrics_of_a_flight():
     a, b, c, d = (m.value for m in margins(read(*rows), flown, ended=True, levels=lambda: levels.along(flown)).values())
     assert a == flown.metrics["post_fault_attitude_from_nominal"]
     assert b == levels.worst(flown)
+    exact = margin_of(read(*rows)[1], flown, levels=lambda: levels.along(flown)).margin
+    assert margin_of(read(*rows)[1], flown, largest_level=levels.worst(flown)).margin == exact
     assert c == flown.metrics["elevator_deflection_minimum"]
     assert d == flown.metrics["altitude_error_maximum"]
 

@@ -125,8 +125,13 @@ class SampleRunner:
         """Return the results of a flight that did not crash, by column; ``level`` is its largest tube level."""
         vehicle = self._variants.unchanged.plant.vehicle
         diverged = not in_model_range(flight.history.state[-1], vehicle.angle_limit)
-        levels = partial(self._levels.along, flight)
-        required = margins(self.scenario.requirement, flight, ended=not diverged, levels=levels)
+        required = margins(
+            self.scenario.requirement,
+            flight,
+            ended=not diverged,
+            levels=partial(self._levels.along, flight),
+            largest_level=math.nan if level is None else level,
+        )
         return {
             "diverged": diverged,
             "end_time": float(flight.time[-1]),
