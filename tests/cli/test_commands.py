@@ -53,7 +53,7 @@ def test_help_and_documentation_have_the_same_exit_codes(hsv):
 def test_the_list_of_commands_is_the_answer_to_no_command(hsv):
     ran = hsv()
     assert ran.out == hsv("--help").out
-    assert len(VISIBLE) <= 32
+    assert len(VISIBLE) <= 33
     listed = re.findall(r"^│ ([a-z]\S+) {2,}", ran.out, re.MULTILINE)
     assert sorted(listed) == sorted(VISIBLE)
     assert all(f"─ {panel} ─" in ran.out for panel, _, _ in TREE if panel)
