@@ -218,6 +218,7 @@ FLYING = {
     "prepare": "own.toml",
     "montecarlo fly": "own.toml",
     "worst": "own.toml",
+    "rare": "own.toml",
 }
 IN_THE_GRAPH = ("set", "command", "watch", "topic", "fault inject", "fault clear", "fault list")
 OTHERS = ("include", "play")  # one prints a folder, the other publishes the messages of a bag

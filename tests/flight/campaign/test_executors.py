@@ -5,14 +5,13 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
 
 import pytest
 from distributed import LocalCluster
-from waiting import wait_until
+from waiting import begin_and_never_end, wait_until
 
 from hsv.base.errors import CampaignError, RunError
 from hsv.flight.campaign.executors import make_executor
@@ -178,13 +177,6 @@ def test_a_batch_that_ends_its_worker_is_named_and_ends_the_campaign_and_not_the
         assert dict(workers.fly(length_of, "text", range(2))) == dict.fromkeys(range(2), b"4")
         pids = workers.pids()
     assert dict(os.environ) == before and not any(map(alive, pids))
-
-
-def begin_and_never_end(text, batch):
-    """Create a file in the folder that the text names, as a sign that the batch has begun, and never return."""
-    Path(text.split()[0], str(batch)).touch()
-    time.sleep(1e6)
-    return b""
 
 
 def test_a_campaign_with_a_long_text_is_interrupted_while_batches_wait(tmp_path):
