@@ -10,8 +10,9 @@ from pathlib import Path
 from threading import Thread
 
 import pytest
+from batches import begin_and_never_end, end_of_the_third, length_of
 from distributed import LocalCluster
-from waiting import begin_and_never_end, wait_until
+from waiting import wait_until
 
 from hsv.base.errors import CampaignError, RunError
 from hsv.flight.campaign.executors import make_executor
@@ -154,18 +155,6 @@ def test_a_worker_without_the_program_or_with_another_one_is_refused_by_its_addr
         ):
             pass
         wait_until(lambda: not cluster.scheduler.workers)
-
-
-def end_of_the_third(text, batch):
-    """Fly a batch; on the third batch the worker process ends."""
-    if batch == 3:
-        os._exit(1)
-    return b""
-
-
-def length_of(text, batch):
-    """Fly a batch and return the length of the text."""
-    return str(len(text)).encode()
 
 
 @pytest.mark.long
