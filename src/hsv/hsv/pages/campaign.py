@@ -153,7 +153,8 @@ def sentence(results: Results) -> str:
     if not limited:
         return f"{ending}; there are no limits to judge them by.{margin}"
     named = "limits and requirements" if required(results) else "limits"
-    text = f"{within_all(results)} of {ended.flights} flights are within all {len(limited)} {named}"
+    bounds = f"all {len(limited)} {named}" if len(limited) > 1 else "the limit"
+    text = f"{within_all(results)} of {ended.flights} flights are within {bounds}"
     if failed := most_failed(judged):
         broken = f"{failed.flights - failed.within} of {failed.flights}{' that reached the end' if lost else ''}"
         text += f"; the limit that most flights break is {spaced(failed.name)} ({broken})"
