@@ -48,6 +48,11 @@ SLOWER_WORDS = ("set: elevator_150", "natural_frequency: 90 rad/s")
     [
         ({}, []),
         ({"sensors.pitch_rate.noise": "0.01 deg/s"}, ["sensors.pitch_rate.noise: 0.01 deg/s; "]),
+        (
+            {"fault": [LOSS | {"intermittent_period": "20 s"}]},
+            ["fault: comes and goes; the certificate is for one that"],
+        ),
+        ({"fault": [LOSS | {"random_on": "2 s", "random_off": "1 s"}]}, ["fault: comes and goes; "]),
         ({"sensors.altitude.random_walk": "1 ft/s^0.5"}, ["sensors.altitude.random_walk: 1 ft/s^0.5; "]),
         ({"wind.up": "3 ft/s"}, ["wind.up: 3 ft/s; the certificate is for still air"]),
         ({"density.offset": "-2 %"}, ["density.offset: -0.02; the certificate is for the model's density"]),

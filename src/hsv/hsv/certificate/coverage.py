@@ -107,6 +107,8 @@ def uncovered_faults(
         found += [f"fault: at {time:g} s; the certificate is for {window}" for time in times]
         ends = [fault.stop for fault in losses if fault.stop < duration - _INSTANT]
         found += [f"fault: ends at {time:g} s; the certificate is for one that stays" for time in ends]
+        if any(fault.parameters.get(name) for fault in losses for name in ("intermittent_period", "random_on")):
+            found.append("fault: comes and goes; the certificate is for one that stays")
         if len(losses) > 1:
             found.append(f"fault: {len(losses)} losses of elevator effectiveness; the certificate is for one")
     return list(dict.fromkeys(found))
