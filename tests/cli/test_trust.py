@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import sys
 from contextlib import nullcontext
 from pathlib import Path
@@ -204,7 +205,7 @@ READERS = {
     "linearise": "--vehicle own.toml --out model.mat",
     "list": "scenarios own.toml",
     "margins": "own.toml",
-    "compare": "{campaign} {campaign}",
+    "compare": "{campaign} {other}",
     "bench": "--only own.toml",
     "montecarlo summary": "{campaign}",
     "montecarlo replay": "{campaign} --flight 1",
@@ -238,6 +239,7 @@ def test_every_command_is_one_that_flies_or_one_that_runs_no_code_of_files():
 def test_no_command_but_those_that_fly_runs_the_code_that_a_file_names(hsv, campaign, loaded, crafted, tmp_path):
     (tmp_path / "own.toml").write_text(SCENARIO)
     places = {"bag": crafted("/**"), "campaign": campaign, "design": find_design("baseline")}
+    places["other"] = shutil.copy(campaign, tmp_path / "other.parquet")
     for command, words in READERS.items():
         assert hsv(*command.split(), *words.format(**places).split()).code in (0, 1, 2), command
         assert not loaded(), command
