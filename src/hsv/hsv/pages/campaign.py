@@ -157,7 +157,9 @@ def sentence(results: Results) -> str:
     text = f"{within_all(results)} of {ended.flights} flights are within {bounds}"
     if failed := most_failed(judged):
         broken = f"{failed.flights - failed.within} of {failed.flights}{' that reached the end' if lost else ''}"
-        text += f"; the limit that most flights break is {spaced(failed.name)} ({broken})"
+        alike = [s for s in limited if s.flights - s.within == failed.flights - failed.within]
+        names = ", ".join(spaced(share.name) for share in alike)
+        text += f"; the limit{'s' * (len(alike) > 1)} that most flights break: {names} ({broken})"
     return f"{text}. {ending}.{margin}"
 
 
