@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from contextlib import suppress
 from pathlib import Path
@@ -174,3 +175,13 @@ def test_the_result_of_a_campaign(fuzz: Fuzz, campaign: Results, tmp_path: Path)
         assert found.campaign == campaign.campaign and found.envelope.encode() == campaign.envelope.encode()
 
     fuzz(mutated(campaign.path.read_bytes()), read)
+
+
+def test_a_duration_beyond_every_double_is_no_traceback(bag: Path) -> None:
+    """Found by the fuzz of attachments."""
+    found = Bag(bag)
+    found.attachments["certificate.json"] = certificate_path(find_design("baseline")).read_bytes()
+    [name] = [name for name, content in found.attachments.items() if b"\n    duration: " in content]
+    changed = re.sub(rb"(?m)^    duration: .*", b"    duration: " + b"9" * 400, found.attachments[name])
+    found.attachments[name] = changed
+    assert describe(found)["not_covered"] is None

@@ -203,8 +203,8 @@ def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | N
         if isinstance(certificate, dict) and (version := certificate.get("format", 1)) != FORMAT:
             return [f"all of it: certificate.json has format {version!r}, expected {FORMAT}; fly the design of today"]
         return uncovered(values, design_of(values), certificate, map(_flown, faults or ()))
-    except (HsvError, ValueError, LookupError, TypeError):
-        return None  # the attachments are of another version or incomplete
+    except (HsvError, ValueError, LookupError, TypeError, OverflowError):
+        return None  # the attachments are of another version, incomplete or damaged
 
 
 def _attached(bag: Bag) -> tuple[dict[str, Any], Any]:
@@ -221,7 +221,8 @@ def _disk_margin(bag: Bag, scenario: Scenario | None) -> dict[str, Any] | None:
     from hsv.flight.margins import margin_verdict
 
     design, certificate = None, None
-    with suppress(HsvError, ValueError, LookupError, TypeError):  # the attachments are of another version or incomplete
+    # The attachments may be of another version, incomplete or damaged.
+    with suppress(HsvError, ValueError, LookupError, TypeError, OverflowError):
         values, certificate = _attached(bag)
         design = design_of(values)
     return margin_verdict(scenario, design, certificate or {})

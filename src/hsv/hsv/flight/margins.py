@@ -307,7 +307,7 @@ def margin_verdict(
     """
     if scenario.disk_margin is None:
         return None
-    with suppress(HsvError, LookupError, TypeError, ValueError):
+    with suppress(HsvError, LookupError, TypeError, ValueError, OverflowError):
         refuse_other_loops(scenario)
         if certificate is None:
             certificate = read_certificate(certificate_path(find_design(scenario.design)))
