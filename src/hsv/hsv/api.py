@@ -68,6 +68,8 @@ def sweep(
         RunError: A custom controller failed.
     """
     require("scenario", name, str, "a name, or a path as text")
+    require("field", field, str, 'a field as text, such as "seed"')
+    require("values", values, Iterable, "a list of values")
     given = [*values]
     scenarios = (load(name, {**(changes or {}), field: value}) for value in given)
     return zip(given, fly_variants(scenarios), strict=True)
@@ -163,6 +165,7 @@ def read_campaign(path: Path | str) -> DataFrame:
     """
     from hsv.flight.campaign.summary import Results
 
+    require("path", path, (str, Path), "the path of a result file")
     return Results(Path(path)).frame()
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from hsv.base.errors import HsvError, QuantityError, ScenarioError, one_of
+from hsv.base.errors import HsvError, QuantityError, ScenarioError, one_of, require
 from hsv.certificate.loops import INPUTS, MEASUREMENTS, Feedback, Hardware, vertex_loops
 from hsv.certificate.margins import (
     LoopMargins,
@@ -274,6 +274,7 @@ def loop(
         ScenarioError: The loop of the scenario is not the linear one of the feedback F; the message says why.
         QuantityError, TrimError: An argument is wrong, or there is no equilibrium.
     """
+    require("design", design, str, "a name, or a path as text")
     if at not in (known := (*INPUTS, *MEASUREMENTS)):
         raise QuantityError(f"at = {at!r}: expected {one_of(known, at)}")
     given = load_scenario(scenario) if isinstance(scenario, str) else scenario
