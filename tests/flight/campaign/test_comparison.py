@@ -42,7 +42,7 @@ def test_pairs_are_the_same_vehicles_and_lost_flights_are_counted(frames):
     difference = (heavy["altitude_end_error"].abs() - tube["altitude_end_error"].abs())[both]
     assert row["pairs"] == both.sum() and row["difference"] == pytest.approx(difference.median())
     assert row["low"] <= row["difference"] <= row["high"]
-    never = table[table["metric"] == "velocity_rise_time"]  # of times that nobody reached, there is no difference
+    never = table[table["metric"] == "velocity_rise_time"]  # no flight has this time, so it has no difference
     assert never["median"].tolist() == [math.inf] * 2 and never["pairs"].iloc[1] == 0
     ended = table[table["metric"] == "flown_to_the_end"].iloc[1]
     assert ended["difference"] == pytest.approx(lost[0].mean() - lost[1].mean()) and ended["low"] < ended["high"]
