@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 from node_processes import short_scenario
 
 from hsv.flight.campaign.executors import Executor
@@ -73,23 +74,21 @@ def test_only_the_newest_cases_of_a_campaign_are_kept(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {f"case1_{new}", f"case1_no_notch_{old}"}
 
 
-def as_it_is(severity):
-    return severity
-
-
 @pytest.mark.parametrize("limit", [0.003, 0.31, 0.5, 0.99])
-def test_bisection_encloses_a_threshold(limit):
+@pytest.mark.parametrize("fault", [TRIED["elevator_loss"], TRIED["elevator_delay"]])
+def test_bisection_encloses_a_threshold(fault, limit):
     def survives(severity):
         return severity < limit
 
-    known = {severity: survives(severity) for severity in (0.1, 0.5, 0.9)}
-    found = boundary(survives, known, 0.02, as_it_is)
-    assert found.survived < limit <= found.lost and found.lost - found.survived <= 0.02 + 1e-9
+    known = {severity: survives(severity) for severity in map(fault.severity, fault.values)}
+    found = boundary(fault, survives, known)
+    assert found.survived < limit <= found.lost and found.lost - found.survived <= fault.resolution + 1e-9
 
 
 def test_the_ends_of_a_range_may_be_survived_or_lost():
-    assert boundary(lambda severity: True, {0.2: True}, 0.02, as_it_is) == Boundary(1.0, None)
-    assert boundary(lambda severity: False, {0.2: False}, 0.02, as_it_is) == Boundary(None, 0.0)
+    fault = TRIED["elevator_loss"]
+    assert boundary(fault, lambda severity: True, {0.2: True}) == Boundary(1.0, None)
+    assert boundary(fault, lambda severity: False, {0.2: False}) == Boundary(None, 0.0)
 
 
 def flight(altitude, attitude):
@@ -120,6 +119,14 @@ def test_a_fault_without_effect_leaves_the_flight_where_it_is():
     assert (flown.survived, flown.attitude, flown.altitude, flown.recovery_time) == (True, 0.0, 0.0, 0.0)
     lost = runner.outcome("severe", 0, fault, 0.0)
     assert not lost.survived and 0.0 < lost.time_to_loss < 10.0 and lost.recovery_time is None
+
+
+def test_a_scenario_with_requirements_on_its_fault_is_flown_without_them(tmp_path):
+    row = {"name": "a", "signal": "altitude_error", "at_most": "9 m", "always": True, "from": "fault"}
+    file = tmp_path / "required.toml"
+    file.write_text(tomli_w.dumps({"extends": "case1", "title": "required", "requirement": [row]}), encoding="utf-8")
+    [subject] = plan((str(file),), ("elevator_loss",)).subjects
+    assert subject.scenario.requirement and not parse_scenario(subject.file(Moment.during, 0), "flown").requirement
 
 
 @pytest.fixture(scope="module")
@@ -183,13 +190,17 @@ def rows(heading):
 
 def test_the_baseline_is_lost_where_the_table_says(all_faults):
     runner = SubjectRunner(all_faults.subjects[0], Moment.during)
+
+    def survives(fault, severity):
+        return runner.outcome("", 0, fault, fault.value(severity)).survived
+
     for name, entries in rows("Largest severity survived").items():
         fault, first = TRIED[name], entries["case1"].split("; ")[0]
         said = float(re.search(r"to (\S+)", first)[1])
         # The table's severities are rounded.
         severity = fault.severity(said)
         if first.startswith("survives all"):
-            assert said == pytest.approx(fault.worst) and runner.survives(fault, 1.0)
+            assert said == pytest.approx(fault.worst) and survives(fault, 1.0)
         else:
-            assert runner.survives(fault, severity - 0.005)
-            assert not runner.survives(fault, severity + fault.resolution + 0.005)
+            assert survives(fault, severity - 0.005)
+            assert not survives(fault, severity + fault.resolution + 0.005)

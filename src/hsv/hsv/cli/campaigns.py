@@ -290,11 +290,11 @@ def resilience(
     from hsv.flight.campaign.run import run_campaign
     from hsv.flight.resilience.campaign import CONTROLLERS, plan
     from hsv.flight.resilience.faults import TRIED
-    from hsv.flight.resilience.summary import CaseStore, ResilienceResults, parameter_words
+    from hsv.flight.resilience.summary import CaseStore, ResilienceResults, survived
     from hsv.pages.resilience import write_results
 
     if listed:
-        output.print_titles({name: parameter_words(name) for name in TRIED}, json)
+        output.print_titles({name: fault.words for name, fault in TRIED.items()}, json)
         return
     scenarios, kinds = ([name.strip() for name in text.split(",") if text] for text in (controllers, faults))
     # A type of hsv list faults stands for all faults of this type.
@@ -323,12 +323,12 @@ def resilience(
     else:
         names = [subject.name for subject in results.campaign.subjects]
         rows = results.campaign.faults
-        cells = [["{} of {}".format(*results.squares[fault, name].survived) for name in names] for fault in rows]
+        cells = [["{} of {}".format(*survived(results.squares[fault, name].every)) for name in names] for fault in rows]
         output.print_matrix("flights survived", [fault.replace("_", " ") for fault in rows], names, cells)
         if flown.batches:
             output.say(f"flown in {flown.wall_time:.0f} s")
         output.say(f"written {', '.join(map(str, written))}")
-    crashes = [flight.crashed for flight in results.flights]
+    crashes = [flight.crashed for cell in results.cells for flight in cell.flights]
     if all(crashes):
         raise RunError(f"all {len(crashes)} flights crashed, the first: {crashes[0]}")
 
@@ -338,28 +338,26 @@ def _cells(results: ResilienceResults) -> list[dict[str, Any]]:
     from hsv.pages.resilience import flight_file
 
     found = []
-    for (fault, controller), square in results.squares.items():
-        tried = TRIED[fault]
-        for moment, cells in square.cells.items():
-            ends = square.boundaries[moment]
-            found += [
-                {
-                    "controller": controller,
-                    "fault": fault,
-                    "time": moment.name,
-                    "severity": cell.severity,
-                    "value": cell.flights[0].value,
-                    "unit": tried.unit,
-                    "survived": cell.survived,
-                    "flights": len(cell.flights),
-                    "attitude_rad": cell.attitude,
-                    "altitude_m": cell.altitude,
-                    "recovery_time_s": cell.recovery_time,
-                    "time_to_loss_s": cell.time_to_loss,
-                    "worst_flight": flight_file(cell),
-                    "largest_survived": None if ends.survived is None else tried.value(ends.survived),
-                    "least_lost": None if ends.lost is None else tried.value(ends.lost),
-                }
-                for cell in cells
-            ]
+    for cell in results.cells:
+        case, tried = cell.case, TRIED[cell.case.fault]
+        ends = results.squares[case.fault, case.subject.name].boundaries[case.moment]
+        found.append(
+            {
+                "controller": case.subject.name,
+                "fault": case.fault,
+                "time": case.moment.name,
+                "severity": cell.severity,
+                "value": cell.flights[0].value,
+                "unit": tried.unit,
+                "survived": cell.survived,
+                "flights": len(cell.flights),
+                "attitude_rad": cell.attitude,
+                "altitude_m": cell.altitude,
+                "recovery_time_s": cell.recovery_time,
+                "time_to_loss_s": cell.time_to_loss,
+                "worst_flight": flight_file(cell),
+                "largest_survived": None if ends.survived is None else tried.value(ends.survived),
+                "least_lost": None if ends.lost is None else tried.value(ends.lost),
+            }
+        )
     return found

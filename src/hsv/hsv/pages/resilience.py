@@ -6,12 +6,11 @@ from pathlib import Path
 
 import tomli_w
 
-from hsv.base.errors import CampaignError, reason
 from hsv.base.units import UnitSystem
-from hsv.flight.campaign.run import write_whole
+from hsv.flight.campaign.run import write_whole, writing
 from hsv.flight.resilience.faults import OBSERVED, SEVERITIES, TRIED, Moment
 from hsv.flight.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND
-from hsv.flight.resilience.summary import Cell, ResilienceResults, boundaries_in_words, parameter_words
+from hsv.flight.resilience.summary import Cell, ResilienceResults, boundaries_in_words, survived
 from hsv.flight.scenario import scenario_table
 from hsv.pages.engine import render
 
@@ -27,11 +26,8 @@ def write_results(results: ResilienceResults, out: Path, command: str) -> list[P
 
     The pages quote the ``command`` that produces the results. A CampaignError names a file that cannot be written.
     """
-    folder = out / FLIGHTS
-    try:
+    with writing(folder := out / FLIGHTS):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CampaignError(f"{folder}: cannot be made ({reason(error)})") from error
     for cell in results.cells:
         write_whole(out / flight_file(cell), flight_text(cell).encode())
     pages = {out / "index.html": "resilience.html.j2", out / "result.md": "resilience.md.j2"}
@@ -64,17 +60,15 @@ def vehicle_words(vehicle: int) -> str:
 
 def sentence(results: ResilienceResults) -> str:
     """Return the verdict: how many flights each controller has survived, best controller first."""
-    counts = {}
-    for subject in results.campaign.subjects:
-        squares = [square for (_, name), square in results.squares.items() if name == subject.name]
-        survived, flown = (sum(numbers) for numbers in zip(*(square.survived for square in squares), strict=True))
-        counts[subject.name] = survived, flown
+    names = [subject.name for subject in results.campaign.subjects]
+    counts = {name: survived([cell for cell in results.cells if cell.case.subject.name == name]) for name in names}
     ranked = sorted(counts.items(), key=lambda item: item[1][0] / item[1][1], reverse=True)
-    return "Flights survived: " + ", ".join(f"{name} {survived} of {flown}" for name, (survived, flown) in ranked) + "."
+    return "Flights survived: " + ", ".join("{} {} of {}".format(name, *count) for name, count in ranked) + "."
 
 
 def resilience_page(results: ResilienceResults, template: str, command: str) -> str:
     """Return the page that ``template`` makes of the results, as HTML or Markdown; it quotes the ``command``."""
+    finished, flown = survived(results.cells)
     return render(
         template,
         command=command,
@@ -91,9 +85,8 @@ def resilience_page(results: ResilienceResults, template: str, command: str) -> 
         sentence=sentence(results),
         boundaries_in_words=boundaries_in_words,
         corners=max(len(subject.vehicles) for subject in results.campaign.subjects) - 1,
-        parameter_words=parameter_words,
         flight_file=flight_file,
         vehicle_words=vehicle_words,
-        survived=sum(flight.survived for flight in results.flights),
-        flights=len(results.flights),
+        survived=finished,
+        flights=flown,
     )

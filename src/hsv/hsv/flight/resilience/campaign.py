@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import Any, Self
 
@@ -28,7 +29,7 @@ _EVERY = 8
 """Stride in the list of screening corners; it selects the nominal vehicle, two corners and their mirror images."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Subject:
     """A controller under test: its scenario, its vehicles, and all else, except code, that its flights depend on."""
 
@@ -39,7 +40,7 @@ class Subject:
     """Parameters of the controller's design by name"""
     library: str
     """SHA-256 of the controller's shared library; empty if it has none"""
-    vehicles: tuple[Mapping[str, float], ...]
+    vehicles: Sequence[Mapping[str, float]]
     """Relative changes of the uncertain parameters of each vehicle; the first vehicle is the nominal one"""
 
     @cached_property
@@ -67,7 +68,8 @@ class Subject:
         period = self.design.get("period", PERIOD)
         steps = round((start + OBSERVED * self.scenario.duration) / period)
         table["duration"] = written(rounded(steps * period), "s")
-        table.pop("limits", None)  # they apply to the scenario's own flight
+        for own in ("limits", "requirement"):  # of the scenario's own flight
+            table.pop(own, None)
         changes = {name: f"{100.0 * change!r} %" for name, change in self.vehicles[vehicle].items()}
         table["vehicle"] = {**table.get("vehicle", {}), "perturbation": changes}
         table["fault"] = [fault.row(value, start)] if fault else []
@@ -81,8 +83,6 @@ class Case:
     subject: Subject
     fault: str
     moment: Moment
-    kind: int = 0
-    """Index of the subject in the campaign"""
 
     @property
     def flights(self) -> int:
@@ -117,12 +117,7 @@ class ResilienceCampaign:
     @cached_property
     def cases(self) -> list[Case]:
         """All cases: for each controller, each fault at each time."""
-        return [
-            Case(subject, fault, moment, kind)
-            for kind, subject in enumerate(self.subjects)
-            for fault in self.faults
-            for moment in Moment
-        ]
+        return [Case(*each) for each in product(self.subjects, self.faults, Moment)]
 
     @property
     def text(self) -> str:
@@ -133,10 +128,7 @@ class ResilienceCampaign:
     def from_text(cls, text: str) -> Self:
         """Return the campaign from its JSON ``text``, the inverse of :attr:`text`."""
         values = json.loads(text)
-        subjects = tuple(
-            Subject(**subject | {"vehicles": tuple(subject["vehicles"])}) for subject in values["subjects"]
-        )
-        return cls(subjects, tuple(values["faults"]))
+        return cls(tuple(Subject(**subject) for subject in values["subjects"]), tuple(values["faults"]))
 
 
 def plan(controllers: Sequence[str], faults: Sequence[str]) -> ResilienceCampaign:

@@ -94,6 +94,13 @@ class TriedFault:
         """Return ``values`` of the parameter as a text with their unit."""
         return f"{', '.join(f'{value:.3g}' for value in values)}{'' if self.unit == '1' else ' ' + self.unit}"
 
+    @property
+    def words(self) -> str:
+        """The parameter with its three values and its range, and the fixed parameters, as a text."""
+        tried = f"{self.values_text(*self.values)} ({self.harmless:g} to {self.values_text(self.worst)})"
+        fixed = (f"{key.replace('_', ' ')} {value}" for key, value in self.fixed.items())
+        return ", ".join([f"{self.parameter.replace('_', ' ')} {tried}", *fixed])
+
 
 _ELEVATOR, _FUEL, _ENGINE = "elevator_deflection", "fuel_equivalence_ratio", "engine"
 _ATTITUDE, _ANGLE, _RATE = "pitch_angle", "angle_of_attack", "pitch_rate"

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from functools import lru_cache
-from typing import Any
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -73,23 +72,17 @@ class SubjectRunner:
         self._subject, self._moment = subject, moment
         unchanged = parse_scenario(subject.file(moment, 0), subject.name)
         self._variants = FlightVariants(unchanged, subject.design, subject.library)
-        self._without: dict[int, Flight] = {}
+        self._without = cache(self.fly)
 
     def fly(self, vehicle: int, fault: TriedFault | None = None, value: float = 0.0) -> Flight:
         """Fly the vehicle with this index, without fault or with a ``fault`` whose severity parameter is ``value``."""
         text = self._subject.file(self._moment, vehicle, fault, value)
         return fly(self._variants.components(parse_scenario(text, self._subject.name)))
 
-    def without(self, vehicle: int) -> Flight:
-        """Return the flight of a vehicle without a fault, simulated at the first call."""
-        if vehicle not in self._without:
-            self._without[vehicle] = self.fly(vehicle)
-        return self._without[vehicle]
-
     def outcome(self, severity: str, vehicle: int, fault: TriedFault, value: float) -> FlownFault:
         """Fly a vehicle with a fault and return the result; ``severity`` is one of :data:`SEVERITIES`."""
         try:
-            flight, without = self.fly(vehicle, fault, value), self.without(vehicle)
+            flight, without = self.fly(vehicle, fault, value), self._without(vehicle)
         except ControllerError as error:
             return FlownFault(severity, value, vehicle, False, None, None, None, None, str(error))
         survived = flight.status is FlightStatus.FINISHED
@@ -97,13 +90,6 @@ class SubjectRunner:
         attitude, altitude, recovery = distances(flight, without, start)
         loss = None if survived else float(flight.time[-1]) - start
         return FlownFault(severity, value, vehicle, survived, attitude, altitude, recovery, loss, None)
-
-    def survives(self, fault: TriedFault, severity: float) -> bool:
-        """Return whether the nominal vehicle survives the fault with a ``severity`` from 0 to 1."""
-        try:
-            return self.fly(0, fault, fault.value(severity)).status is FlightStatus.FINISHED
-        except ControllerError:
-            return False
 
 
 def distances(flight: FlightData, without: FlightData, start: float) -> tuple[float, float, float | None]:
@@ -125,31 +111,22 @@ def distances(flight: FlightData, without: FlightData, start: float) -> tuple[fl
     return float(attitude.max()), float(altitude.max()), recovery
 
 
-def boundary(
-    survives: Callable[[float], bool], known: dict[float, bool], resolution: float, at: Callable[[float], float]
-) -> Boundary:
+def boundary(fault: TriedFault, survives: Callable[[float], bool], known: Mapping[float, bool]) -> Boundary:
     """Return a survived and a lost severity by bisection; (1, None) if none is lost, (None, 0) if even 0 is lost.
 
-    Args:
-        survives: Flies with a severity, and returns whether the flight survives.
-        known: Whether the flights so far survived, by severity.
-        resolution: Largest permitted difference between the two severities.
-        at: Returns the nearest severity that can be flown, because some parameters are integers.
+    ``survives`` flies with a severity and returns whether the flight survives; ``known`` has the results so far.
     """
-    known = dict(known)
-    if all(known.values()):
-        known[1.0] = survives(1.0)
-    if not any(not survived for survived in known.values()):
+    lost = min((severity for severity, survived in known.items() if not survived), default=1.0)
+    if all(known.values()) and survives(1.0):
         return Boundary(1.0, None)
-    lost = min(severity for severity, survived in known.items() if not survived)
-    below = [severity for severity, survived in known.items() if survived and severity < lost]
-    if not below:
+    survived = max((severity for severity, survived in known.items() if survived and severity < lost), default=-1.0)
+    if survived < 0.0:
         if lost <= 0.0 or not survives(0.0):
             return Boundary(None, 0.0)
-        below = [0.0]
-    survived = max(below)
-    while lost - survived > resolution + 1e-9:
-        middle = at(0.5 * (survived + lost))
+        survived = 0.0
+    while lost - survived > fault.resolution + 1e-9:
+        # Some parameters are integers.
+        middle = fault.severity(fault.value(0.5 * (survived + lost)))
         if survives(middle):
             survived = middle
         else:
@@ -157,26 +134,19 @@ def boundary(
     return Boundary(survived, lost)
 
 
-@lru_cache(maxsize=_RUNNERS)
-def _runner(text: str, subject: int, moment: Moment) -> SubjectRunner:
-    return SubjectRunner(ResilienceCampaign.from_text(text).subjects[subject], moment)
+_campaign = lru_cache(maxsize=1)(ResilienceCampaign.from_text)
+_runner = lru_cache(maxsize=_RUNNERS)(SubjectRunner)
 
 
 def fly_case(text: str, number: int) -> bytes:
     """Fly the case with this ``number`` in the campaign ``text``; return its flights and its boundary as JSON."""
-    case = ResilienceCampaign.from_text(text).cases[number]
-    runner, fault = _runner(text, case.kind, case.moment), TRIED[case.fault]
+    case = _campaign(text).cases[number]
+    runner, fault = _runner(case.subject, case.moment), TRIED[case.fault]
     flown = [
         runner.outcome(severity, vehicle, fault, value)
         for severity, value in zip(SEVERITIES, fault.values, strict=True)
         for vehicle in range(len(case.subject.vehicles))
     ]
     known = {fault.severity(row.value): row.survived for row in flown if row.vehicle == 0}
-    found = boundary(
-        lambda severity: runner.survives(fault, severity),
-        known,
-        fault.resolution,
-        lambda severity: fault.severity(fault.value(severity)),
-    )
-    outcome: dict[str, Any] = {"flights": [asdict(row) for row in flown], "boundary": asdict(found)}
-    return json.dumps(outcome).encode()
+    found = boundary(fault, lambda severity: runner.outcome("", 0, fault, fault.value(severity)).survived, known)
+    return json.dumps({"flights": [asdict(row) for row in flown], "boundary": asdict(found)}).encode()

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 
 from hsv.base.errors import CampaignError
 from hsv.base.files import parse_json, read_text
 from hsv.flight.campaign.run import Store
 from hsv.flight.fingerprint import DIGITS, code_digest, digest_of, drop_older
-from hsv.flight.resilience.campaign import Case, ResilienceCampaign, Subject
-from hsv.flight.resilience.faults import SEVERITIES, TRIED, Moment, TriedFault
+from hsv.flight.resilience.campaign import Case, ResilienceCampaign
+from hsv.flight.resilience.faults import SEVERITIES, Moment, TriedFault
 from hsv.flight.resilience.flights import Boundary, FlownFault, fly_case
 
 Outcome = tuple[tuple[FlownFault, ...], Boundary]
@@ -58,7 +59,7 @@ class Cell:
 
     case: Case
     severity: str
-    flights: tuple[FlownFault, ...]
+    flights: list[FlownFault]
 
     @property
     def survived(self) -> int:
@@ -107,22 +108,18 @@ def _rank(flight: FlownFault) -> tuple[float, float]:
 class Square:
     """Results of one controller with one fault: cells (ordered by severity) and boundary by time of occurrence."""
 
-    fault: str
-    subject: Subject
-    cells: dict[Moment, tuple[Cell, ...]]
-    boundaries: dict[Moment, Boundary]
+    cells: dict[Moment, list[Cell]] = field(default_factory=dict)
+    boundaries: dict[Moment, Boundary] = field(default_factory=dict)
 
     @property
-    def worst(self) -> tuple[Cell, FlownFault]:
-        """The cell with the worst flight of all cells, and this flight."""
-        cell = min((cell for row in self.cells.values() for cell in row), key=lambda cell: _rank(cell.worst))
-        return cell, cell.worst
+    def every(self) -> list[Cell]:
+        """The cells of all times of occurrence."""
+        return [cell for row in self.cells.values() for cell in row]
 
     @property
-    def survived(self) -> tuple[int, int]:
-        """Number of flights that reached their end, and number of all flights."""
-        cells = [cell for row in self.cells.values() for cell in row]
-        return sum(cell.survived for cell in cells), sum(len(cell.flights) for cell in cells)
+    def worst(self) -> Cell:
+        """The cell with the worst flight of all cells."""
+        return min(self.every, key=lambda cell: _rank(cell.worst))
 
 
 @dataclass(frozen=True)
@@ -136,30 +133,27 @@ class ResilienceResults:
     @classmethod
     def read(cls, campaign: ResilienceCampaign, store: CaseStore) -> ResilienceResults:
         """Return the results in ``store``; a ``CampaignError`` if a case is missing or its file is damaged."""
-        squares = {
-            (fault, subject.name): Square(fault, subject, {}, {})
-            for fault in campaign.faults
-            for subject in campaign.subjects
-        }
+        names = [subject.name for subject in campaign.subjects]
+        squares = {pair: Square() for pair in product(campaign.faults, names)}
         for number, case in enumerate(campaign.cases):
             if (outcome := store.read(number)) is None:
                 raise CampaignError(f"{store.folder}: {case.label} is missing; run the same command again to fly it")
             square, (flights, boundary) = squares[case.fault, case.subject.name], outcome
             square.boundaries[case.moment] = boundary
-            square.cells[case.moment] = tuple(
-                Cell(case, severity, tuple(f for f in flights if f.severity == severity)) for severity in SEVERITIES
-            )
+            square.cells[case.moment] = [
+                Cell(case, severity, [f for f in flights if f.severity == severity]) for severity in SEVERITIES
+            ]
         return cls(campaign, squares)
 
     @property
     def cells(self) -> list[Cell]:
         """All cells, ordered by fault, controller, time of occurrence and severity."""
-        return [cell for square in self.squares.values() for row in square.cells.values() for cell in row]
+        return [cell for square in self.squares.values() for cell in square.every]
 
-    @property
-    def flights(self) -> Sequence[FlownFault]:
-        """All flights except those of the bisections."""
-        return [flight for cell in self.cells for flight in cell.flights]
+
+def survived(cells: Sequence[Cell]) -> tuple[int, int]:
+    """Return the numbers of flights in ``cells`` that reached their end, and of all their flights."""
+    return sum(cell.survived for cell in cells), sum(len(cell.flights) for cell in cells)
 
 
 def boundaries_in_words(fault: TriedFault, boundaries: Mapping[Moment, Boundary]) -> list[str]:
@@ -176,11 +170,3 @@ def boundaries_in_words(fault: TriedFault, boundaries: Mapping[Moment, Boundary]
     if len({*texts.values()}) == 1:
         return list(texts.values())[:1]
     return [f"{text} ({moment.name})" for moment, text in texts.items()]
-
-
-def parameter_words(name: str) -> str:
-    """Return a text on the fault ``name``: severity parameter, its three values and range, fixed parameters."""
-    fault = TRIED[name]
-    fixed = "".join(f", {key.replace('_', ' ')} {value}" for key, value in fault.fixed.items())
-    tried = f"{fault.values_text(*fault.values)} ({fault.harmless:g} to {fault.values_text(fault.worst)}){fixed}"
-    return f"{fault.parameter.replace('_', ' ')} {tried}"
