@@ -60,6 +60,8 @@ class NominalTrajectoryNode(BlockNode):
         """Publish the status of the nominal law as diagnostics; warn when its solver begins to fail."""
         failed = bool(int(signals.nominal_status) & _SOLVER_FAILED)
         begins, self._failed = failed and not self._failed, failed
+        if self.diagnosed(signals) and not begins:
+            return
         status = NominalStatus(signals.nominal_status)
         summary = "running" if status is NominalStatus.OK else str(status.name)
         self.diagnose(signals, summary, warning=begins, gain_index=signals.gain_index)

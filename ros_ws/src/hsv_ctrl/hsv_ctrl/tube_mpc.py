@@ -54,15 +54,16 @@ class TubeNode(BlockNode):
         if left:
             time = signals.stamp[0] + 1e-9 * signals.stamp[1]
             self.get_logger().warning(f"left the tube at {time:.2f} s: {result.component}, level {result.level:.3f}")
+        summary, found, changed = result.status.name, result.effectiveness, False
+        if found and found.mode is not self._mode:
+            changed, self._mode, summary = True, found.mode, f"elevator {found}"
+            self.get_logger().warning(summary)
+        if self.diagnosed(signals) and not (left or changed):
+            return
         values = {"saturated": bool(result.saturated.any()), "level": result.level, "component": result.component}
-        summary, changed = result.status.name, False
-        if found := result.effectiveness:
-            changed, self._mode = found.mode is not self._mode, found.mode
+        if found:
             values |= {"effectiveness": found.estimate, "effectiveness_low": found.low}
             values |= {"effectiveness_high": found.high, "elevator": found.mode.name}
-        if changed:
-            summary = f"elevator {found}"
-            self.get_logger().warning(summary)
         self.diagnose(signals, summary, warning=left or changed, **values)
 
 

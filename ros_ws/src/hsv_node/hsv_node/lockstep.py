@@ -175,9 +175,13 @@ class LockstepNode(ProcessNode):
         self._changed = words
         self.get_logger().info(words)
 
+    def diagnosed(self, signals: Signals) -> bool:
+        """Return whether diagnostics of this simulated second have been published."""
+        return bool(signals.stamp[0] == self._diagnosed_second)
+
     def diagnose(self, signals: Signals, summary: str = "running", warning: bool = False, **values: object) -> None:
         """Publish ``summary`` and ``values`` as diagnostics, once per simulated second and for every ``warning``."""
-        if signals.stamp[0] == self._diagnosed_second and not warning:
+        if self.diagnosed(signals) and not warning:
             return
         self._diagnosed_second = signals.stamp[0]
         values = {"step": signals.step, **values, **self.measured()}

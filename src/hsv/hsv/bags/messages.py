@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from operator import attrgetter
+from struct import Struct
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,6 +40,8 @@ ENCAPSULATION = 4
 """Length of the header of a message in CDR, bytes; fields are aligned relative to the end of the header."""
 
 _LITTLE_ENDIAN = b"\x00\x01"
+_STAMP = Struct("<iI")
+"""Seconds and nanoseconds of simulated time, the first fields of every message of a step."""
 
 
 def stamp_of(step: int, period: float) -> tuple[int, int]:
@@ -48,8 +51,8 @@ def stamp_of(step: int, period: float) -> tuple[int, int]:
 
 def stamp_in(message: bytes) -> int:
     """Return the simulated time (ns) at the beginning of a message (CDR) of a step topic."""
-    seconds = int.from_bytes(message[4:8], "little", signed=True)
-    return seconds * 1_000_000_000 + int.from_bytes(message[8:12], "little")
+    seconds, nanoseconds = _STAMP.unpack_from(message, ENCAPSULATION)
+    return int(seconds * 1_000_000_000 + nanoseconds)
 
 
 class MessageError(RunError):
@@ -194,6 +197,7 @@ class StepMessages:
         self._has_faults = types.ACTIVE_FAULTS in carried
         numbers = {signal: field for signal, field in carried.items() if signal is not types.ACTIVE_FAULTS}
         self._sequences = {signal: field for signal, field in numbers.items() if signal.sequence}
+        self._has_estimate = types.ESTIMATE in self._sequences
         self._needed = {signal.name: (field, _size(signal)) for signal, field in numbers.items() if signal in _NEEDED}
         if topic == TUBE_STATUS:
             sent = {name: (size, attrgetter(f"diagnostics.{name}")) for name, size in DIAGNOSED.items()}
@@ -232,7 +236,7 @@ class StepMessages:
         vars(signals).update(zip(self._needed, values, strict=True))
         if self._has_faults:
             signals.active_faults = faults
-        if types.ESTIMATE in self._sequences and not len(signals.estimate):
+        if self._has_estimate and not len(signals.estimate):
             signals.estimate = signals.measurement
 
     def pack(self, signals: Signals) -> bytes:

@@ -104,6 +104,7 @@ class Bag:
         """Topics of other programs whose messages are not ROS 2 messages in CDR; only a recovery copies them."""
         self._messages: dict[str, list[Message]] = defaultdict(list)
         self._columns: dict[str, Columns] = {}
+        self._stamps: dict[str, NDArray[np.int64]] = {}
         self._read()
         self._check()
 
@@ -121,7 +122,9 @@ class Bag:
         """Return the simulated times of the messages of a topic, ns, shape (n,)."""
         name = self._topic(topic).name
         if name in self._step_topics:
-            return self._stamps(name, self._data(name))
+            if name not in self._stamps:
+                self._stamps[name] = self._stamps_in(name, self._data(name))
+            return self._stamps[name]
         log_times = self._log_times(name)
         received, stamps = self._clock
         if np.array_equal(received.astype(np.int64), stamps):
@@ -221,7 +224,7 @@ class Bag:
     def _log_times(self, name: str) -> NDArray[np.uint64]:
         return np.array([message.log_time for message in self._messages[name]], np.uint64)
 
-    def _stamps(self, topic: str, messages: list[bytes]) -> NDArray[np.int64]:
+    def _stamps_in(self, topic: str, messages: list[bytes]) -> NDArray[np.int64]:
         if any(len(message) < _STAMP_END for message in messages):
             raise RecordingError(f"{self.path}: topic {topic}: a message of less than {_STAMP_END} bytes")
         order = ">" if messages and messages[0].startswith(_BIG_ENDIAN) else "<"

@@ -19,6 +19,8 @@ from hsv.base.errors import RecordingError
 
 _FRAME = struct.Struct("<BQ")
 """Opcode and length at the start of a record."""
+_MESSAGE = struct.Struct("<HIQQ")
+"""Channel, sequence number, log time and publish time at the start of a message."""
 _CANDIDATE = re.compile(rb"(?=[\x06\x09\x0f].{5}\x00{3})", re.DOTALL)
 """Possible start of a chunk, of an attachment, or of the end of the data."""
 # Exceptions of the mcap package for wrong lengths and texts.
@@ -120,9 +122,14 @@ def _record(data: memoryview, position: int) -> tuple[kinds.McapRecord | None, i
     end = start + length
     if end > len(data) or length > MAX_RECORD or opcode not in _KINDS:
         return None, end if opcode >= 0x80 and end <= len(data) else 0  # opcodes from 0x80 on are private
+    if opcode == Opcode.MESSAGE:  # by far the most records: read without the fields' own functions of the package
+        if length < _MESSAGE.size:
+            return None, 0
+        channel, sequence, logged, published = _MESSAGE.unpack_from(data, start)
+        return kinds.Message(channel, logged, bytes(data[start + _MESSAGE.size : end]), published, sequence), end
     stream = ReadDataStream(BytesIO(data[start:end]))
     try:
-        record = _KINDS[opcode].read(stream, *([length] if opcode == Opcode.MESSAGE else []))
+        record = _KINDS[opcode].read(stream)
     except _DAMAGE:
         return None, 0
     return (record, end) if stream.count == length else (None, 0)

@@ -307,7 +307,6 @@ def _conclude(
     from hsv.bags.reader import Bag
     from hsv.cli.summary import FlightSummary, report_flight
     from hsv.flight.scenario import parse_scenario
-    from hsv.pages.report import write_report
 
     recorded = Bag(bag)
     if "scenario.toml" not in recorded.attachments:
@@ -318,6 +317,8 @@ def _conclude(
     files = {"bag": bag}
     unwritten = None
     if report:
+        from hsv.pages.report import write_report
+
         page = bag / "report.html"
         try:
             write_report([recorded], page, units=units)

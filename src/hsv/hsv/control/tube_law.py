@@ -30,9 +30,8 @@ from hsv.control.effectiveness import (
     effectiveness_in,
 )
 from hsv.control.hardware import HARDWARE_PARAMETERS, uncovered_hardware
-from hsv.control.nominal_law import ellipsoid_level
 from hsv.control.notch_filter import FLOWN_NOTCH_PARAMETERS, NotchSection, discretise, flown_sections
-from hsv.core import Struct, doubles, dtype, lib, records
+from hsv.core import Struct, doubles, dtype, lib, records, vector
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES
 from hsv.model.vehicle import COUPLING_PARAMETER
@@ -175,22 +174,23 @@ class DisturbanceMonitor:
 
     def __init__(self, design: ControlDesign, bounds: np.ndarray) -> None:
         """Watch flights of ``design``; ``bounds`` (2, 5) are the lower and upper ones of Delta, SI."""
-        self._polytope, self._bounds = design.polytope.data(), bounds
+        self._polytope, (self._lower, self._upper) = design.polytope.data(), bounds
+        self._expected, self._input = np.zeros(N_STATES), np.zeros(N_INPUTS)
+        self._pointers = [*map(doubles, (self._expected, self._input, np.zeros(N_STATES)))]
         self.reset()
 
     def reset(self) -> None:
         """Prepare a new flight, whose first step has no disturbance yet."""
-        self._expected = np.full(N_STATES, np.nan)
+        self._expected[:] = np.nan
 
-    def leaves(self, inputs: ControllerInput, u: np.ndarray) -> bool:
-        """Return whether the disturbance that led to this step is outside W; predict e for the next, with input u."""
-        error = (inputs.estimate - inputs.reference - inputs.deviation)[:N_RIGID]
-        delta, (lower, upper) = error - self._expected[:N_RIGID], self._bounds
-        self._expected[:] = 0.0
-        self._expected[:N_RIGID] = error
-        given = map(doubles, (self._expected, u - inputs.reference_input - inputs.nominal_input, np.zeros(N_STATES)))
-        lib.hsv_nominal_advance(self._polytope.pointer, *inputs.estimate[:2], *given)
-        return bool(np.any((delta < lower) | (delta > upper)))
+    def leaves(self, inputs: ControllerInput, error: np.ndarray, u: np.ndarray) -> bool:
+        """Return whether the disturbance that led to ``error`` e (5) is outside W; predict the next e, with input u."""
+        delta = error - self._expected[:N_RIGID]
+        self._expected[:N_RIGID], self._expected[N_RIGID:] = error, 0.0
+        self._input[:] = u - inputs.reference_input - inputs.nominal_input
+        altitude, velocity = inputs.estimate[:2]
+        lib.hsv_nominal_advance(self._polytope.pointer, altitude, velocity, *self._pointers)
+        return bool(((delta < self._lower) | (delta > self._upper)).any())
 
 
 class TubeLaw(Controller):
@@ -233,6 +233,7 @@ class TubeLaw(Controller):
         self._hardware_covered = hardware_covered
         flown = notch or design.notch
         self._tube = design.tube if flown == design.notch else None
+        self._shape = doubles(vector(self._tube.shape)) if self._tube else None
         self._notch = discretise(flown, design.period)
         self._integral_rate = integral_rate
         self._effectiveness = effectiveness
@@ -316,10 +317,10 @@ class TubeLaw(Controller):
         feedback, total, u, active = self._step(self.kernel, inputs)
         self._next = k + 1
         error, tube = (inputs.estimate - inputs.reference - inputs.deviation)[:N_RIGID], None
+        leaves_w = self.monitor is not None and self.monitor.leaves(inputs, error, u)
         if in_loop:
             error, tube = np.concatenate((error, filter_state - planned)), self._tube
-        tube_level = ellipsoid_level(tube.shape, error - tube.centre) if tube else math.nan
-        leaves_w = self.monitor is not None and self.monitor.leaves(inputs, u)
+        tube_level = lib.hsv_level(self._shape, len(error), doubles(error - tube.centre)) if tube else math.nan
         valid = math.isfinite(total[0]) and math.isfinite(total[1])
         inside = valid and tube_level <= 1.0
         if not valid:
@@ -335,8 +336,8 @@ class TubeLaw(Controller):
         elif leaves_w:
             status = TubeStatusCode.UNCERTIFIED_DISTURBANCE
         else:
-            fast = tube.too_fast(inputs.estimate[:2] - self._before, self.design.period)
-            status = TubeStatusCode.UNCERTIFIED_RATE if any(fast) else TubeStatusCode.OK
+            fast = len(tube.rates) and any(tube.too_fast(inputs.estimate[:2] - self._before, self.design.period))
+            status = TubeStatusCode.UNCERTIFIED_RATE if fast else TubeStatusCode.OK
         self._before = inputs.estimate[:2].copy()
         return TubeResult(
             input=u,

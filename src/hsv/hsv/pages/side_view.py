@@ -6,8 +6,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from hsv.pages.airframe.geometry import Airframe, Point, airframe
 
@@ -61,7 +59,10 @@ class Image:
 
     def __init__(self, shown: bool, elastic: bool) -> None:
         """Open a window if the image is ``shown``; a vehicle that is not ``elastic`` is drawn as a plain cone."""
+        # Imported here, as pages need the geometry only and matplotlib takes long to import.
         from matplotlib import pyplot
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
 
         self._geometry = geometry(plain=not elastic)
         self.figure = (pyplot.figure if shown else Figure)(figsize=(6.4, 4.0), dpi=100)
