@@ -30,8 +30,9 @@ from hsv.control.effectiveness import (
     effectiveness_in,
 )
 from hsv.control.hardware import HARDWARE_PARAMETERS, uncovered_hardware
+from hsv.control.nominal_law import ellipsoid_level
 from hsv.control.notch_filter import FLOWN_NOTCH_PARAMETERS, NotchSection, discretise, flown_sections
-from hsv.core import Struct, doubles, dtype, lib, records, vector
+from hsv.core import Struct, doubles, dtype, lib, records
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES
 from hsv.model.vehicle import COUPLING_PARAMETER
@@ -175,8 +176,7 @@ class DisturbanceMonitor:
     def __init__(self, design: ControlDesign, bounds: np.ndarray) -> None:
         """Watch flights of ``design``; ``bounds`` (2, 5) are the lower and upper ones of Delta, SI."""
         self._polytope, (self._lower, self._upper) = design.polytope.data(), bounds
-        self._expected, self._input = np.zeros(N_STATES), np.zeros(N_INPUTS)
-        self._pointers = [*map(doubles, (self._expected, self._input, np.zeros(N_STATES)))]
+        self._expected, self._no_defect = np.zeros(N_STATES), np.zeros(N_STATES)
         self.reset()
 
     def reset(self) -> None:
@@ -187,9 +187,8 @@ class DisturbanceMonitor:
         """Return whether the disturbance that led to ``error`` e (5) is outside W; predict the next e, with input u."""
         delta = error - self._expected[:N_RIGID]
         self._expected[:N_RIGID], self._expected[N_RIGID:] = error, 0.0
-        self._input[:] = u - inputs.reference_input - inputs.nominal_input
-        altitude, velocity = inputs.estimate[:2]
-        lib.hsv_nominal_advance(self._polytope.pointer, altitude, velocity, *self._pointers)
+        given = map(doubles, (self._expected, u - inputs.reference_input - inputs.nominal_input, self._no_defect))
+        lib.hsv_nominal_advance(self._polytope.pointer, *inputs.estimate[:2], *given)
         return bool(((delta < self._lower) | (delta > self._upper)).any())
 
 
@@ -233,7 +232,6 @@ class TubeLaw(Controller):
         self._hardware_covered = hardware_covered
         flown = notch or design.notch
         self._tube = design.tube if flown == design.notch else None
-        self._shape = doubles(vector(self._tube.shape)) if self._tube else None
         self._notch = discretise(flown, design.period)
         self._integral_rate = integral_rate
         self._effectiveness = effectiveness
@@ -320,7 +318,7 @@ class TubeLaw(Controller):
         leaves_w = self.monitor is not None and self.monitor.leaves(inputs, error, u)
         if in_loop:
             error, tube = np.concatenate((error, filter_state - planned)), self._tube
-        tube_level = lib.hsv_level(self._shape, len(error), doubles(error - tube.centre)) if tube else math.nan
+        tube_level = ellipsoid_level(tube.shape, error - tube.centre) if tube else math.nan
         valid = math.isfinite(total[0]) and math.isfinite(total[1])
         inside = valid and tube_level <= 1.0
         if not valid:
