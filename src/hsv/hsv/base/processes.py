@@ -9,7 +9,6 @@ import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from multiprocessing import resource_tracker
 from pathlib import Path
 from tempfile import mkdtemp
 from types import CodeType, FrameType
@@ -145,6 +144,8 @@ def ctrl_c_held_back() -> Iterator[None]:
     A pool of workers needs this because it cannot be closed if it is interrupted while it starts. After Ctrl-C,
     the code that started the pool must end its processes.
     """
+    from multiprocessing import resource_tracker  # imported here: most commands start no processes
+
     resource_tracker.ensure_running()  # its start would unblock SIGINT
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

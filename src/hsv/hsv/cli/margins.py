@@ -9,7 +9,6 @@ from typing import Annotated, Any
 from typer import Argument, Option
 
 from hsv.base.errors import HsvError, ParameterError, QuantityError, RunError
-from hsv.base.files import is_path
 from hsv.cli import output
 from hsv.cli.options import ForceOption, JsonOption, check_new, check_target, writing
 
@@ -31,10 +30,9 @@ def margins(
 
     Example: hsv margins case1_robust --corners; hsv margins baseline --out margins.html
     """
-    from hsv.certificate.checks import load_subject
+    from hsv.base.files import is_path
     from hsv.certificate.coverage import region_parameters
     from hsv.certificate.margins import CASES, design_loops
-    from hsv.control.design_file import find_design
     from hsv.flight.assembly import assemble_flight, flight_parameters
     from hsv.flight.margins import MarginResults, corner_file, flown_borders, scenario_loops
     from hsv.flight.scenario import load_scenario, scenario_names
@@ -52,7 +50,7 @@ def margins(
         vehicles = {"coupled vehicle": scenario_loops(scenario)}
         design, values = assemble_flight(scenario).controller.design, flight_parameters(scenario)  # type: ignore[attr-defined]
     else:
-        subject = _subject(name, find_design, load_subject)
+        subject = _subject(name)
         design, inputs = subject.design, subject.certificate["inputs"]
         vehicles = {f"{case} hardware": design_loops(design, subject.vehicle, inputs, case) for case in CASES}
         values = {**design.to_parameters(), **region_parameters(inputs, subject.vehicle)}
@@ -90,9 +88,13 @@ def margins(
         raise RunError("flown: a flight does not agree with the computed border")
 
 
-def _subject(name: str, find: Any, load: Any) -> Any:
+def _subject(name: str) -> Any:
+    from hsv.base.files import is_path
+    from hsv.certificate.checks import load_subject
+    from hsv.control.design_file import find_design
+
     try:
-        return load(find(name))
+        return load_subject(find_design(name))
     except HsvError as error:
         if is_path(name) or name.endswith(".yaml") or "expected" not in str(error):
             raise

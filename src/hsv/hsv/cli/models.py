@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Option
 
-from hsv.base.files import json_text
 from hsv.base.units import UnitSystem, significant
 from hsv.cli import output
 from hsv.cli.options import JsonOption, UnitsOption, check_target, writing
@@ -95,6 +94,8 @@ def linearise(
     if out:
         with writing(out, "out"):
             if out.suffix == ".json":
+                from hsv.base.files import json_text
+
                 out.write_text(json_text(described, indent=2) + "\n", encoding="utf-8")
             else:
                 shown.save(out)

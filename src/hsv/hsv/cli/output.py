@@ -18,7 +18,6 @@ from rich.table import Table
 from rich.text import Text
 
 from hsv.base.errors import messages, visible
-from hsv.base.files import json_text
 from hsv.base.units import UnitSystem, duration_in_words, in_system, significant, unit_in
 
 if TYPE_CHECKING:
@@ -102,6 +101,8 @@ def json_system(units: UnitSystem) -> UnitSystem:
 
 def print_json(values: Mapping[str, Any]) -> None:
     """Print ``values`` as JSON on standard output; numbers that are not finite become null."""
+    from hsv.base.files import json_text
+
     sys.stdout.write(json_text(values, indent=2) + "\n")
 
 
