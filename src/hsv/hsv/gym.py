@@ -435,7 +435,7 @@ class TrackVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         if seed is None or isinstance(seed, int | np.integer):
             seeds: list[int | None] = [None if seed is None else int(seed) + i for i in rows]
         else:
-            seeds = [*seed]
+            seeds = [*seed] if np.iterable(seed) else [seed]
         if len(seeds) != self.num_envs:
             raise ControllerError(f"seed: {len(seeds)} seeds, expected {self.num_envs}, one for each environment")
         for i in chosen:

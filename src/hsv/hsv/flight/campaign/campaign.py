@@ -15,7 +15,7 @@ from typing import Any, Self
 import numpy as np
 import tomli_w
 
-from hsv.base.errors import CampaignError, one_of, require
+from hsv.base.errors import CampaignError, ParameterError, one_of, require
 from hsv.base.files import parse_json
 from hsv.base.units import percent, rounded, written
 from hsv.control.design import design_of
@@ -290,9 +290,14 @@ def plan(
     table = scenario_table(text, name)
     if factors:
         for field, values in factors.items():
+            require("factors", field, str, "names of fields")
+            require(field, values, (list, tuple), "a pair of least and largest value, or a list of values")
             place = _PERTURBATION + field if field in COEFFICIENT_UNITS else field
             set_field(table, place, {"grid" if isinstance(values, list) else "uniform": list(values)}, name)
-        text = tomli_w.dumps(table)
+        try:
+            text = tomli_w.dumps(table)
+        except TypeError:
+            raise ParameterError(f"factors = {factors!r}: expected values as written in a scenario file") from None
     mean, drawn = scenario_at_means(table, name)
     found = _factors(mean, drawn, scale)
     grid = [len(factor.values) for factor in found if factor.values]
