@@ -1,6 +1,7 @@
 """The adjustable design: certificates for every factor, and designs that cannot be adjusted."""
 
 import dataclasses
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,11 @@ from hsv.base.errors import DesignError
 from hsv.certificate.coverage import region_parameters
 from hsv.design.adjustable import design_adjustable
 from hsv.design.certified import load_certified
-from hsv.design.disturbance import ChannelModel
 from hsv.design.error_system import error_system
-from hsv.design.inputs import read_inputs, with_tau
+from hsv.design.inputs import parse_inputs, read_inputs, with_tau
 from hsv.design.region import incomplete_share
 from hsv.flight.corners import corners
+from hsv.flight.disturbance import ChannelModel
 from hsv.model.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
@@ -87,3 +88,17 @@ def test_what_an_adjustable_design_cannot_be_is_refused_at_once(table, choice, m
     changed = inputs.model_copy(update={table: getattr(inputs, table).model_copy(update=choice)})
     with pytest.raises(DesignError, match=message):
         design_adjustable(changed)
+
+
+@pytest.mark.parametrize(
+    ("name", "table", "message"),
+    [
+        ("adjustable", {"elevator_deflection": "elevator_50"}, r"^actuator: given, expected none in an adjustable"),
+        ("baseline", {"elevator_deflection": "fuel_10"}, r"actuator\.elevator_deflection = 'fuel_10': expected one of"),
+        ("baseline", {"rudder": "elevator_50"}, r"actuator\.rudder: unknown field"),
+    ],
+)
+def test_wrong_actuators_are_named(name, table, message):
+    inputs = tomllib.loads((OFFLINE_DESIGN / f"{name}.toml").read_text(encoding="utf-8"))
+    with pytest.raises(DesignError, match=message):
+        parse_inputs(inputs | {"actuator": table})

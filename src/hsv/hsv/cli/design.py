@@ -156,9 +156,10 @@ def verify(
     """Recompute what a design and its certificate state, and name the first item that fails.
 
     Inequalities, sets and bounds are computed by other code than in the design. Vehicle, linearisation, trim,
-    actuators, notch filter, flights and their corners are the same code, which has tests of its own. The flights that
-    measure W are flown again, and others are drawn: the seed is printed, and --seed repeats it. Fields that no check
-    recomputes are counted, with --verbose listed, and unknown fields are refused. A design for a share of W fails.
+    actuators, notch filter, flights, their disturbances and corners are the same code, with tests of its own. The
+    flights that measure W are flown again, and others are drawn: the seed is printed, and --seed repeats it. Fields
+    that no check recomputes are counted, with --verbose listed, and unknown fields are refused. A design for a share
+    of W fails.
 
     Example: hsv verify baseline --seed 1; hsv verify robust --quick --corners;
     hsv verify baseline --scenario case1_qp

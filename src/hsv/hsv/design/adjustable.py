@@ -29,7 +29,7 @@ from hsv.design.baseline import (
     nominal_report,
     with_family,
 )
-from hsv.design.disturbance import ChannelModel, DisturbanceSet
+from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import error_system
 from hsv.design.feedback import CommonLyapunov, common_lyapunov
 from hsv.design.full_state import full_state_report
@@ -39,6 +39,7 @@ from hsv.design.sets.invariant_set import InvariantSet
 from hsv.design.tightening import TightenedInputs, tighten
 from hsv.design.tube import MeasuredSet, Tube, design_tube, flights_in_tube, flights_report, measured_set
 from hsv.design.tube_problem import tube_problem
+from hsv.flight.disturbance import ChannelModel
 from hsv.lmi.nominal_gain import nominal_gain
 from hsv.lmi.semidefinite import BOUND_DIGITS, rounded_to_size
 from hsv.model.signals import N_RIGID

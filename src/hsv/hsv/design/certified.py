@@ -13,16 +13,12 @@ import numpy as np
 
 from hsv.certificate.checks import Subject, load_subject
 from hsv.control.design import ControlDesign
-from hsv.design.disturbance import (
-    ChannelModel,
-    DisturbanceSet,
-    scheduled,
-    widened,
-)
+from hsv.design.disturbance import DisturbanceSet, widened
 from hsv.design.inputs import CertifiedInputs, inputs_from_report
 from hsv.design.region import Region, incomplete_share, measure
 from hsv.design.sets.invariant_set import InvariantSet
 from hsv.design.tube_problem import tube_problem
+from hsv.flight.disturbance import ChannelModel, scheduled
 from hsv.flight.flight import Flight
 from hsv.model.lpv.actuated import respond, sampled_actuators
 from hsv.model.lpv.linearisation import acceleration_channels

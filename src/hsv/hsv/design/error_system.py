@@ -13,7 +13,7 @@ The error system also includes the actuators of the design, with e_a = a - a_n. 
 actuators driven by the plan u_n + u_r. Then e_a(k+1) = A_a e_a + B_a (F e + lost elevator), and the positions act on e.
 The input of the nominal model is the plan itself, without actuators. The lag, the difference between the response to
 the plan and the plan, therefore drives e as well. It depends on the plan only, and its effect in the closed loop is
-computed separately, by :func:`hsv.flight.responses.lag_response`. The tube error is e minus this effect.
+computed separately, by :meth:`hsv.flight.disturbance.ChannelModel.lag`. The tube error is e minus this effect.
 """
 
 from __future__ import annotations
@@ -25,9 +25,8 @@ import numpy as np
 
 from hsv.control.notch_filter import with_notch
 from hsv.core import Struct
-from hsv.flight.responses import along_filter
 from hsv.model.actuators import ActuatorSet
-from hsv.model.lpv.actuated import actuator_names, respond, sampled_actuators
+from hsv.model.lpv.actuated import actuator_names, sampled_actuators
 from hsv.model.signals import N_RIGID, PITCH_RATE, STATE_NAMES
 
 
@@ -114,30 +113,3 @@ def union(first: ErrorSystem, *others: ErrorSystem) -> ErrorSystem:
     systems = (first, *others)
     A, B, G = (np.concatenate([getattr(s, name) for s in systems]) for name in ("A", "B", "G"))
     return replace(first, A=A, B=B, G=G)
-
-
-def tube_errors(
-    state: np.ndarray,
-    deviation: np.ndarray,
-    reference: np.ndarray,
-    notch: Struct,
-    actuators: Struct | None = None,
-    beyond_plan: np.ndarray | None = None,
-) -> np.ndarray:
-    """Return the error e (k, n) of a flight: rigid states, then states of the filter and of the design's actuators.
-
-    Filter and actuators are linear, so their errors are their responses to the errors of their inputs.
-
-    Args:
-        state: (k, 9) x at every step, from the first.
-        deviation: (k, 9) x_n.
-        reference: (k, 9) x_r.
-        notch: The notch filter in discrete time.
-        actuators: Sampled actuators, without their limits; None: ideal ones, without states.
-        beyond_plan: (k, 2) input of the actuators, after the fault, minus the plan u_n + u_r; None: ideal actuators.
-    """
-    rigid = (state - deviation - reference)[:, :N_RIGID]
-    errors = [rigid, along_filter(notch, rigid[:, PITCH_RATE])[1]]
-    if actuators is not None and beyond_plan is not None:
-        errors.append(respond(actuators, beyond_plan)[0])
-    return np.hstack(errors)

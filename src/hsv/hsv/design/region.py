@@ -19,11 +19,12 @@ import numpy as np
 from hsv.base.errors import DesignError
 from hsv.certificate.coverage import region_parameters
 from hsv.control.design import ControlDesign
-from hsv.design.disturbance import ChannelModel, Extremes
+from hsv.design.disturbance import Extremes
 from hsv.design.inputs import CertifiedInputs
 from hsv.flight.assembly import assemble_with
 from hsv.flight.closed_loop import fly
 from hsv.flight.corners import Corner, corners, fraction, screening_corners
+from hsv.flight.disturbance import ChannelModel
 from hsv.flight.flight import Flight
 from hsv.flight.side_by_side import fly_perturbed
 from hsv.model.plant import FlightStatus
@@ -112,7 +113,7 @@ def measure(
     """Simulate the flights of the corners ``over``; return the extremes of the disturbances (paper eq. 17, eq. 19)."""
 
     def job(flight: Flight) -> list[np.ndarray]:
-        parts = model.signals(flight).channels, model.errors(flight)[1]
+        parts = model.channels(flight), model.errors(flight)[1]
         return [extreme for part in parts for extreme in (part.min(axis=0), part.max(axis=0))]
 
     columns = [np.stack(column) for column in zip(*region.map(job, over, progress), strict=True)]

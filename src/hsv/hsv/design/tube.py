@@ -11,7 +11,7 @@ import numpy as np
 from hsv.base.errors import DesignError
 from hsv.base.processes import Progress
 from hsv.control.design import ControlDesign, PlanBounds
-from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership, widened
+from hsv.design.disturbance import DisturbanceSet, widened
 from hsv.design.inputs import DesignInputs, InvariantSetInputs
 from hsv.design.region import Region, RegionResult, incomplete_share, measure
 from hsv.design.sets.counter_example import counter_examples
@@ -19,9 +19,9 @@ from hsv.design.sets.invariant_set import InvariantSet, ellipsoid
 from hsv.design.sets.star_norms import star_norms
 from hsv.design.tightening import TightenedInputs, check_plan, plan_bounds, tighten
 from hsv.design.tube_problem import TubeProblem, tube_problem
+from hsv.flight.disturbance import ChannelModel, Membership, membership, plan_extremes
 from hsv.flight.flight import Flight
 from hsv.flight.random_sequences import random_sequences
-from hsv.model.signals import PITCH_RATE
 
 SEQUENCES, STEPS, SEED = 100_000, 600, 1
 """Number of random sequences that test the set, their steps and their seed."""
@@ -182,14 +182,9 @@ class FlightEvidence:
 
 def flight_evidence(flight: Flight, found: InvariantSet, model: ChannelModel) -> FlightEvidence:
     """Return the evidence of ``flight`` for the invariant set ``found``; ``model`` computes its disturbances."""
-    (errors, _), plan = model.errors(flight), flight.plan
-    pitch_acceleration = np.diff(flight.history.deviation[:, PITCH_RATE]) / flight.period
-    return FlightEvidence(
-        level=float(found.levels(errors).max()),
-        membership=found.problem.disturbance.membership(model.signals(flight).channels),
-        lowest=np.append(plan.min(axis=0), pitch_acceleration.min()),
-        highest=np.append(plan.max(axis=0), pitch_acceleration.max()),
-    )
+    level, bounds = float(found.levels(model.errors(flight)[0]).max()), found.problem.disturbance
+    inside = membership(model.channels(flight), bounds.lower, bounds.upper)
+    return FlightEvidence(level, inside, *plan_extremes(flight))
 
 
 def flights_report(flown: list[FlightEvidence]) -> dict[str, Any]:
@@ -204,7 +199,7 @@ def membership_report(flown: list[FlightEvidence]) -> dict[str, Any]:
     worst = int(np.argmax([f.membership.ratio for f in flown]))
     at = flown[worst].membership
     return {
-        "outside": sum(not f.membership.inside for f in flown),
+        "outside": sum(f.membership.ratio > 1.0 for f in flown),
         "worst_ratio": at.ratio,
         "worst_ratio_flight": worst,
         "channel": at.channel,

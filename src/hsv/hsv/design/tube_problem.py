@@ -8,8 +8,9 @@ import numpy as np
 
 from hsv.certificate.verification import extreme_factors
 from hsv.control.design import ControlDesign
-from hsv.design.disturbance import ChannelModel, DisturbanceSet
+from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import ErrorSystem, error_system, union
+from hsv.flight.disturbance import ChannelModel
 from hsv.model.signals import CHANNELS, N_RIGID
 from hsv.model.vehicle import Vehicle
 

@@ -1,7 +1,7 @@
 """Verification of a design by flights and random sequences; :mod:`hsv.certificate.verification` has the other checks.
 
-Nothing here uses the code that computes designs. The core simulates the flights. The disturbances of a flight are the
-part of its motion that the polytopic model does not explain, eq. 13 to 19.
+Nothing here uses the code that computes designs. The core simulates the flights, and :mod:`hsv.flight.disturbance`
+takes their disturbances apart.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -41,34 +41,23 @@ from hsv.certificate.verification import (
     lag_feedback,
 )
 from hsv.control.design import ControlDesign
-from hsv.control.notch_filter import discretise
 from hsv.flight.assembly import assemble_flight, assemble_with
 from hsv.flight.closed_loop import Components, fly
 from hsv.flight.corners import Corner, Drawn, corners, drawn_flights, fraction
+from hsv.flight.disturbance import ChannelModel, membership, plan_extremes
 from hsv.flight.flight import Flight
 from hsv.flight.random_sequences import random_sequences
-from hsv.flight.responses import along_filter, lag_response
 from hsv.flight.scenario import Scenario
 from hsv.flight.side_by_side import fly_each, fly_perturbed
 from hsv.model.faults.injector import FaultInjector
 from hsv.model.faults.schedule import ScheduledFault
 from hsv.model.faults.table import Fault
-from hsv.model.lpv.actuated import respond, sampled_actuators
-from hsv.model.lpv.linearisation import acceleration_channels
-from hsv.model.lpv.polytope import evaluate
 from hsv.model.plant import FlightStatus
 from hsv.model.signals import (
-    ACCELERATED,
-    CHANNELS,
     INPUT_NAMES,
-    N_INPUTS,
     N_RIGID,
-    N_STATES,
-    PITCH_RATE,
-    REMAINING,
     STATE_NAMES,
 )
-from hsv.model.trim import trim
 
 DRAWN = 192
 """Number of flights that are drawn from a design's region by default."""
@@ -86,70 +75,13 @@ def region(subject: Subject, design: ControlDesign, share: float) -> Components:
     return assemble_with(design, declared)
 
 
-class Disturbances(NamedTuple):
-    """Disturbances, tube error, and the feedback's response to the actuators' lag in a flight; one row per step, SI.
-
-    ``channels``, shape (n, 7), are the disturbances in the order of :data:`~hsv.model.signals.CHANNELS`.
-    ``error``, shape (n + 1, states), is the tube error e, less its response to the lag of the actuators behind the
-    plan u_r + u_n. ``lag``, shape (n + 1, 2), is the response of the feedback to this lag, 0 without actuators.
-    """
-
-    channels: np.ndarray
-    error: np.ndarray
-    lag: np.ndarray
-
-
-def disturbances(subject: Subject, flight: Flight) -> Disturbances:
-    """Return the disturbances in a flight (eq. 13 to 18), its tube error (eq. 22) and the response to actuator lag.
-
-    The disturbance is Delta(k) = x(k+1) - [x_r(k+1) + d_r(k)] - A(p) (x - x_r) - B(p) (u - u_r), where p is the
-    altitude and velocity of step k. One channel is the lost elevator deflection (actuator input minus command); Delta
-    contains it times the elevator's column of B(p). The rigid part of the rest is expressed by three accelerations,
-    constant over a period, and two residuals, of altitude and pitch angle. With actuators, u and the contribution of
-    the lost deflection to Delta are computed from mean positions over a period. The remaining channel is not part of
-    Delta: the change of the nominal pitch rate by the notch filter, 0 if the design filters that rate.
-    """
-    design, vehicle, h = subject.design, subject.vehicle, flight.history
-    notch, plan = discretise(design.notch, design.period), flight.plan
-    lost = np.zeros_like(h.command)
-    lost[:, 1] = (h.actuator - h.command)[:, 1]
-    acting, through = h.command, lost
-    if design.actuators:
-        actuators = sampled_actuators(design.actuator_sets, design.period)
-        at_rest = trim(vehicle.decoupled, h.state[0, 0], h.state[0, 1]).input
-        acting, through = at_rest + respond(actuators, h.command - at_rest)[1], respond(actuators, lost)[1]
-    polytope = design.polytope
-    S = np.concatenate((polytope.A, polytope.B), axis=2)
-    at = evaluate(polytope.altitude, h.state[:-1, 0]), evaluate(polytope.velocity, h.state[:-1, 1])
-    weights = (at[0][:, :, None] * at[1][:, None, :]).reshape(len(at[0]), -1)
-    S = (weights @ S.reshape(len(S), -1)).reshape(-1, N_STATES, N_STATES + N_INPUTS)
-    moved = np.hstack((h.state - flight.reference, acting - flight.reference_input))[:-1]
-    delta = h.state[1:] - flight.reference[1:] - flight.defect[:-1] - np.einsum("kij,kj->ki", S, moved)
-    rest = delta - S[:, :, -1] * through[:-1, 1:]
-    columns, rate = acceleration_channels(vehicle, design.period), (h.deviation + flight.reference)[:-1, PITCH_RATE]
-    channels = np.zeros((len(rest), len(CHANNELS)))
-    channels[:, :3] = np.linalg.solve(columns[ACCELERATED], rest[:, ACCELERATED].T).T
-    channels[:, 3] = lost[:-1, 1]
-    channels[:, 4] = 0.0 if design.filtered else along_filter(notch, rate)[0] - rate
-    channels[:, 5:] = rest[:, REMAINING] - channels[:, :3] @ columns[REMAINING].T
-    rigid = (h.state - h.deviation - flight.reference)[:, :N_RIGID]
-    error = np.hstack((rigid, along_filter(notch, rigid[:, PITCH_RATE])[1]))
-    if not design.actuators:
-        return Disturbances(channels, error, np.zeros_like(h.command))
-    error = np.hstack((error, respond(actuators, h.actuator - plan)[0]))
-    late = at_rest + respond(actuators, plan - at_rest)[1] - plan
-    gain = design.feedback_gain[:, :N_RIGID] * design.tau
-    moved_by_lag, lag = lag_response(polytope, gain, notch, actuators, h.state[:, :2], late)
-    return Disturbances(channels, error - moved_by_lag, lag)
-
-
 @dataclass(frozen=True)
 class Evidence:
     """Extremes of a flight: largest ``level`` in the tube, and largest ``ratio`` of a disturbance to its bound.
 
     The largest ratio occurs in ``channel`` at ``step``. ``lowest`` and ``highest``, shape (3,), are the extremes of the
     two inputs u_r + u_n and of the nominal pitch acceleration (rad/s^2). ``lag``, shape (2, 2), and ``channels``, shape
-    (2, 7), have the minima (row 0) and maxima (row 1) of the two fields of :class:`Disturbances` with these names.
+    (2, 7), have minima (row 0) and maxima (row 1) of the feedback due to the actuators' lag, and of the disturbances.
     ``moved``, shape (2,), is the largest change of altitude (m) and velocity (m/s) in a step. ``outputs``, shape (7,),
     are the largest distances of the errors and of the feedback (:attr:`Tube.rows`) from the centre of the set.
     """
@@ -166,7 +98,7 @@ class Evidence:
     outputs: np.ndarray
 
 
-def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
+def evidence(model: ChannelModel, tube: Tube, flight: Flight) -> Evidence:
     """Return the extremes of ``flight`` that are compared with the ``tube``.
 
     Raises:
@@ -175,22 +107,14 @@ def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
     h = flight.history
     if flight.status is not FlightStatus.FINISHED or np.any(h.command != h.u_unsaturated):
         raise DesignError(f"flight: {flight.status.name}, expected FINISHED, no input limited")
-    found = disturbances(subject, flight)
-    bounds = np.where(found.channels > 0.0, tube.upper, tube.lower)
-    ratios = np.where(found.channels == 0.0, 0.0, np.inf)
-    np.divide(found.channels, bounds, out=ratios, where=bounds != 0.0)
-    step, channel = np.unravel_index(int(np.argmax(ratios)), ratios.shape)
-    plan = flight.plan
-    turning, v = np.diff(h.deviation[:, PITCH_RATE]) / flight.period, found.error - tube.c
+    channels, (error, lag) = model.channels(flight), model.errors(flight)
+    v, bound = error - tube.c, membership(channels, tube.lower, tube.upper)
     return Evidence(
         float(ellipsoid_levels(tube.Q, v).max()),
-        float(ratios[step, channel]),
-        CHANNELS[channel].name,
-        int(step),
-        np.append(plan.min(axis=0), turning.min()),
-        np.append(plan.max(axis=0), turning.max()),
-        np.stack((found.lag.min(axis=0), found.lag.max(axis=0))),
-        np.stack((found.channels.min(axis=0), found.channels.max(axis=0))),
+        *bound,
+        *plan_extremes(flight),
+        np.stack((lag.min(axis=0), lag.max(axis=0))),
+        np.stack((channels.min(axis=0), channels.max(axis=0))),
         np.abs(np.diff(h.state[:, :2], axis=0)).max(axis=0),
         np.abs(v @ tube.rows.T).max(axis=0),
     )
@@ -209,13 +133,13 @@ def flight_checks(subject: Subject, seed: int, number: int = DRAWN) -> Checks:
     """
     subject = replace(subject, design=replace(subject.design, tau=subject.design.tau_minimum))  # in flight: any tau
     inputs, vehicle, tube = subject.certificate["inputs"], subject.vehicle, Tube(subject, subject.design, "tube")
-    share, declared = share_of(inputs), inputs["disturbance"]
+    share, declared, model = share_of(inputs), inputs["disturbance"], ChannelModel(subject.design, vehicle)
     parts, seen = region(subject, subject.design, share), fraction(vehicle.uncertainty, share)
     everyone = corners(vehicle.uncertainty, share)
     yield from _statements(subject, len(seen), len(everyone), parts)
 
     def show(_: object, flight: Flight) -> Evidence:
-        return evidence(subject, tube, flight)
+        return evidence(model, tube, flight)
 
     stated, plan = subject.stated("tube.flights"), subject.stated("tube.tightening.plan")
     sides = [*plan["lowest_flight"], *plan["highest_flight"]]
@@ -355,8 +279,9 @@ def scenario_checks(
     if scenario.controller != "tube_mpc":
         raise DesignError(f"scenario {name!r}: controller = {scenario.controller!r}, expected 'tube_mpc'")
     parts, tube, flown = assemble_flight(scenario, subject.design), Tube(subject, subject.design, "tube"), []
+    model = ChannelModel(subject.design, subject.vehicle)
     for corner in over:
-        flown.append(evidence(subject, tube, fly(parts.perturbed(corner))))
+        flown.append(evidence(model, tube, fly(parts.perturbed(corner))))
         progress("flights", len(flown), len(over))
     yield at_most(f"{name}: level in the set", max(f.level for f in flown), 1.0)
     worst, share = max(flown, key=lambda f: f.ratio), share_of(subject.certificate["inputs"])

@@ -22,11 +22,12 @@ from hsv.control.design_file import find_design, read_parameters
 from hsv.control.nominal_law import FamilyLaw
 from hsv.control.nominal_trajectory import nominal_data
 from hsv.control.notch_filter import NotchSection, discretise, flown_sections, notch_response
-from hsv.design.disturbance import ChannelModel, DisturbanceSet
+from hsv.design.disturbance import DisturbanceSet
 from hsv.design.tube import invariant_set
 from hsv.design.tube_problem import tube_problem
 from hsv.flight.assembly import assemble, flight_parameters
 from hsv.flight.corners import Corner, fraction
+from hsv.flight.disturbance import ChannelModel
 from hsv.flight.flight import Flight
 from hsv.flight.scenario import load_scenario
 from hsv.flight.side_by_side import fly_perturbed
@@ -370,7 +371,7 @@ def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.
     )
 
     def largest(corner: Corner, flight: Flight) -> np.ndarray:
-        return np.asarray(np.abs(model.signals(flight).channels).max(axis=0))
+        return np.asarray(np.abs(model.channels(flight)).max(axis=0))
 
     rows = np.array(fly_perturbed(assemble(values), over, largest))
     return {channel.name: column for channel, column in zip(CHANNELS, rows.T, strict=True)}

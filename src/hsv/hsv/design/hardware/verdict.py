@@ -20,13 +20,14 @@ from hsv.base.processes import Progress
 from hsv.base.units import UnitSystem, in_system, quantity_text
 from hsv.control.design import ControlDesign
 from hsv.design.certified import CertifiedDesign, Plan
-from hsv.design.disturbance import ChannelModel, widened
+from hsv.design.disturbance import widened
 from hsv.design.hardware.models import N_SCHEDULING, Measured, Model, with_models
 from hsv.design.region import Region, incomplete_share
 from hsv.design.sets.invariant_set import InvariantSet
 from hsv.design.tightening import left_by
 from hsv.design.tube import invariant_set
 from hsv.design.tube_problem import tube_problem
+from hsv.flight.disturbance import ChannelModel
 from hsv.model.actuators import ACTUATOR_SETS, IDEAL, SUBSTEPS
 from hsv.model.lpv.actuated import actuator_names, actuator_system
 from hsv.model.lpv.linearisation import zero_order_hold
