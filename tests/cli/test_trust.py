@@ -189,7 +189,6 @@ READERS = {
     "report": "{bag} --out report.html",
     "plot": "{bag} --out plot.png",
     "info": "{bag}",
-    "view": "{bag} --with rerun",
     "replay": "{bag} --scenario own.toml",
     "diff": "{bag} {bag}",
     "export": "{bag} --csv --out tables",

@@ -231,7 +231,7 @@ def export(
     csv: Annotated[bool, Option("--csv", help="A folder of CSV files, one per topic.")] = False,
     parquet: Annotated[bool, Option("--parquet", help="A folder of Parquet files, one per topic.")] = False,
     npz: Annotated[bool, Option("--npz", help="One .npz file.")] = False,
-    scene: Annotated[bool, Option("--scene", help="A copy of the bag with the vehicle in 3-D, for Foxglove.")] = False,
+    scene: Annotated[bool, Option("--scene", help="A copy of the bag with the vehicle in 3-D, and a layout.")] = False,
     exaggeration: Annotated[float | None, Option(help="Factor on the bending in the scene.")] = None,
     topic: Annotated[
         list[str] | None, Option(help="Topic to export, repeatable; default: all with a message per step.")
@@ -241,7 +241,8 @@ def export(
 ) -> None:
     """Write the topics of a bag as tables with field names and units (SI), or a copy of the bag with a 3-D scene.
 
-    A mat file is for MATLAB and Octave: a structure per topic, with the units in its field "units".
+    Foxglove and Lichtblick open the copy; import the layout there, which has the topic names of the bag. A mat file is
+    for MATLAB and Octave: a structure per topic, with the units in its field "units".
 
     Example: hsv export bags/case1_20260101T000000Z --format mat --topic /hsv/state
     """
@@ -269,8 +270,7 @@ def export(
         if exaggeration is not None and not 0.0 <= exaggeration <= most:
             raise ParameterError(f"exaggeration = {exaggeration:g}: expected a number from 0 to {most:g}")
         out = out or scene_path(opened)
-        write_scene(opened, out, exaggeration)
-        written = [out]
+        written = [out, write_scene(opened, out, exaggeration)]
     else:
         if exaggeration is not None:
             raise ParameterError("exaggeration: expected with --scene, tables hold what was recorded")

@@ -14,7 +14,7 @@ TREE = (
     ("Fly", "hsv.cli.fly", "run simulate"),
     ("Fly", "hsv.cli.campaigns", "montecarlo resilience"),
     ("Fly", "hsv.cli.search", "worst rare"),
-    ("Look at flights", "hsv.cli.look", "report plot info view"),
+    ("Look at flights", "hsv.cli.look", "report plot info"),
     ("Look at flights", "hsv.cli.compare", "compare"),
     ("In flight", "hsv.cli.in_flight", "fault set command watch topic"),
     ("Bags", "hsv.cli.bags", "replay diff export recover play"),

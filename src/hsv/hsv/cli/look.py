@@ -1,9 +1,8 @@
-"""Commands that look at recorded flights: report, plots, contents, and viewers."""
+"""Commands that look at recorded flights: report, plots, contents."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,7 +12,6 @@ from typer import Argument, Option
 from hsv.base.units import UnitSystem, quantity_text, significant
 from hsv.cli import output
 from hsv.cli.options import (
-    BagArgument,
     JsonOption,
     SuppliedDesignOption,
     SuppliedScenarioOption,
@@ -28,15 +26,6 @@ if TYPE_CHECKING:
 
 SHOWN_EXCURSIONS = 5
 """Maximum number of excursions from the tube that are listed one by one."""
-
-
-class Program(StrEnum):
-    """Viewers from which the user can choose."""
-
-    foxglove = "foxglove"
-    lichtblick = "lichtblick"
-    plotjuggler = "plotjuggler"
-    rerun = "rerun"
 
 
 def report(
@@ -110,51 +99,6 @@ def plot(
         save_figure(flight_figure(flights, units, remarks, layout), out)
     output.print_written([out], json)
     output.print_bag_warnings(*opened)
-
-
-def view(
-    bag: BagArgument,
-    program: Annotated[Program | None, Option("--with", help="Viewer; default: the first installed.")] = None,
-    json: JsonOption = False,
-) -> None:
-    """Open a bag in Foxglove, Lichtblick, PlotJuggler or Rerun, whichever is installed.
-
-    Foxglove and Lichtblick show the vehicle in 3-D: they open a copy with a 3-D scene, in the folder scene of the bag.
-
-    Example: hsv view bags/case1_20260101T000000Z --with plotjuggler
-    """
-    import subprocess
-
-    from hsv.bags.reader import Bag
-    from hsv.base.errors import RecordingError
-    from hsv.pages.airframe.scene_file import scene_of
-    from hsv.pages.viewers import VIEWERS, layout_for
-
-    opened = Bag(bag)
-    if len(opened.files) != 1 or opened.path.suffix != ".mcap":
-        raise RecordingError(
-            f"{opened.path}: viewers open one MCAP file, expected a bag that is neither split nor compressed by rosbag2"
-        )
-    mcap = opened.path.absolute()
-    tried = [VIEWERS[program]] if program else list(VIEWERS.values())
-    viewer = next((viewer for viewer in tried if viewer.program()), None)
-    if viewer is None:
-        sources = "; ".join(f"{viewer.name}: {viewer.source}" for viewer in tried)
-        raise RecordingError(
-            f"{mcap}: no viewer is installed, expected one of these ({sources}); "
-            f"or drop the file into a browser at https://app.foxglove.dev and import "
-            f"{layout_for(opened)} there, or use: hsv report {bag}"
-        )
-    layout = str(layout_for(opened)) if viewer.scene else None
-    if viewer.scene:
-        mcap = scene_of(opened).absolute()
-    command = [str(viewer.program()), *viewer.options, str(mcap)]
-    subprocess.Popen(command, start_new_session=True, stdin=subprocess.DEVNULL)
-    if json:
-        output.print_json({"path": str(mcap), "viewer": viewer.name, "command": command, "layout_to_import": layout})
-    else:
-        output.say(f"opening {mcap} with {viewer.name}", *([f"layout to import there: {layout}"] if layout else []))
-    output.print_bag_warnings(opened)
 
 
 def info(

@@ -18,6 +18,7 @@ from hsv.base.errors import RecordingError
 from hsv.model.signals import INPUT_NAMES, N_RIGID, STATE_NAMES
 from hsv.pages.airframe.pose import Sample
 from hsv.pages.airframe.scene import RATE, SCENE_TOPIC, TRANSFORMS_TOPIC, frame_transforms, scene
+from hsv.pages.layouts import foxglove_layout
 
 Message = tuple[int, str, bytes]
 """Time (ns), topic and data."""
@@ -28,22 +29,14 @@ def scene_path(bag: Bag) -> Path:
     return bag.folder / "scene" / f"{bag.path.stem}_scene.mcap"
 
 
-def scene_of(bag: Bag) -> Path:
-    """Return the viewer file of ``bag``; write it if it is missing or older than the bag."""
-    target = scene_path(bag)
-    if not target.is_file() or target.stat().st_mtime < bag.path.stat().st_mtime:
-        target.unlink(missing_ok=True)
-        write_scene(bag, target)
-    return target
-
-
-def write_scene(bag: Bag, target: Path, exaggeration: float | None = None) -> None:
+def write_scene(bag: Bag, target: Path, exaggeration: float | None = None) -> Path:
     """Write ``target`` with the messages and attachments of ``bag``, and the vehicle as a Foxglove scene with frames.
 
-    ``exaggeration`` is the factor on the bending; default: the value of the airframe. A RecordingError says that the
-    bag holds no flight, or that the file exists or cannot be written.
+    Write next to it, and return, the layout to import, ``layout_foxglove.json``. ``exaggeration`` is the factor on the
+    bending; default: the value of the airframe. A RecordingError says that the bag holds no flight, or that the file
+    exists or cannot be written.
     """
-    pictures = _pictures(bag, exaggeration)
+    pictures, layout = _pictures(bag, exaggeration), target.with_name("layout_foxglove.json")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with target.open("xb") as stream:
@@ -58,10 +51,12 @@ def write_scene(bag: Bag, target: Path, exaggeration: float | None = None) -> No
             if bag.custom_data:
                 writer.add_metadata(CUSTOM_DATA, bag.custom_data)
             writer.finish()
+        layout.write_text(foxglove_layout(bag.name_of), encoding="utf-8")
     except FileExistsError:
         raise RecordingError(f"out = {str(target)!r}: exists already, expected a new file") from None
     except OSError as error:
         raise RecordingError(f"{target}: cannot be written: {error.strerror}, expected an MCAP file to write") from None
+    return layout
 
 
 def _channels(writer: Writer, bag: Bag) -> dict[str, int]:
