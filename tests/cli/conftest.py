@@ -1,7 +1,7 @@
 import pytest
 from ran import Ran
 
-from hsv.cli.entry import COMMANDS, DESCRIPTION, MOVED
+from hsv.cli.entry import COMMANDS, DESCRIPTION
 from hsv.cli.main import run as run_command_line
 
 
@@ -13,7 +13,7 @@ def hsv(monkeypatch, capsys, tmp_path):
     def run(*words):
         monkeypatch.setattr("sys.argv", ["hsv", *words])
         with pytest.raises(SystemExit) as caught:
-            run_command_line("hsv", COMMANDS, DESCRIPTION, MOVED)
+            run_command_line("hsv", COMMANDS, DESCRIPTION)
         captured = capsys.readouterr()
         code = caught.value.code
         return Ran(captured.out, captured.err, 0 if code is None else int(code))

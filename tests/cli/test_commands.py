@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hsv.base.units import PAPER_UNITS
-from hsv.cli.entry import COMMANDS, MOVED, TREE
+from hsv.cli.entry import COMMANDS, TREE
 from hsv.cli.main import EXIT_CODES
 from hsv.cli.output import print_json, unit_key
 from hsv.control.design_file import find_design
@@ -57,14 +57,6 @@ def test_the_list_of_commands_is_the_answer_to_no_command(hsv):
     listed = re.findall(r"^│ ([a-z]\S+) {2,}", ran.out, re.MULTILINE)
     assert sorted(listed) == sorted(VISIBLE)
     assert all(f"─ {panel} ─" in ran.out for panel, _, _ in TREE if panel)
-
-
-@pytest.mark.parametrize("old", MOVED)
-def test_an_old_name_is_answered_in_one_line_with_the_new_one(hsv, old):
-    ran = hsv(old, "case1", "--json")
-    assert ran.code == 2 and ran.out == ""
-    assert ran.error == f"hsv {old} {MOVED[old]}"
-    assert {*re.findall(r"hsv (\S+)", MOVED[old])} <= {*COMMANDS}
 
 
 def test_trim_and_linearise_of_another_vehicle_are_inside_its_envelope(hsv):

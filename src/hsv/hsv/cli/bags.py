@@ -262,7 +262,7 @@ def export(
     opened = Bag(bag)
     if scene:
         from hsv.pages.airframe.geometry import airframe
-        from hsv.pages.airframe.scene_file import scene_path, write_scene
+        from hsv.pages.scene_file import scene_path, write_scene
 
         if topic:
             raise ParameterError("topic: expected with a table, --scene holds every topic")

@@ -38,18 +38,6 @@ class Command(NamedTuple):
 
 COMMANDS = {name: Command(module, panel) for panel, module, names in TREE for name in names.split()}
 
-MOVED = {
-    "scenarios": "is called hsv list scenarios now, and --show NAME hsv list scenarios NAME",
-    "vehicles": "is called hsv list vehicles now, and --show NAME hsv list vehicles NAME",
-    "faults": "is called hsv list faults now",
-    "equipment": "is called hsv list equipment now",
-    "figures": "is called hsv-paper figures now",
-    "claims": "is called hsv-paper claims now",
-    "study": "is called hsv-paper sensitivity now",
-    "cluster": "is gone: start Dask workers on other hosts and use --scheduler, see docs/montecarlo.md",
-}
-"""Messages about commands that were renamed or removed, by old name."""
-
 
 def main() -> None:
     """Run the command line; Ctrl-C ends it with a message of one line, even while modules are loaded."""
@@ -58,7 +46,7 @@ def main() -> None:
         take_interrupts()
         from hsv.cli.main import run
 
-        run("hsv", COMMANDS, DESCRIPTION, MOVED)
+        run("hsv", COMMANDS, DESCRIPTION)
     except KeyboardInterrupt:
         print("hsv: error: interrupted", file=sys.stderr, flush=True)
         os._exit(130)

@@ -138,14 +138,13 @@ def options(
     """Declare the options that precede a command."""
 
 
-def run(prog: str, commands: Mapping[str, Command], description: str, moved: Mapping[str, str] | None = None) -> None:
+def run(prog: str, commands: Mapping[str, Command], description: str) -> None:
     """Run a command line and exit; bad input gives one line and exit code 2, a failed run exit code 1.
 
     Args:
         prog: Name of the command line.
         commands: Places of its commands by name.
         description: First sentence of its help.
-        moved: Messages about commands that were renamed or removed, by old name.
     """
     completing = f"_{prog.upper()}_COMPLETE" in os.environ
     if completing:
@@ -158,8 +157,6 @@ def run(prog: str, commands: Mapping[str, Command], description: str, moved: Map
         os.environ["HSV_TRACEBACK"] = "1"
     first = next((word for word in words if word != "--traceback"), "")
     try:
-        if first in (moved or {}):
-            raise QuantityError(f"{prog} {first} {(moved or {})[first]}")
         if first not in commands and not first.startswith("-"):
             hint = did_you_mean(first, [name for name, command in commands.items() if command.panel])
             raise QuantityError(f"command {first!r}: unknown{hint} (see {prog} --help)")

@@ -9,8 +9,8 @@ from recorded_flight import record_flight
 from hsv.pages.airframe.geometry import airframe
 from hsv.pages.airframe.pose import BODY, LEVEL, Sample, transforms
 from hsv.pages.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC, scene
-from hsv.pages.airframe.scene_file import write_scene
 from hsv.pages.airframe.solids import solids
+from hsv.pages.scene_file import write_scene
 
 ADDED = {SCENE_TOPIC, TRANSFORMS_TOPIC}
 
