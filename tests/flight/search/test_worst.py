@@ -15,8 +15,8 @@ from hsv.flight.campaign.sample_runner import SampleRunner
 from hsv.flight.campaign.summary import Results
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import parse_scenario
-from hsv.flight.search.rows import Rows, badness, check_goal
-from hsv.flight.search.worst import find_worst, least_budget, repeated
+from hsv.flight.search.rows import Rows, badness, check_goal, recorded
+from hsv.flight.search.worst import find_worst, least_budget, of_campaign
 
 FACTORS = [Factor(name=f"p{i}", unit="1", low=-1.0, high=1.0 + i) for i in range(6)]
 ANY_TIME = {"fault[0].start": ("0.5 s", "150 s")}
@@ -40,7 +40,7 @@ def in_memory(campaign):
 
 
 def found(campaign):
-    return find_worst(in_memory(campaign), campaign.factors, campaign.budget, campaign.seed)
+    return of_campaign(campaign, in_memory(campaign))
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -151,7 +151,7 @@ def test_an_interrupted_search_resumes_to_the_same_bytes_and_its_worst_flight_fl
 
     def run(out, executor):
         rows = Rows(out, campaign, executor, lambda done: None)
-        rows.run(lambda evaluate: find_worst(evaluate, campaign.factors, campaign.budget, campaign.seed))
+        rows.run(of_campaign)
         return rows
 
     assert run(tmp_path / "whole.parquet", Executor()).flown_now == 64
@@ -161,9 +161,9 @@ def test_an_interrupted_search_resumes_to_the_same_bytes_and_its_worst_flight_fl
     assert (tmp_path / "whole.parquet").read_bytes() == (tmp_path / "parts.parquet").read_bytes()
     assert run(tmp_path / "parts.parquet", Executor()).flown_now == 0
     with pytest.raises(CampaignError, match="holds another campaign"):
-        Rows(tmp_path / "parts.parquet", replace(campaign, budget=65), Executor(), print).run(lambda evaluate: None)
+        Rows(tmp_path / "parts.parquet", replace(campaign, budget=65), Executor(), print).run(of_campaign)
     results = Results(tmp_path / "whole.parquet")
-    worst = repeated(results)
+    worst = of_campaign(results.campaign, recorded(results))
     assert worst == found(campaign) and worst.badness == results.row(worst.flight)["tube_level"]
     alone = fly(assemble_flight(parse_scenario(results.file(worst.flight), "alone")))
     assert alone.fingerprint == results.row(worst.flight)["fingerprint"]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Option
 
@@ -25,15 +27,18 @@ from hsv.cli.options import JsonOption, ScenarioArgument, SetOption, UnitsOption
 if TYPE_CHECKING:
     from hsv.flight.campaign.campaign import Campaign
     from hsv.flight.campaign.summary import Results
+    from hsv.flight.search.worst import Worst
 
-GoalOption = Annotated[str, Option("--of", help="Requirement or metric; default: all requirements of the scenario.")]
+Search = Callable[[Any, Any], Any]
+Texts = list[str] | None
+
 SeedOption = Annotated[int, Option(help="Determines all random samples.")]
 OutOption = Annotated[Path | None, Option(help="Result file; default: campaigns/<scenario>_<command>_<goal>.parquet.")]
 
 
 def worst(
     scenario: ScenarioArgument = "case1",
-    goal: GoalOption = "",
+    goal: Annotated[str, Option("--of", help="Requirement or metric; default: all requirements.")] = "",
     budget: Annotated[int, Option(help="Largest number of flights.")] = 400,
     seed: SeedOption = 1,
     scale: ScaleOption = 1.0,
@@ -54,66 +59,28 @@ def worst(
 
     Example: hsv worst case1 --of post_fault_attitude_from_nominal --factor "fault[0].start=0.5 s..150 s"
     """
-    from hsv.flight.campaign.campaign import WORST, plan
-    from hsv.flight.campaign.executors import make_executor
-    from hsv.flight.campaign.summary import Results
-    from hsv.flight.search.rows import Rows
-    from hsv.flight.search.worst import find_worst, least_budget
-    from hsv.flight.tables import read_changes
+    from hsv.flight.campaign.campaign import WORST
+    from hsv.flight.search.worst import least_budget, of_campaign
 
-    changed, factors = read_changes(changes or ()), read_factors(factor or ())
-    planned = plan(scenario, samples=1, seed=seed, scale=scale, factors=factors, changes=changed)
-    campaign = _search(planned, WORST, goal, budget)
-    least = least_budget(campaign.factors)
-    if budget < least:
+    campaign = _planned(WORST, scenario, goal, budget, seed, scale, factor, changes)
+    if budget < (least := least_budget(campaign.factors)):
         raise CampaignError(f"budget = {budget}: expected at least {least} flights for {len(campaign.factors)} factors")
-    target = _target(out, campaign)
-    with output.resumable(target.with_name(target.name + ".parts")) as complete:
-        with (
-            make_executor(workers, scheduler, output.errors.print) as flying,
-            output.flights(campaign.scenario_name, budget) as progress,
-        ):
-            rows = Rows(target, campaign, flying, progress)
-            rows.run(lambda fly: find_worst(fly, campaign.factors, budget, seed), restart=restart)
-            complete(target)
-        _show_worst(Results(target, trust=True), units, json, page, rows.flown_now)
+    with _searched(campaign, of_campaign, out, workers, scheduler, restart) as (found, results, flown):
+        _show_worst(found, results, units, json, page, flown)
 
 
-def _search(planned: Campaign, method: str, goal: str, budget: int) -> Campaign:
-    """Return the campaign of a search; the number of its samples is known only at its end."""
-    from hsv.flight.search.rows import check_goal
-    from hsv.graph.preparation import commit
-
-    goal = check_goal(goal, planned.scenario)
-    for factor in planned.grid:
-        raise CampaignError(f"factor {factor.name}: a search has no grid, expected {factor.name}=LEAST..LARGEST")
-    return replace(planned, method=method, commit=commit(), goal=goal, budget=budget, samples=0)
-
-
-def _target(out: Path | None, campaign: Campaign) -> Path:
-    if out is not None:
-        check_target(out, "out", ".parquet")
-        return out
-    target = Path("campaigns", f"{campaign.scenario_name}_{campaign.method}_{campaign.goal}.parquet")
-    check_folder(target.parent, "out")
-    return target
-
-
-def _show_worst(results: Results, units: UnitSystem, json: bool, page: bool, flown: int) -> None:
+def _show_worst(found: Worst, results: Results, units: UnitSystem, json: bool, page: bool, flown: int) -> None:
     """Print the result of a search, write the worst flight as a scenario and, with ``page``, the page."""
     from hsv.cli.summary import sample_words
-    from hsv.flight.search.worst import repeated
     from hsv.pages.campaign import write_campaign_page
     from hsv.pages.search import in_words
 
-    found, campaign = repeated(results), results.campaign
-    alone = results.path.with_suffix(".toml")
+    campaign, row, sample = results.campaign, results.row(found.flight), results.sample(found.flight)
+    alone, written = results.path.with_suffix(".toml"), results.path.with_suffix(".html") if page else None
     with writing(alone, "out"):
         alone.write_text(results.file(found.flight), encoding="utf-8")
-    written = results.path.with_suffix(".html") if page else None
     if written:
         write_campaign_page(results, written)
-    row = results.row(found.flight)
     if json:
         output.print_json(
             {
@@ -123,8 +90,12 @@ def _show_worst(results: Results, units: UnitSystem, json: bool, page: bool, flo
                 "goal": campaign.goal,
                 "flights": found.flights,
                 "flown_now": flown,
-                "worst": {"flight": found.flight, "badness_si": found.badness, "fingerprint": row["fingerprint"]}
-                | {"sample_si": results.sample(found.flight)},
+                "worst": {
+                    "flight": found.flight,
+                    "badness_si": found.badness,
+                    "sample_si": sample,
+                    "fingerprint": row["fingerprint"],
+                },
                 "broken": found.broken(campaign.goal),
                 "nominal_si": found.nominal,
                 "random": {"flights": found.random_flights, "badness_si": found.random},
@@ -133,21 +104,21 @@ def _show_worst(results: Results, units: UnitSystem, json: bool, page: bool, flo
             }
         )
         return
-    rows = [(phase.name, str(phase.flights), in_words(campaign, phase.worst, units)) for phase in found.phases]
-    output.print_rows([dict(zip(("search", "flights", "worst so far"), row, strict=True)) for row in rows])
-    at, nominal = (in_words(campaign, bad, units) for bad in (found.badness, found.nominal))
+    shown = [(phase.name, phase.flights, in_words(campaign, phase.worst, units)) for phase in found.phases]
+    output.print_rows([{"search": name, "flights": flights, "worst so far": at} for name, flights, at in shown])
+    at, nominal, drawn = (in_words(campaign, bad, units) for bad in (found.badness, found.nominal, found.random))
     output.say(f"worst of {found.flights} flights: number {found.flight}, {at} (nominal: {nominal})")
     if found.random_flights:
-        drawn = in_words(campaign, found.random, units)
         output.say(f"worst of {found.random_flights} random flights: {drawn}")
-    output.say(output.folded(f"sample: {sample_words(results.sample(found.flight), units)}", 2))
     mattered = [f"{name} {in_words(campaign, gain, units, change=True)}" for name, gain in found.influences.items()]
-    output.say(output.folded(f"less bad if one moves to its other end, by: {', '.join(mattered)}", 2))
     output.say(
-        f"fingerprint {row['fingerprint'] or row['crashed']}", f"scenario    {alone}", f"results     {results.path}"
+        output.folded(f"sample: {sample_words(sample, units)}", 2),
+        output.folded(f"less bad if one moves to its other end, by: {', '.join(mattered)}", 2),
+        f"fingerprint {row['fingerprint'] or row['crashed']}",
+        f"scenario    {alone}",
+        f"results     {results.path}",
+        *([f"page        {written}"] if written else []),
     )
-    if written:
-        output.say(f"page        {written}")
 
 
 def rare(
@@ -171,41 +142,70 @@ def rare(
 
     Example: hsv rare mine.toml --of "attitude after the fault" --budget 20000
     """
-    from hsv.flight.campaign.campaign import RARE, plan
-    from hsv.flight.campaign.executors import make_executor
-    from hsv.flight.campaign.summary import CONFIDENCE, Results
-    from hsv.flight.search.rare import RUNS, estimate, least_budget, of_flights, repeated
-    from hsv.flight.search.rows import Rows, is_margin
-    from hsv.flight.tables import read_changes
+    from hsv.flight.campaign.campaign import RARE
+    from hsv.flight.campaign.summary import CONFIDENCE
+    from hsv.flight.search.rare import LEAST_BUDGET, RUNS, of_campaign
+    from hsv.flight.search.rows import is_margin
 
-    changed, factors = read_changes(changes or ()), read_factors(factor or ())
-    planned = plan(scenario, samples=1, seed=seed, scale=scale, factors=factors, changes=changed)
-    campaign = _search(planned, RARE, goal, budget)
+    campaign = _planned(RARE, scenario, goal, budget, seed, scale, factor, changes)
     if not is_margin(campaign.goal):
         raise CampaignError(f"of = {goal!r}: a metric, expected a requirement of the scenario")
-    if budget < least_budget():
-        raise CampaignError(f"budget = {budget}: expected at least {least_budget()} flights, for independent runs")
-    target = _target(out, campaign)
+    if budget < LEAST_BUDGET:
+        raise CampaignError(f"budget = {budget}: expected at least {LEAST_BUDGET} flights, for independent runs")
+    with _searched(campaign, of_campaign, out, workers, scheduler, restart) as (found, results, flown):
+        if json:
+            given = {"result": str(results.path), "goal": campaign.goal, "confidence": CONFIDENCE, "flown_now": flown}
+            output.print_json(given | asdict(found))
+        else:
+            shown = " to ".join(f"{end:.3g}" for end in found.interval) if found.interval else "not measured"
+            output.say(f"probability {found.probability:.3g}, {CONFIDENCE:.0%} interval {shown}")
+            if found.runs:
+                output.say(f"runs        {', '.join(f'{p:.2g}' for p in found.runs)}; at most {found.levels} levels")
+            output.say(f"flights     {found.samples}, {found.method}", f"results     {results.path}")
+            for warning in found.warnings:
+                output.report_line("hsv: warning", warning, "bold yellow")
+        if not found.interval:
+            raise RunError(f"no interval: {len(found.runs)} of {RUNS} runs reached the failure with {budget} flights")
+
+
+def _planned(
+    method: str, scenario: str, goal: str, budget: int, seed: int, scale: float, factor: Texts, changes: Texts
+) -> Campaign:
+    """Return the campaign of a search; the number of its samples is known only at its end."""
+    from hsv.flight.campaign.campaign import plan
+    from hsv.flight.search.rows import check_goal
+    from hsv.flight.tables import read_changes
+    from hsv.graph.preparation import commit
+
+    factors, changed = read_factors(factor or ()), read_changes(changes or ())
+    planned = plan(scenario, samples=1, seed=seed, scale=scale, factors=factors, changes=changed)
+    goal = check_goal(goal, planned.scenario)
+    for grid in planned.grid:
+        raise CampaignError(f"factor {grid.name}: a search has no grid, expected {grid.name}=LEAST..LARGEST")
+    return replace(planned, method=method, commit=commit(), goal=goal, budget=budget, samples=0)
+
+
+@contextmanager
+def _searched(
+    campaign: Campaign, search: Search, out: Path | None, workers: int, scheduler: str, restart: bool
+) -> Iterator[tuple[Any, Results, int]]:
+    """Fly a search; yield its result, its flights, and the number of those that were flown now."""
+    from hsv.flight.campaign.executors import make_executor
+    from hsv.flight.campaign.summary import Results
+    from hsv.flight.search.rows import Rows, recorded
+
+    if out:
+        check_target(out, "out", ".parquet")
+    else:
+        check_folder(Path("campaigns"), "out")
+    target = out or Path("campaigns", f"{campaign.scenario_name}_{campaign.method}_{campaign.goal}.parquet")
     with output.resumable(target.with_name(target.name + ".parts")) as complete:
         with (
             make_executor(workers, scheduler, output.errors.print) as flying,
-            output.flights(campaign.scenario_name, budget) as progress,
+            output.flights(campaign.scenario_name, campaign.budget) as progress,
         ):
             rows = Rows(target, campaign, flying, progress)
-            d = len(campaign.factors)
-            rows.run(lambda fly: estimate(of_flights(fly, campaign.factors), d, budget, seed), restart=restart)
+            rows.run(search, restart=restart)
             complete(target)
-        found = repeated(Results(target, trust=True))
-    if json:
-        values = asdict(found) | {"confidence": CONFIDENCE, "goal": campaign.goal, "flown_now": rows.flown_now}
-        output.print_json({"result": str(target), **values})
-    else:
-        shown = " to ".join(f"{end:.3g}" for end in found.interval) if found.interval else "not measured"
-        output.say(f"probability {found.probability:.3g}, 95 % interval {shown}")
-        if found.runs:
-            output.say(f"runs        {', '.join(f'{p:.2g}' for p in found.runs)}; at most {found.levels} levels")
-        output.say(f"flights     {found.samples}, {found.method}", f"results     {target}")
-        for warning in found.warnings:
-            output.report_line("hsv: warning", warning, "bold yellow")
-    if not found.interval:
-        raise RunError(f"no interval: {len(found.runs)} of {RUNS} runs reached the failure with {budget} flights")
+        results = Results(target, trust=True)
+        yield search(results.campaign, recorded(results)), results, rows.flown_now

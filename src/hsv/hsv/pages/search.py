@@ -12,8 +12,8 @@ from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.sample_runner import OUTCOMES
 from hsv.flight.campaign.summary import Results
 from hsv.flight.metrics import spaced
-from hsv.flight.search.rows import is_margin, recorded_badness
-from hsv.flight.search.worst import repeated
+from hsv.flight.search.rows import is_margin, recorded, recorded_badness
+from hsv.flight.search.worst import of_campaign
 from hsv.pages.engine import Numbers, Plot
 from hsv.pages.picture import picture
 from hsv.pages.text import capitalised
@@ -35,7 +35,8 @@ def in_words(campaign: Campaign, badness: float, units: UnitSystem, *, change: b
 
 def search_section(results: Results, numbers: Numbers) -> dict[str, Any]:
     """Return the data of the section: the search, the picture of its flights, and the influences of the factors."""
-    found, campaign = repeated(results), results.campaign
+    campaign = results.campaign
+    found = of_campaign(campaign, recorded(results))
     bad = recorded_badness(results)
     sign = -1.0 if is_margin(campaign.goal) else 1.0
     finite = np.where(np.isfinite(bad), bad, np.nan)

@@ -117,7 +117,7 @@ class Results:
 
     def column(self, name: str) -> np.ndarray:
         """Return a column of numbers or truth values, shape (flights,), in SI units; undefined numbers are NaN."""
-        return _values(self._table[name])
+        return values_of(self._table[name])
 
     def frame(self) -> DataFrame:
         """Return the results as a table with one row per flight.
@@ -142,7 +142,7 @@ class Results:
     @property
     def crashed(self) -> np.ndarray:
         """Whether each flight ended because the controller failed, shape (flights,)."""
-        return _values(self._table["crashed"].is_valid())
+        return values_of(self._table["crashed"].is_valid())
 
     @cached_property
     def finished(self) -> np.ndarray:
@@ -186,14 +186,14 @@ class Results:
         try:
             with pq.ParquetFile(self.path, page_checksum_verification=True) as file:
                 table = file.read()
-            if not np.array_equal(_values(table["flight"]), range(self.campaign.samples)):
+            if not np.array_equal(values_of(table["flight"]), range(self.campaign.samples)):
                 raise ValueError("rows that are not those of the campaign's flights")
         except (OSError, ValueError) as error:
             raise CampaignError(f"{self.path}: damaged, expected the result of a campaign") from error
         return table
 
 
-def _values(column: pa.ChunkedArray) -> np.ndarray:
+def values_of(column: pa.ChunkedArray) -> np.ndarray:
     """Return a column as an array, without importing pandas, as ``to_numpy`` would."""
     values = column.combine_chunks()
     if pa.types.is_boolean(values.type):

@@ -14,11 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.base.errors import CampaignError
-from hsv.flight.campaign.campaign import Factor
-from hsv.flight.campaign.summary import CONFIDENCE, Results, clopper_pearson
+from hsv.flight.campaign.campaign import Campaign
+from hsv.flight.campaign.summary import CONFIDENCE, clopper_pearson
 from hsv.flight.distribution import standard_quantiles, standard_shares
-from hsv.flight.search.rows import recorded
+from hsv.flight.search.rows import Flown
 
 RUNS, KEPT = 10, 10
 """Number of independent runs, and the number of samples of a level for each seed of the next one."""
@@ -26,8 +25,11 @@ RUNS, KEPT = 10, 10
 LEVELS = 6
 """Number of levels for which a budget is divided, enough for a probability of 1e-6; the largest number is twice it"""
 
-LEAST = 100
-"""Smallest number of samples of a level"""
+_COST = RUNS * (KEPT + (LEVELS - 1) * (KEPT - 1))
+"""Number of samples of all runs with :data:`LEVELS` levels, for each chain of a run"""
+
+LEAST_BUDGET = 10 * _COST
+"""Smallest number of samples for which an interval is estimated: 100 in a level"""
 
 PLAIN = 100
 """Number of failures that plain sampling is expected to find with the budget, from which on it is preferred"""
@@ -64,54 +66,33 @@ class _Run:
     """Failed points (k, d) of the last level"""
 
 
-def least_budget() -> int:
-    """Return the smallest number of samples for which an interval is estimated."""
-    return _samples(LEAST)
-
-
-def _samples(size: int) -> int:
-    """Return the number of samples of all runs with :data:`LEVELS` levels of ``size`` samples."""
-    return RUNS * (size + (LEVELS - 1) * (size - size // KEPT))
-
-
 def estimate(margins: Margins, d: int, budget: int, seed: int = 1) -> Rare:
     """Return the probability that ``margins`` of ``d`` independent standard normal variables are negative.
 
     Args:
         margins: The margin function.
         d: Number of variables.
-        budget: Largest number of samples.
+        budget: Largest number of samples, at least :data:`LEAST_BUDGET`.
         seed: Seed of all random numbers.
-
-    Raises:
-        CampaignError: The budget is smaller than :func:`least_budget`.
     """
-    if budget < least_budget():
-        raise CampaignError(
-            f"budget = {budget}: expected at least {least_budget()} flights, for {RUNS} independent runs"
-        )
-    size = next(n for n in range(budget // RUNS // KEPT * KEPT, 0, -KEPT) if _samples(n) <= budget)
-    randoms = [np.random.default_rng([seed, run]) for run in range(RUNS)]
-    runs = [_run(random, size, d) for random in randoms]
-    asked = [next(run) for run in runs]
+    size = budget // _COST * KEPT
+    runs = [_run(np.random.default_rng([seed, run]), size, d) for run in range(RUNS)]
+    asked = {number: next(run) for number, run in enumerate(runs)}
     found: dict[int, _Run] = {}
     samples = 0
-    while len(found) < RUNS:
-        active = [run for run in range(RUNS) if run not in found]
-        count = sum(len(asked[run]) for run in active)
-        if samples + count > budget:
-            break
-        values = margins(np.concatenate([asked[run] for run in active]))
+    while asked and samples + (count := sum(map(len, asked.values()))) <= budget:
+        values = margins(np.concatenate([*asked.values()]))
         if not samples and (failures := int(np.count_nonzero(values < 0.0))) * budget >= PLAIN * count:
             return _plain(margins, values, failures, budget, d, seed)
         samples += count
-        cuts = np.cumsum([len(asked[run]) for run in active])[:-1]
-        for run, own in zip(active, np.split(values, cuts), strict=True):
+        parts = np.split(values, np.cumsum([*map(len, asked.values())])[:-1])
+        for number, own in zip([*asked], parts, strict=True):
             try:
-                asked[run] = runs[run].send(own)
+                asked[number] = runs[number].send(own)
             except StopIteration as end:
-                found[run] = end.value
-    reached = [found[run] for run in sorted(found)]
+                found[number] = end.value
+                del asked[number]
+    reached = [found[number] for number in sorted(found)]
     each = tuple(run.probability for run in reached)
     levels = max((run.levels for run in reached), default=0)
     complete = len(reached) == RUNS and min(each) > 0.0
@@ -190,19 +171,11 @@ def _apart(first: np.ndarray, second: np.ndarray) -> float:
     return math.sqrt(max(0.0, float(np.quantile(squares.min(axis=1), 0.98))))
 
 
-def of_flights(evaluate: Callable[[np.ndarray], np.ndarray], factors: Sequence[Factor]) -> Margins:
-    """Return the margin function of flights; ``evaluate`` returns how bad the flights of samples (n, factors) are."""
+def of_campaign(campaign: Campaign, fly: Flown) -> Rare:
+    """Return the probability that the margin that is the goal of a ``campaign`` is negative."""
 
     def margins(points: np.ndarray) -> np.ndarray:
-        shares = [standard_shares(column) for column in points.T]
-        columns = [factor.quantiles(share) for factor, share in zip(factors, shares, strict=True)]
-        return -evaluate(np.column_stack(columns))
+        drawn = zip(campaign.factors, points.T, strict=True)
+        return -fly(np.column_stack([factor.quantiles(standard_shares(column)) for factor, column in drawn]))
 
-    return margins
-
-
-def repeated(results: Results) -> Rare:
-    """Return the result of a finished search, which is repeated with the stored flights."""
-    campaign = results.campaign
-    margins = of_flights(recorded(results), campaign.factors)
     return estimate(margins, len(campaign.factors), campaign.budget, campaign.seed)

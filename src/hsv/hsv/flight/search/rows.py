@@ -14,10 +14,10 @@ import pyarrow as pa
 from hsv.base.errors import CampaignError, one_of
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.executors import Executor
-from hsv.flight.campaign.sample_runner import in_child_of, outcomes_of, sample_runner
+from hsv.flight.campaign.sample_runner import OUTCOMES, in_child_of, outcomes_of, sample_runner
 from hsv.flight.campaign.store import ResultStore, read_result
-from hsv.flight.campaign.summary import Results
-from hsv.flight.metrics import MARGIN, METRICS
+from hsv.flight.campaign.summary import Results, values_of
+from hsv.flight.metrics import MARGIN
 from hsv.flight.scenario import Scenario
 
 EVERY_REQUIREMENT = "requirements"
@@ -25,6 +25,9 @@ EVERY_REQUIREMENT = "requirements"
 
 _SMALL, _LARGE = 8, 64
 """Numbers of flights in a batch: of requests for fewer than 256 flights, and of larger ones."""
+
+Flown = Callable[[np.ndarray], np.ndarray]
+"""Flies samples (n, factors), and returns how bad the flights are, see :func:`badness`, shape (n,)."""
 
 
 def check_goal(goal: str, scenario: Scenario) -> str:
@@ -46,6 +49,11 @@ def check_goal(goal: str, scenario: Scenario) -> str:
     return named.get(goal, goal)
 
 
+def is_margin(goal: str) -> bool:
+    """Return whether ``goal`` is the margin of one or every requirement, so that positive badness is a failure."""
+    return goal not in OUTCOMES
+
+
 def badness(campaign: Campaign, column: Callable[[str], np.ndarray], lost: np.ndarray) -> np.ndarray:
     """Return how bad flights are, shape (n,): minus the smallest margin, or the magnitude of the metric.
 
@@ -61,9 +69,15 @@ def badness(campaign: Campaign, column: Callable[[str], np.ndarray], lost: np.nd
     return np.where(lost, math.inf, np.where(np.isnan(worst), -math.inf, worst))
 
 
-def is_margin(goal: str) -> bool:
-    """Return whether ``goal`` is the margin of one or every requirement, so that positive badness is a failure."""
-    return goal not in METRICS and goal not in ("end_time", "tube_level")
+def recorded_badness(results: Results) -> np.ndarray:
+    """Return how bad the flights of a finished search are, shape (flights,), in their order."""
+    return badness(results.campaign, results.column, ~results.finished)
+
+
+def recorded(results: Results) -> Flown:
+    """Return a function in place of :meth:`Rows.evaluate` that repeats a finished search with its stored flights."""
+    found = iter(recorded_badness(results).tolist())
+    return lambda samples: np.array([next(found) for _ in samples])
 
 
 class Rows(ResultStore):
@@ -75,8 +89,8 @@ class Rows(ResultStore):
         self._executor, self._progress = executor, progress
         self.flown = self.flown_now = self._parts = 0
 
-    def run(self, search: Callable[[Callable[[np.ndarray], np.ndarray]], object], *, restart: bool = False) -> None:
-        """Call ``search`` with :meth:`evaluate` and write the result file, unless the file of this search exists.
+    def run(self, search: Callable[[Campaign, Flown], object], *, restart: bool = False) -> None:
+        """Call ``search`` with the campaign and :meth:`evaluate`, unless the result file exists, and write this file.
 
         Raises:
             CampaignError: The results belong to another search, are in use or damaged, or cannot be written.
@@ -84,7 +98,7 @@ class Rows(ResultStore):
         """
         with self.opened(restart=restart):
             if not self.out.exists():
-                search(self.evaluate)
+                search(self._campaign, self.evaluate)
                 self._campaign = replace(self._campaign, samples=self.flown)
                 self.finish()
 
@@ -101,24 +115,23 @@ class Rows(ResultStore):
 
     def evaluate(self, samples: np.ndarray) -> np.ndarray:
         """Return how bad the flights with these ``samples``, shape (n, factors), are, shape (n,)."""
-        first, n, begin = self.flown, len(samples), self._parts
-        width = _SMALL if n < _LARGE * 4 else _LARGE
-        cuts = [samples[start : start + width] for start in range(0, n, width)]
-        text = json.dumps({"campaign": self._campaign.text, "first": first, "samples": [cut.tolist() for cut in cuts]})
+        width = _SMALL if len(samples) < 4 * _LARGE else _LARGE
+        cuts = [samples[start : start + width] for start in range(0, len(samples), width)]
+        first, begin = self.flown, self._parts
+        given = {"campaign": self._campaign.text, "first": first, "samples": [cut.tolist() for cut in cuts]}
         missing = [number for number, cut in enumerate(cuts) if not self._has(begin + number, cut)]
-        self.flown, self._parts = first + n, begin + len(cuts)
-        done = self.flown - sum(len(cuts[number]) for number in missing)
-        for number, content in self._executor.fly(fly_given, text, missing):
+        self.flown, self._parts = first + len(samples), begin + len(cuts)
+        left = sum(len(cuts[number]) for number in missing)
+        for number, content in self._executor.fly(fly_given, json.dumps(given), missing):
             self.keep(begin + number, content)
-            done += len(cuts[number])
+            left -= len(cuts[number])
             self.flown_now += len(cuts[number])
-            self._progress(done)
-        return np.concatenate([self._badness(self._read(begin + number)[0]) for number in range(len(cuts))])
+            self._progress(self.flown - left)
+        return np.concatenate([self._badness(self._read(part)[0]) for part in range(begin, self._parts)])
 
     def _badness(self, part: pa.Table) -> np.ndarray:
-        ended = zip(part["diverged"].to_pylist(), part["crashed"].to_pylist(), strict=True)
-        lost = np.array([diverged or crashed is not None for diverged, crashed in ended])
-        return badness(self._campaign, lambda name: _numbers(part[name]), lost)
+        lost = values_of(part["diverged"]) | values_of(part["crashed"].is_valid())
+        return badness(self._campaign, lambda name: values_of(part[name]), lost)
 
     def _has(self, number: int, samples: np.ndarray) -> bool:
         """Return whether a whole part with these samples is stored."""
@@ -127,34 +140,12 @@ class Rows(ResultStore):
         except CampaignError:
             return False
         names = [f"sample_{factor.name}" for factor in self._campaign.factors]
-        return np.array_equal(np.column_stack([_numbers(part[name]) for name in names]), samples)
-
-
-def _numbers(column: pa.ChunkedArray) -> np.ndarray:
-    return np.array([math.nan if value is None else value for value in column.to_pylist()], float)
-
-
-def recorded(results: Results) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function in place of :meth:`Rows.evaluate` that repeats a finished search with its stored flights."""
-    found, first = recorded_badness(results), 0
-
-    def fly(samples: np.ndarray) -> np.ndarray:
-        nonlocal first
-        first += len(samples)
-        return found[first - len(samples) : first]
-
-    return fly
-
-
-def recorded_badness(results: Results) -> np.ndarray:
-    """Return how bad the flights of a finished search are, shape (flights,), in their order."""
-    return badness(results.campaign, results.column, ~results.finished)
+        return np.array_equal(np.column_stack([values_of(part[name]) for name in names]), samples)
 
 
 def fly_given(text: str, batch: int) -> bytes:
     """Fly a batch of the samples in the JSON ``text``; return its table as :meth:`SampleRunner.table` does."""
-    given = json.loads(text)
-    return in_child_of(sample_runner(given["campaign"]), _fly_given, text, batch)
+    return in_child_of(sample_runner(json.loads(text)["campaign"]), _fly_given, text, batch)
 
 
 def _fly_given(text: str, batch: int) -> bytes:

@@ -9,16 +9,15 @@ the worst of them are where the search starts anew with the rest of the budget.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from hsv.base.units import rounded
-from hsv.flight.campaign.campaign import Factor
-from hsv.flight.campaign.summary import Results
-from hsv.flight.search.rows import is_margin, recorded
+from hsv.flight.campaign.campaign import Campaign, Factor
+from hsv.flight.search.rows import Flown, is_margin
 
 Point = tuple[float, ...]
 """A sample: one value per factor, in the factor's unit."""
@@ -67,11 +66,10 @@ class _BudgetSpentError(Exception):
 
 @dataclass
 class _Search:
-    fly: Callable[[np.ndarray], np.ndarray]
+    fly: Flown
     factors: Sequence[Factor]
     budget: int
     known: dict[Point, float] = field(default_factory=dict)
-    best: Point = ()
     phases: list[Phase] = field(default_factory=list)
 
     def evaluate(self, points: Sequence[Point]) -> list[float]:
@@ -95,50 +93,44 @@ class _Search:
         if flights:
             self.phases.append(Phase(name, flights, max(self.known.values())))
 
-    def climb(self, point: Point, lines: Sequence[int]) -> Point:
-        """Return the point that flips and line searches reach from ``point``, which none of them makes worse."""
-        grid = {index: (high - low) / GRID for index in lines for low, high in [self.ends(index)]}
-        over = {index: (step, self.ends(index)) for index, step in grid.items()}
-        while True:
+    def climb(self, point: Point, lines: Sequence[int]) -> None:
+        """Repeat flips, and line searches along the factors ``lines``, until neither finds a worse point."""
+        start: Point = ()
+        refined = 0
+        while point != start:
             start = point
             point = self.flips(point)
             self.note("flips")
-            for index, (step, ends) in over.items():
-                point = self.line(point, index, step, ends)
+            for index in lines:
+                point = self.line(point, index, refined)
             self.note("line searches")
-            # The next searches are only around the place that the whole grid gave.
-            over = {index: (2.0 * step / REFINED, self.around(point, index, step)) for index, step in grid.items()}
-            if point == start or not lines:
-                return point
+            refined = 1  # the next searches are only around the place that the whole grid gave
 
     def flips(self, point: Point) -> Point:
         """Move single factors to their other ends, and all that help together, as long as the flights get worse."""
         while True:
-            [here] = self.evaluate([point])
             moves = [self.moved(point, i, end) for i in range(len(point)) for end in self.ends(i) if end != point[i]]
-            gains = [value - here for value in self.evaluate(moves)]
-            helpful = [move for move, gain in zip(moves, gains, strict=True) if gain > 0.0]
+            [here] = self.evaluate([point])
+            self.evaluate(moves)
+            helpful = sorted((move for move in moves if self.known[move] > here), key=self.known.__getitem__)
             if not helpful:
                 return point
-            together = list(point)
-            for move in sorted(helpful, key=lambda move: self.known[move]):  # of two ends, the worse one remains
-                together = [m if m != p else t for m, p, t in zip(move, point, together, strict=True)]
-            point = self.worst_of([*helpful, tuple(together)])
+            # Of the two ends of a factor, the worse one remains.
+            changes = {i: end for move in helpful for i, end in enumerate(move) if end != point[i]}
+            point = self.worst_of([*helpful, tuple(changes.get(i, value) for i, value in enumerate(point))])
 
-    def line(self, point: Point, index: int, step: float, ends: tuple[float, float]) -> Point:
-        """Return the worst point along one factor: in steps between ``ends``, refined around the worst point."""
-        for _ in range(REFINEMENTS + 1):
-            low, high = ends
+    def line(self, point: Point, index: int, refined: int) -> Point:
+        """Return the worst point along one factor, on grids around the last worst point from number ``refined`` on."""
+        least, most = low, high = self.ends(index)
+        step = (high - low) / GRID
+        for refinement in range(refined, refined + REFINEMENTS + 1):
+            if refinement:
+                low, high = max(least, point[index] - step), min(most, point[index] + step)
+                step *= 2.0 / REFINED
             values = [low + step * k for k in range(round((high - low) / step) + 1)]
             values = [float(np.floor(v)) if self.factors[index].whole else rounded(v) for v in values]
             point = self.worst_of([point, *(self.moved(point, index, min(value, high)) for value in values)])
-            ends, step = self.around(point, index, step), 2.0 * step / REFINED
         return point
-
-    def around(self, point: Point, index: int, step: float) -> tuple[float, float]:
-        """Return the values of a factor one ``step`` below and above its value at ``point``, within its range."""
-        low, high = self.ends(index)
-        return max(low, point[index] - step), min(high, point[index] + step)
 
     def worst_of(self, points: Sequence[Point]) -> Point:
         """Return the worst of ``points``, the first one of several."""
@@ -164,7 +156,7 @@ class _Search:
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
-def find_worst(fly: Callable[[np.ndarray], np.ndarray], factors: Sequence[Factor], budget: int, seed: int = 1) -> Worst:
+def find_worst(fly: Flown, factors: Sequence[Factor], budget: int, seed: int = 1) -> Worst:
     """Return the worst flight within the bounds of ``factors``.
 
     The search is deterministic: it depends on how bad the flights are, not on the order in which they are flown.
@@ -177,24 +169,22 @@ def find_worst(fly: Callable[[np.ndarray], np.ndarray], factors: Sequence[Factor
     """
     search = _Search(fly, factors, budget)
     centre = tuple(factor.middle for factor in factors)
-    singles = [[search.moved(centre, i, end) for end in search.ends(i)] for i in range(len(factors))]
-    drawn: list[Point] = []
-    [nominal, *_] = search.evaluate([centre, *(point for pair in singles for point in pair)])
+    singles = [search.moved(centre, i, end) for i in range(len(factors)) for end in search.ends(i)]
+    nominal, *found = search.evaluate([centre, *singles])
     search.note("one factor at a time")
+    pairs = [*zip(factors, found[::2], found[1::2], strict=True)]
+    corner = tuple(factor.high if high > low else factor.low for factor, low, high in pairs)
+    lines = [i for i, (factor, low, high) in enumerate(pairs) if factor.unit == "s" or nominal > max(low, high)]
+    drawn: list[Point] = []
     try:
-        decided = [[search.known[point] for point in pair] for pair in singles]
-        lines = [
-            i
-            for i, (pair, factor) in enumerate(zip(decided, factors, strict=True))
-            if factor.unit == "s" or nominal > max(pair)
-        ]
-        search.evaluate([corner := tuple(search.ends(i)[int(pair[1] > pair[0])] for i, pair in enumerate(decided))])
+        search.evaluate([corner])
         search.note("corner of the worse signs")
         search.climb(corner, lines)
         count = min(len(search.known), budget - len(search.known))
         shares = np.random.default_rng(seed).random((count, len(factors))).T
         columns = [factor.quantiles(share) for factor, share in zip(factors, shares, strict=True)]
-        search.evaluate(drawn := [tuple(row) for row in np.column_stack(columns).tolist()])
+        drawn = [*map(tuple, np.column_stack(columns).tolist())]
+        search.evaluate(drawn)
         search.note("random flights")
         for point in sorted(drawn, key=lambda point: -search.known[point])[:RESTARTS]:
             if search.known[point] < math.inf:
@@ -216,10 +206,9 @@ def find_worst(fly: Callable[[np.ndarray], np.ndarray], factors: Sequence[Factor
     )
 
 
-def repeated(results: Results) -> Worst:
-    """Return the result of a finished search, which is repeated with the stored flights."""
-    campaign = results.campaign
-    return find_worst(recorded(results), campaign.factors, campaign.budget, campaign.seed)
+def of_campaign(campaign: Campaign, fly: Flown) -> Worst:
+    """Return the worst flight of a ``campaign``, with its budget and its seed."""
+    return find_worst(fly, campaign.factors, campaign.budget, campaign.seed)
 
 
 def least_budget(factors: Sequence[Factor]) -> int:
