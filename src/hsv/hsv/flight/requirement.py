@@ -37,14 +37,8 @@ LEVEL = "level"
 """The signal that a flight has only with an invariant set."""
 
 SIGNALS = {
-    **{
-        name: Signal(unit, _column("state", i))
-        for i, (name, unit) in enumerate(zip(STATE_NAMES, STATE_UNITS, strict=True))
-    },
-    **{
-        name: Signal(unit, _column("command", i))
-        for i, (name, unit) in enumerate(zip(INPUT_NAMES, INPUT_UNITS, strict=True))
-    },
+    **{name: Signal(STATE_UNITS[i], _column("state", i)) for i, name in enumerate(STATE_NAMES)},
+    **{name: Signal(INPUT_UNITS[i], _column("command", i)) for i, name in enumerate(INPUT_NAMES)},
     "altitude_error": Signal("m", lambda flight: np.abs(flight.curves[0])),
     "velocity_error": Signal("m/s", lambda flight: np.abs(flight.curves[1])),
     "angle_of_attack_from_nominal": Signal("rad", lambda flight: flight.curves[8]),
@@ -57,7 +51,9 @@ SIGNALS = {
 ALWAYS, EVENTUALLY, UNTIL = MODES = ("always", "eventually", "until")
 START, FAULT, MANOEUVRE_END = EVENTS = ("start", "fault", "manoeuvre end")
 
-_KEYS = ("name", "id", "signal", "at_most", "at_least", *MODES, "from", "within")
+_BOUNDS = ("at_most", "at_least")
+
+_KEYS = ("name", "id", "signal", *_BOUNDS, *MODES, "from", "within")
 
 
 class Predicate(NamedTuple):
@@ -107,9 +103,8 @@ class Requirement:
         mode = f"until {self.target.words(system)}" if self.target else self.mode
         begin = self.begin if isinstance(self.begin, str) else f"{self.begin:g} s"
         window = "" if begin == START else f", from {begin}"
-        return f"{self.predicate.words(system)}, {mode}{window}" + (
-            f", within {self.within:g} s" if math.isfinite(self.within) else ""
-        )
+        within = f", within {self.within:g} s" if math.isfinite(self.within) else ""
+        return f"{self.predicate.words(system)}, {mode}{window}{within}"
 
     def window(self, flight: FlightData) -> slice:
         """Return the steps of the window in a flight, empty if its begin was not reached; ends count, if flown."""
@@ -151,18 +146,15 @@ def decided(mode: str, first: np.ndarray, second: np.ndarray | None = None) -> t
     """
     if not len(first):
         return (math.inf if mode == ALWAYS else -math.inf), None
-    if mode == ALWAYS:
-        index = int(np.argmin(first))
-        return float(first[index]), index
     if second is None:
-        index = int(np.argmax(first))
+        index = int(np.argmin(first) if mode == ALWAYS else np.argmax(first))
         return float(first[index]), index
     before = np.concatenate(([math.inf], np.minimum.accumulate(first)[:-1]))
-    reached = int(np.argmax(np.minimum(before, second)))
-    if before[reached] < second[reached]:
-        index = int(np.argmin(first[:reached]))
-        return float(first[index]), index
-    return float(second[reached]), reached
+    index = int(np.argmax(np.minimum(before, second)))
+    if before[index] >= second[index]:
+        return float(second[index]), index
+    index = int(np.argmin(first[:index]))
+    return float(first[index]), index
 
 
 def margins(
@@ -194,19 +186,19 @@ def margins(
 
     found = {}
     for requirement in requirements:
+        predicate, target, mode = requirement.predicate, requirement.target, requirement.mode
         window = requirement.window(flight) if ended else slice(0, 0)
         if window.start == window.stop:
             found[requirement.metric] = Margin(-math.inf)
             continue
-        of_level = requirement.predicate == (LEVEL, requirement.predicate.bound, True) and requirement.mode == ALWAYS
+        of_level = (predicate.signal, predicate.upper, mode) == (LEVEL, True, ALWAYS)
         if of_level and window == slice(0, len(flight.time)) and not math.isnan(largest_level):
-            margin = float(requirement.predicate.margins(np.array([largest_level]))[0])
+            margin, _ = decided(mode, predicate.margins(np.array([largest_level])))
             found[requirement.metric] = Margin(margin, None, largest_level, window)
             continue
-        signal = values(requirement.predicate, window)
-        target = requirement.target
-        second = None if target is None else target.margins(values(target, window))
-        margin, index = decided(requirement.mode, requirement.predicate.margins(signal), second)
+        signal = values(predicate, window)
+        second = target.margins(values(target, window)) if target else None
+        margin, index = decided(mode, predicate.margins(signal), second)
         assert index is not None
         found[requirement.metric] = Margin(margin, window.start + index, float(signal[index]), window)
     return found
@@ -259,29 +251,27 @@ def _requirement(row: Mapping[str, Any], field: str) -> Requirement:
     for key in row:
         if key not in _KEYS:
             raise ScenarioError(f"{field}.{key}: unknown key, expected {one_of(_KEYS, key)}")
-    name, own = row.get("name", ""), row.get("id", "")
+    name, own, begin = row.get("name", ""), row.get("id", ""), row.get("from", START)
     if not isinstance(name, str) or not re.search(r"\w", name):
         raise ScenarioError(f"{field}.name = {name!r}: expected a text")
     if not isinstance(own, str):
         raise ScenarioError(f"{field}.id = {own!r}: expected a text")
-    [bound, *others] = [key for key in ("at_most", "at_least") if key in row] or [""]
-    if others or not bound:
+    bounds, modes = [key for key in _BOUNDS if key in row], [key for key in MODES if key in row]
+    if len(bounds) != 1:
         raise ScenarioError(f"{field}: expected either at_most or at_least")
-    predicate = _predicate(row.get("signal"), bound, row[bound], field)
-    [mode, *others] = [key for key in MODES if key in row] or [""]
-    if others or not mode or (mode != UNTIL and row[mode] is not True):
+    predicate = _predicate(row.get("signal"), bounds[0], row[bounds[0]], field)
+    if len(modes) != 1 or not (modes == [UNTIL] or row[modes[0]] is True):
         raise ScenarioError(
             f"{field}: expected one of always = true, eventually = true, until = 'SIGNAL at_most BOUND'"
         )
     target = None
-    if mode == UNTIL:
-        words = str(row[UNTIL]).split(maxsplit=2)
-        if len(words) != 3 or words[1] not in ("at_most", "at_least"):
+    if modes == [UNTIL]:
+        signal, bound, value = [*str(row[UNTIL]).split(maxsplit=2), "", "", ""][:3]
+        if not value or bound not in _BOUNDS:
             raise ScenarioError(
                 f"{field}.until = {row[UNTIL]!r}: expected 'SIGNAL at_most BOUND' or 'SIGNAL at_least BOUND'"
             )
-        target = _predicate(words[0], words[1], words[2], f"{field}.until")
-    begin = row.get("from", START)
+        target = _predicate(signal, bound, value, f"{field}.until")
     if begin not in EVENTS:
         if isinstance(begin, str) and not any(map(str.isdigit, begin)):
             raise ScenarioError(f"{field}.from = {begin!r}: expected {one_of(EVENTS, begin)}, or a time")
@@ -289,7 +279,7 @@ def _requirement(row: Mapping[str, Any], field: str) -> Requirement:
     within = parse_quantity(row["within"], "s", f"{field}.within") if "within" in row else math.inf
     if not within > 0.0:
         raise ScenarioError(f"{field}.within = {row['within']!r}: an empty window, expected more than 0 s")
-    return Requirement(name, own, predicate, mode, target, begin, within)
+    return Requirement(name, own, predicate, modes[0], target, begin, within)
 
 
 def _predicate(signal: object, key: str, bound: object, field: str) -> Predicate:
