@@ -14,20 +14,7 @@ from hsv.base.errors import HsvError
 from hsv.flight.closed_loop import fly
 from hsv.flight.history import History
 from hsv.flight.metrics import FlightData
-from hsv.flight.requirement import (
-    ALWAYS,
-    EVENTUALLY,
-    FAULT,
-    LEVEL,
-    MANOEUVRE_END,
-    MODES,
-    SIGNALS,
-    UNTIL,
-    Predicate,
-    Requirement,
-    decided,
-    margins,
-)
+from hsv.flight.requirement import MODES, SIGNALS, Predicate, Requirement, decided, margins
 from hsv.flight.scenario import load_scenario, parse_scenario, scenario_text
 from hsv.flight.side_by_side import TubeLevels
 
@@ -45,7 +32,7 @@ def flight(altitude, velocity=0.0, fault=None, reference=None):
     return FlightData(np.arange(n) * PERIOD, history, np.zeros((n, 9)) if reference is None else reference, fault)
 
 
-def required(mode=ALWAYS, bound=1.0, upper=True, begin=0.0, within=math.inf, target=None, signal="altitude"):
+def required(mode="always", bound=1.0, upper=True, begin=0.0, within=math.inf, target=None, signal="altitude"):
     return Requirement("r", "", Predicate(signal, bound, upper), mode, target, begin, within)
 
 
@@ -73,7 +60,7 @@ def oracle(text):
 @pytest.mark.parametrize("traces", [1_500, pytest.param(10_000, marks=pytest.mark.long)])
 def test_margins_of_random_traces_are_those_of_rtamt(traces):
     random = np.random.default_rng(66)
-    forms = {ALWAYS: "always{0} (x {1} c)", EVENTUALLY: "eventually{0} (x {1} c)", UNTIL: "(x {1} c) until{0} (y <= d)"}
+    forms = dict(zip(MODES, ("always{} (x {} c)", "eventually{} (x {} c)", "(x {1} c) until{0} (y <= d)"), strict=True))
     cases = [(mode, upper, width) for mode in MODES for upper in (True, False) for width in (0, 1, 4, 9, None)]
     kept = 0
     for mode, upper, width in cases:
@@ -85,7 +72,7 @@ def test_margins_of_random_traces_are_those_of_rtamt(traces):
             expected = spec(x=x.tolist(), y=y.tolist(), c=[float(bound)] * n, d=[float(other)] * n)
             start = int(random.integers(n))
             within = math.inf if width is None else width * PERIOD or PERIOD / 2.0
-            target = Predicate("velocity", 1.0, True) if mode == UNTIL else None
+            target = Predicate("velocity", 1.0, True) if mode == "until" else None
             # Margins are shares of each bound; rtamt compares differences, so the target's bound is 1 and moves y.
             scale = abs(bound)
             moved = 1.0 - (other - y) / scale
@@ -98,10 +85,10 @@ def test_margins_of_random_traces_are_those_of_rtamt(traces):
 
 
 def test_windows_beyond_the_end_of_a_trace_are_empty_as_in_rtamt():
-    for mode in (ALWAYS, EVENTUALLY):
+    for mode in ("always", "eventually"):
         [beyond, *_] = oracle(f"{mode}[5:6] (x <= c)")(x=[0.0] * 3, y=[0.0] * 3, c=[1.0] * 3, d=[0.0] * 3)
         assert decided(mode, np.empty(0))[0] == beyond
-    assert decided(UNTIL, np.empty(0), np.empty(0))[0] == -math.inf
+    assert decided("until", np.empty(0), np.empty(0))[0] == -math.inf
     # A flight that does not reach the window does not keep the requirement.
     assert margin_of(required(begin=1.0), flight([0.0] * 3)).margin == -math.inf
 
@@ -109,7 +96,7 @@ def test_windows_beyond_the_end_of_a_trace_are_empty_as_in_rtamt():
 @given(st.lists(st.floats(-10.0, 10.0), min_size=1, max_size=30), st.integers(0, 29))
 @settings(max_examples=100, deadline=None)
 def test_always_and_eventually_are_dual_and_the_deciding_step_has_the_margin(values, start):
-    upper, lower = required(ALWAYS, begin=start * PERIOD), required(EVENTUALLY, upper=False, begin=start * PERIOD)
+    upper, lower = required("always", begin=start * PERIOD), required("eventually", upper=False, begin=start * PERIOD)
     a, b = (margin_of(each, flight(values)) for each in (upper, lower))
     if start >= len(values):
         assert a.margin == b.margin == -math.inf
@@ -120,12 +107,12 @@ def test_always_and_eventually_are_dual_and_the_deciding_step_has_the_margin(val
 
 def test_nan_and_a_lost_flight_keep_nothing():
     assert margin_of(required(), flight([0.0, math.nan, 0.0])).margin == -math.inf
-    assert margin_of(required(EVENTUALLY), flight([math.nan, 0.5])).margin == 0.5
-    assert not margin_of(required(EVENTUALLY), flight([math.nan])).kept
+    assert margin_of(required("eventually"), flight([math.nan, 0.5])).margin == 0.5
+    assert not margin_of(required("eventually"), flight([math.nan])).kept
     lost = margin_of(required(), flight([0.0]), ended=False)
     assert lost.margin == -math.inf and lost.step is None
-    assert margin_of(required(signal=LEVEL), flight([0.0])).margin == -math.inf  # no invariant set
-    assert margin_of(required(signal=LEVEL, bound=2.0), flight([0.0]), levels=lambda: np.ones(1)).margin == 0.5
+    assert margin_of(required(signal="level"), flight([0.0])).margin == -math.inf  # no invariant set
+    assert margin_of(required(signal="level", bound=2.0), flight([0.0]), levels=lambda: np.ones(1)).margin == 0.5
 
 
 def test_windows_from_the_fault_and_from_the_end_of_the_manoeuvre():
@@ -134,10 +121,10 @@ def test_windows_from_the_fault_and_from_the_end_of_the_manoeuvre():
     reference[4:, 0] = 1.0
     data = flight(values, fault=5 * PERIOD, reference=reference)
     assert margin_of(required(begin="start"), data).value == 0.9
-    assert margin_of(required(begin=FAULT), data).value == 0.8
-    assert margin_of(required(begin=FAULT, within=2 * PERIOD), data).value == 0.5
-    assert margin_of(required(begin=MANOEUVRE_END), data).window == slice(4, 10)
-    assert margin_of(required(begin=FAULT), flight(values)).margin == -math.inf  # no fault was flown
+    assert margin_of(required(begin="fault"), data).value == 0.8
+    assert margin_of(required(begin="fault", within=2 * PERIOD), data).value == 0.5
+    assert margin_of(required(begin="manoeuvre end"), data).window == slice(4, 10)
+    assert margin_of(required(begin="fault"), flight(values)).margin == -math.inf  # no fault was flown
 
 
 def test_margins_agree_with_the_metrics_of_a_flight():
@@ -207,6 +194,5 @@ def test_duplicate_names_windows_without_fault_and_other_types_are_refused():
         read({**ROW, "from": "fault"}, fault=[])
     with pytest.raises(HsvError, match="expected a list of tables"):
         read(3)
-    until = {key: value for key, value in ROW.items() if key != "always"} | {"until": "altitude below 3 m"}
     with pytest.raises(HsvError, match="'SIGNAL at_most BOUND'"):
-        read(until)
+        read({"name": "r", "signal": "altitude_error", "at_most": "5 ft", "until": "altitude below 3 m"})

@@ -7,13 +7,12 @@ from statistics import NormalDist
 import mpmath
 import numpy as np
 import pytest
+from searches import in_memory, required, search
 
-from hsv.flight.campaign.campaign import RARE, plan
-from hsv.flight.campaign.executors import Executor
-from hsv.flight.campaign.summary import Results, clopper_pearson
+from hsv.flight.campaign.campaign import RARE
+from hsv.flight.campaign.summary import clopper_pearson
 from hsv.flight.distribution import standard_quantiles, standard_shares
-from hsv.flight.search.rare import LEAST_BUDGET, estimate, of_campaign
-from hsv.flight.search.rows import Rows, recorded
+from hsv.flight.search.rare import estimate, of_campaign
 
 PROBABILITY = 1e-5
 BETA = -NormalDist().inv_cdf(PROBABILITY)
@@ -95,17 +94,13 @@ def test_shares_of_the_normal_distribution_are_those_of_mpmath():
     np.testing.assert_allclose(standard_quantiles(standard_shares(x[40:121])), x[40:121], atol=1e-11)
 
 
-def test_flights_are_sampled_stored_and_give_the_same_result_again(tmp_path):
-    file = tmp_path / "short.toml"
-    rows = '[[requirement]]\nname = "a"\nsignal = "attitude_from_nominal"\nat_most = "0.3 deg"\nalways = true\n'
-    file.write_text(f'extends = "case1"\ntitle = "short"\nduration = "4 s"\nfault = []\n{rows}', encoding="utf-8")
-    planned = plan(str(file), samples=1)
-    campaign = replace(planned, method=RARE, goal="margin_a", budget=LEAST_BUDGET, samples=0)
-    store, flown = Rows(tmp_path / "rare.parquet", campaign, Executor(), lambda done: None), []
-    store.run(lambda *given: flown.append(of_campaign(*given)))
-    results = Results(tmp_path / "rare.parquet")
-    [found] = flown
-    assert of_campaign(results.campaign, recorded(results)) == found
-    failed = np.count_nonzero(results.column("margin_a") < 0.0)
-    assert found.method == "plain sampling" and found.probability == failed / results.campaign.samples
-    assert len({*results.frame()["flight"]}) == store.flown
+@pytest.mark.long
+def test_the_interval_of_a_scenario_agrees_with_a_plain_campaign(tmp_path):
+    campaign = search(RARE, required(tmp_path, "0.447 deg"), "margin_a", 8_000)
+    found = of_campaign(campaign, in_memory(campaign))
+    assert found.method == "subset simulation" and found.samples <= 8_000
+    drawn, _ = replace(campaign, method="uniform", samples=10_000, seed=5).draw(range(10_000))
+    failures = int(np.count_nonzero(in_memory(campaign)(drawn) > 0.0))
+    low, high = clopper_pearson(failures, len(drawn))
+    assert 0.5e-3 < failures / len(drawn) < 2e-3
+    assert found.interval[0] <= high and low <= found.interval[1]
