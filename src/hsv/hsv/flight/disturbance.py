@@ -63,10 +63,11 @@ class ChannelModel:
         return sampled_actuators(known, self.design.period) if known else None
 
     def channels(self, flight: Flight) -> np.ndarray:
-        """Return the disturbances of ``flight`` (n, 7), a row per step, SI, in the order of :data:`CHANNELS`.
+        """Return the disturbances (n, 7) of ``flight`` (paper eq. 13, eq. 16, eq. 18), a row per step, SI.
 
-        The bits are the same on every machine: sums over columns have a fixed order. The channel of the filtered
-        nominal rate is zero if the design filters the nominal pitch rate like the measured one.
+        They are in the order of :data:`CHANNELS`. The bits are the same on every machine: sums over columns have a
+        fixed order. The channel of the filtered nominal rate is zero if the design filters the nominal pitch rate like
+        the measured one.
         """
         h, x_r, n = flight.history, flight.reference[:-1], len(flight.history.state) - 1
         lost = h.actuator[:, 1] - h.command[:, 1]
