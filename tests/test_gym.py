@@ -10,9 +10,11 @@ import sys
 from pathlib import Path
 
 import gymnasium
+import matplotlib
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from matplotlib import pyplot
 from page_blocks import blocks, indented
 
 import hsv.gym
@@ -48,6 +50,21 @@ def test_the_side_view_follows_the_vehicle(scenario):
     assert hsv.gym.TrackEnv().render() is None
     with pytest.raises(ParameterError, match="render_mode = 'ansi': expected one of human, rgb_array"):
         hsv.gym.TrackEnv(render_mode="ansi")
+    matplotlib.use("agg")
+    with pytest.raises(ParameterError, match="'human': no window can be opened here, expected 'rgb_array'"):
+        hsv.gym.TrackEnv(render_mode="human").reset()
+
+
+@pytest.mark.skipif("DISPLAY" not in os.environ, reason="there is no display; xvfb-run gives one")
+def test_a_window_that_is_closed_stays_closed():
+    matplotlib.use("tkagg", force=True)
+    env = hsv.gym.TrackEnv(render_mode="human")
+    env.reset()
+    assert pyplot.get_fignums()
+    pyplot.close("all")
+    env.step([0.0, 0.0])
+    assert not pyplot.get_fignums()
+    env.close()
 
 
 def test_observations_are_normalised_by_the_scales_of_a_design():

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hsv.base.errors import ParameterError
 from hsv.pages.airframe.geometry import Airframe, Point, airframe
 
 SPACING = 0.5
@@ -58,22 +59,31 @@ class Image:
     """The side view of a vehicle as an image, of 640 x 400 pixels; angles are true, the bending is exaggerated."""
 
     def __init__(self, shown: bool, elastic: bool) -> None:
-        """Open a window if the image is ``shown``; a vehicle that is not ``elastic`` is drawn as a plain cone."""
+        """Open a window if the image is ``shown``; a vehicle that is not ``elastic`` is drawn as a plain cone.
+
+        Raises:
+            ParameterError: No window can be opened.
+        """
         # Imported here, as pages need the geometry only and matplotlib takes long to import.
         from matplotlib import pyplot
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
         self._geometry = geometry(plain=not elastic)
+        self._opened = pyplot.fignum_exists
         self.figure = (pyplot.figure if shown else Figure)(figsize=(6.4, 4.0), dpi=100)
+        if shown and self.figure.canvas.required_interactive_framework is None:
+            raise ParameterError("render_mode = 'human': no window can be opened here, expected 'rgb_array'")
         self._pixels = FigureCanvasAgg(self.figure) if not shown else None
         self._axes = self.figure.add_axes((0.0, 0.0, 1.0, 1.0))
 
     def draw(self, time: float, state: np.ndarray, effector: np.ndarray) -> np.ndarray | None:
         """Draw the state (9, SI) at a ``time`` (s) with the inputs ``effector`` (2), and show it.
 
-        Return the pixels (400, 640, 3), or None if they are in a window.
+        Return the pixels (400, 640, 3), or None if they are in a window; a window that the user closed stays closed.
         """
+        if self._pixels is None and not self._opened(self.figure.number):
+            return None
         drawn, axes, half = self._geometry, self._axes, 0.65 * self._geometry["length"]
         altitude, velocity, alpha, pitch, _, *elastic = state
         bend = drawn["exaggeration"] * np.array([*elastic[::2], 0.0])
