@@ -172,7 +172,7 @@ def test_the_documented_glider_is_built_trims_and_flies(tmp_path):
     for name, before, after in (
         ("core/vehicle.h", "enum { PARKER, WINGED_CONE };", numbers),
         ("core/vehicle.h", '#include "winged_cone.h"', f'#include "winged_cone.h"\n{included}'),
-        ("core/vehicle.h", "        default: return parker_forces", f"{case}\n        default: return parker_forces"),
+        ("core/vehicle.h", "    default: return parker_forces", f"{case}\n    default: return parker_forces"),
         ("core/vehicle_fields.h", "/* The number of", f"{blocks['hsv/core/vehicle_fields.h']}/* The number of"),
         ("model/dynamics.py", "    structure: float = 0.0", f"    {field}\n    structure: float = 0.0"),
     ):

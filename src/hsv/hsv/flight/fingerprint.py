@@ -16,11 +16,12 @@ from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsv.flight.scenario import Scenario, load_scenario
+if TYPE_CHECKING:  # a node, which computes no fingerprint, does not load the scenario's tables
+    from hsv.flight.scenario import Scenario
 
 FORMAT = 1
 """Version of the contents and the order of the digested data."""
@@ -63,6 +64,8 @@ def as_published(found: str | None, scenario: Scenario | None, design_hash: str)
     entry = _table().get(scenario.name) if scenario else None
     if found is None or scenario is None or entry is None or entry["design_hash"] != design_hash:
         return None
+    from hsv.flight.scenario import load_scenario
+
     if load_scenario(scenario.name).parameters() != scenario.parameters():
         return None
     return False
