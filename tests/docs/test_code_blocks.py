@@ -49,7 +49,7 @@ def test_code_of_the_page_runs(page, tmp_path, monkeypatch):
         exec(compile(block, page, "exec"), names)
     if page in MODULES:
         sys.modules.pop(module, None)
-    assert {path.name for path in tmp_path.glob("*.png")} == set(re.findall(r'savefig\("(.*?)"\)', "".join(code)))
+    assert {path.name for path in tmp_path.glob("*.png")} == set(re.findall(r'savefig\("(.*?)"', "".join(code)))
     assert names["flight"].status.name == "FINISHED"
 
 

@@ -72,21 +72,17 @@ def worst(
 def _show_worst(found: Worst, results: Results, units: UnitSystem, json: bool, page: bool, flown: int) -> None:
     """Print the result of a search, write the worst flight as a scenario and, with ``page``, the page."""
     from hsv.cli.summary import sample_words
-    from hsv.pages.campaign import write_campaign_page
     from hsv.pages.search import in_words
 
     campaign, row, sample = results.campaign, results.row(found.flight), results.sample(found.flight)
-    alone, written = results.path.with_suffix(".toml"), results.path.with_suffix(".html") if page else None
+    alone = results.path.with_suffix(".toml")
     with writing(alone, "out"):
         alone.write_text(results.file(found.flight), encoding="utf-8")
-    if written:
-        write_campaign_page(results, written)
+    files = {"scenario": str(alone)} | _written(results, page)
     if json:
         output.print_json(
-            {
-                "result": str(results.path),
-                "page": str(written) if written else None,
-                "scenario_file": str(alone),
+            files
+            | {
                 "goal": campaign.goal,
                 "flights": found.flights,
                 "flown_now": flown,
@@ -115,9 +111,7 @@ def _show_worst(found: Worst, results: Results, units: UnitSystem, json: bool, p
         output.folded(f"sample: {sample_words(sample, units)}", 2),
         output.folded(f"less bad if one moves to its other end, by: {', '.join(mattered)}", 2),
         f"fingerprint {row['fingerprint'] or row['crashed']}",
-        f"scenario    {alone}",
-        f"results     {results.path}",
-        *([f"page        {written}"] if written else []),
+        *(f"{name:11} {file}" for name, file in files.items()),
     )
 
 
@@ -133,6 +127,7 @@ def rare(
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
     restart: RestartOption = False,
+    page: PageOption = True,
     json: JsonOption = False,
 ) -> None:
     """Estimate the probability that a requirement breaks, with an interval from independent runs.
@@ -153,19 +148,32 @@ def rare(
     if budget < LEAST_BUDGET:
         raise CampaignError(f"budget = {budget}: expected at least {LEAST_BUDGET} flights, for independent runs")
     with _searched(campaign, of_campaign, out, workers, scheduler, restart) as (found, results, flown):
+        files = _written(results, page)
         if json:
-            given = {"result": str(results.path), "goal": campaign.goal, "confidence": CONFIDENCE, "flown_now": flown}
-            output.print_json(given | asdict(found))
+            given = {"goal": campaign.goal, "confidence": CONFIDENCE, "flown_now": flown}
+            output.print_json(files | given | asdict(found))
         else:
             shown = " to ".join(f"{end:.3g}" for end in found.interval) if found.interval else "not measured"
-            output.say(f"probability {found.probability:.3g}, {CONFIDENCE:.0%} interval {shown}")
+            output.say(f"probability {found.probability:.3g}, 95 % interval {shown}")
             if found.runs:
                 output.say(f"runs        {', '.join(f'{p:.2g}' for p in found.runs)}; at most {found.levels} levels")
-            output.say(f"flights     {found.samples}, {found.method}", f"results     {results.path}")
+            output.say(
+                f"flights     {found.samples}, {found.method}", *(f"{name:11} {file}" for name, file in files.items())
+            )
             for warning in found.warnings:
                 output.report_line("hsv: warning", warning, "bold yellow")
         if not found.interval:
             raise RunError(f"no interval: {len(found.runs)} of {RUNS} runs reached the failure with {budget} flights")
+
+
+def _written(results: Results, page: bool) -> dict[str, str]:
+    """Write the page of a search next to its ``results``, if ``page`` is true; return the paths of both by name."""
+    from hsv.pages.campaign import write_campaign_page
+
+    files = {"result": results.path} | ({"page": results.path.with_suffix(".html")} if page else {})
+    if page:
+        write_campaign_page(results, files["page"])
+    return {name: str(path) for name, path in files.items()}
 
 
 def _planned(

@@ -13,7 +13,7 @@ from markupsafe import Markup
 
 from hsv.base.errors import CampaignError, ControllerError
 from hsv.base.units import UnitSystem
-from hsv.flight.campaign.campaign import WORST, Factor
+from hsv.flight.campaign.campaign import SEARCHES, Factor
 from hsv.flight.campaign.envelope import SIGNALS, signals, window_starts
 from hsv.flight.campaign.sample_runner import OUTCOMES
 from hsv.flight.campaign.summary import (
@@ -54,7 +54,7 @@ PICTURED = ("altitude_error", "velocity_error", "angle_of_attack", "elevator_def
 
 SECTIONS = {
     "summary": "Summary",
-    "search": "Search for the worst flight",
+    "search": "Search",
     "worst": "Worst flights",
     "envelopes": "Envelopes",
     "distributions": "Distributions",
@@ -90,7 +90,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
     survival = partial(campaign_figure, {results.path.stem: results}, panels=[SURVIVAL], layout=Layout(size=(7.0, 2.5)))
     starts = [fault.start for fault in results.campaign.scenario.fault]
     shades = [(start, end) for start in starts if start < end]
-    search = search_section(results, numbers) if results.campaign.method == WORST else None
+    search = search_section(results, numbers) if results.campaign.method in SEARCHES else None
     absent = [name for name, there in (("scatter", differing), ("search", search)) if not there]
     return render(
         "campaign.html.j2",

@@ -1,4 +1,4 @@
-"""The section of a campaign page on the search for the worst flight."""
+"""The section of a campaign page on a search: for the worst flight, or for the probability of a failure."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from hsv.base.units import UnitSystem, quantity_text, significant
-from hsv.flight.campaign.campaign import Campaign
+from hsv.flight.campaign.campaign import RARE, Campaign
 from hsv.flight.campaign.sample_runner import OUTCOMES
 from hsv.flight.campaign.summary import Results
 from hsv.flight.metrics import spaced
+from hsv.flight.search import rare, worst
 from hsv.flight.search.rows import is_margin, recorded, recorded_badness
-from hsv.flight.search.worst import of_campaign
 from hsv.pages.engine import Numbers, Plot
 from hsv.pages.picture import picture
 from hsv.pages.text import capitalised
@@ -36,7 +36,9 @@ def in_words(campaign: Campaign, badness: float, units: UnitSystem, *, change: b
 def search_section(results: Results, numbers: Numbers) -> dict[str, Any]:
     """Return the data of the section: the search, the picture of its flights, and the influences of the factors."""
     campaign = results.campaign
-    found = of_campaign(campaign, recorded(results))
+    method = rare if campaign.method == RARE else worst
+    found = method.of_campaign(campaign, recorded(results))
+    influences = found.influences if isinstance(found, worst.Worst) else {}
     bad = recorded_badness(results)
     sign = -1.0 if is_margin(campaign.goal) else 1.0
     finite = np.where(np.isfinite(bad), bad, np.nan)
@@ -47,13 +49,13 @@ def search_section(results: Results, numbers: Numbers) -> dict[str, Any]:
     ]
     title = "Margin" if is_margin(campaign.goal) else capitalised(spaced(campaign.goal))
     plot = Plot("search", title, OUTCOMES.get(campaign.goal, "1"), "", curves)
-    most = max(found.influences.values(), default=0.0) or 1.0
+    most = max(influences.values(), default=0.0) or 1.0
     return {
         "found": found,
         "said": lambda badness: in_words(campaign, badness, UnitSystem.metric),
         "picture": picture([plot], numbers, float(len(bad)), axis="flight", kinds=("nominal", "actual")),
         "bars": [
             (spaced(name), in_words(campaign, gain, UnitSystem.metric, change=True), 100.0 * max(gain, 0.0) / most)
-            for name, gain in found.influences.items()
+            for name, gain in influences.items()
         ],
     }
