@@ -19,7 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 CACHE = ROOT / ".portability"
-PACKAGES = ("cffi", "numpy", "pydantic", "pyyaml", "scipy", "tomli-w")
+PACKAGES = ("cffi", "numpy", "pint", "pydantic", "pyyaml", "scipy", "tomli-w")
 """Packages that a simulated flight imports."""
 LIBRARY = ROOT / "src" / "hsv"
 """Folder of the library, with the core that the set-up compiled for this machine."""

@@ -1,18 +1,20 @@
 import ctypes
 import dataclasses
+import math
 import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
+import pint
 import pytest
 from flights import components
 from marking import long
 from numpy.testing import assert_array_equal
 
 import hsv.core
-from hsv.base.units import base_units, factor
+from hsv.base.units import base_units
 from hsv.control.design_file import find_design, read_design
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
@@ -73,9 +75,11 @@ def test_it_is_c99_that_calls_nothing_and_keeps_nothing(design, level, compiler,
 
 
 def test_units_of_an_fmu_are_their_exponents_in_base_units():
+    registry = pint.UnitRegistry()
     for unit in ("1", "m", "s", "1/s", "m/s", "rad", "rad/s", "rad s", "N", "N m", "Pa"):
-        base = " ".join(f"{name}^{power:g}" for name, power in base_units(unit).items()) or "1"
-        assert factor(unit, base) == 1.0, unit
+        powers = base_units(unit)
+        base = math.prod((registry.Unit(name) ** power for name, power in powers.items()), start=registry.Unit(""))
+        assert registry.get_base_units("" if unit == "1" else unit.replace(" ", "*")) == (1.0, base), unit
 
 
 @needs_compiler

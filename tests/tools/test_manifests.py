@@ -33,7 +33,7 @@ KEYS = {name: f"python3-{name}" for name in DISTRIBUTION}
 """rosdep keys by imported module."""
 
 WITHOUT_KEY = {"clarabel", "control", "cvxpy", "distributed", "fmpy", "foxglove", "gymnasium", "lz4", "markupsafe"}
-WITHOUT_KEY |= {"matplotlib", "mcap", "pandas", "piqp", "pyarrow", "pydantic", "rosbags", "scipy", "tomli_w"}
+WITHOUT_KEY |= {"matplotlib", "mcap", "pandas", "pint", "piqp", "pyarrow", "pydantic", "rosbags", "scipy", "tomli_w"}
 WITHOUT_KEY |= {"typer", "websockets", "zstandard"}
 """Modules for which no rosdep key names a suitable Debian package; see docs/installation.md."""
 

@@ -1,7 +1,7 @@
 """Conversion between quantities with units, as people write them, and the SI numbers used inside the library.
 
 Reading a quantity rounds once: its number is read, and factors are multiplied, as fractions. Constants therefore have
-the same bits on every machine.
+the same bits on every machine and with every version of pint, the units library.
 """
 
 from __future__ import annotations
@@ -14,8 +14,12 @@ from decimal import Decimal
 from enum import StrEnum
 from fractions import Fraction
 from functools import cache, lru_cache
+from typing import TYPE_CHECKING
 
 from hsv.base.errors import QuantityError, one_of
+
+if TYPE_CHECKING:
+    import pint
 
 FOOT = 0.3048
 """Metres in a foot, by definition."""
@@ -60,6 +64,14 @@ _QUANTITY = re.compile(
 
 _ROOT_BITS = 80
 """Bits to which a square root is computed before it is rounded to the 53 bits of a double."""
+
+
+@cache
+def registry() -> pint.UnitRegistry:
+    """Return the registry of pint, with fractions as factors; it is slow to create, and only rare units need it."""
+    import pint
+
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=False, non_int_type=Fraction)
 
 
 def is_finite(value: float) -> bool:
@@ -227,7 +239,7 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
         raise QuantityError(f"{field} = {text!r}: {expected}") from error
     except _UnknownUnitError as error:
         raise QuantityError(f"{field} = {text!r}: unknown unit, {expected}") from error
-    except ValueError as error:
+    except Exception as error:  # pint lets the errors of Python's tokenizer and of its operators through
         raise QuantityError(f"{field} = {text!r}: cannot be read, {expected}") from error
 
 
@@ -255,12 +267,12 @@ def _number_and_unit(text: str) -> tuple[Fraction, str]:
     found = _QUANTITY.fullmatch(text.strip())
     if not found:
         raise ValueError(f"{text!r}: expected a number and a unit")
-    unit = re.sub(r"\s*([*/^ ])\s*", r"\1", found["unit"] or "").replace("%", "percent").replace("**", "^")
+    unit = re.sub(r"\s*([*/^ ])\s*", r"\1", found["unit"] or "").replace("%", "percent")
     return Fraction(found["number"]), f"1{unit}" if unit.startswith("/") else unit
 
 
 class _UnknownUnitError(ValueError):
-    """A unit that is none of :data:`_KNOWN`, and no product of them."""
+    """A unit that neither this module nor pint knows."""
 
 
 Square = tuple[Fraction, tuple[tuple[str, int], ...]]
@@ -273,27 +285,27 @@ exponents.
 
 _PI = Fraction("3.1415926535897932384626433832795028841971693993751")
 _FORCE, _PRESSURE = {"kg": 2, "m": 2, "s": -4}, {"kg": 2, "m": -2, "s": -4}
-_SIZES: tuple[tuple[dict[str, int], dict[str, str]], ...] = (
-    ({}, {"": "1", "1": "1", "percent": "1/100"}),
-    ({"m": 2}, {"m": "1", "km": "1000", "cm": "1/100", "mm": "1/1000", "meter": "1", "metre": "1"}),
-    ({"m": 2}, {"ft": "0.3048", "kft": "304.8", "foot": "0.3048", "feet": "0.3048", "inch": "0.0254", "in": "0.0254"}),
-    ({"m": 2}, {"mi": "1609.344", "mile": "1609.344", "nmi": "1852"}),
-    ({"m": 2, "s": -2}, {"kt": "1852/3600", "knot": "1852/3600"}),
-    ({"s": 2}, {"s": "1", "ms": "1/1000", "us": "1/1000000", "second": "1", "min": "60", "minute": "60"}),
-    ({"s": 2}, {"h": "3600", "hour": "3600"}),
-    ({"s": -2}, {"Hz": "1", "kHz": "1000"}),
-    ({"rad": 2}, {"rad": "1", "mrad": "1/1000", "radian": "1"}),
-    ({"kg": 2}, {"kg": "1", "g": "1/1000", "t": "1000", "lb": "0.45359237"}),
-    (_FORCE, {"N": "1", "kN": "1000", "MN": "1000000"}),
-    (_PRESSURE, {"Pa": "1", "hPa": "100", "kPa": "1000", "MPa": "1000000", "bar": "100000"}),
-)
 _KNOWN: dict[str, tuple[Fraction, dict[str, int]]] = {
-    **{unit: (Fraction(size) ** 2, base) for base, sizes in _SIZES for unit, size in sizes.items()},
-    **{unit: ((_PI / 180) ** 2, {"rad": 2}) for unit in ("deg", "degree", "°")},
-    "arcmin": ((_PI / 10800) ** 2, {"rad": 2}),
-    "arcsec": ((_PI / 648000) ** 2, {"rad": 2}),
+    **{unit: (Fraction(size) ** 2, {"m": 2}) for unit, size in {"m": "1", "km": "1000", "mm": "1/1000"}.items()},
+    **{unit: (Fraction(size) ** 2, {"m": 2}) for unit, size in {"ft": "0.3048", "kft": "304.8"}.items()},
+    **{
+        unit: (Fraction(size) ** 2, {"s": 2})
+        for unit, size in {"s": "1", "ms": "1/1000", "min": "60", "h": "3600"}.items()
+    },
+    **{unit: (size**2, {"rad": 2}) for unit, size in {"deg": _PI / 180, "arcsec": _PI / 648000}.items()},
+    **{unit: (Fraction(size) ** 2, {"rad": 2}) for unit, size in {"rad": "1", "mrad": "1/1000"}.items()},
+    "": (Fraction(1), {}),
+    "1": (Fraction(1), {}),
+    "percent": (Fraction(1, 10**4), {}),
+    "Hz": (Fraction(1), {"s": -2}),
     "rpm": ((_PI / 30) ** 2, {"rad": 2, "s": -2}),
-    # Each of these units, and each product of them, is rounded to 16 digits: published flights have these bits.
+    "kg": (Fraction(1), {"kg": 2}),
+    "kg^0.5": (Fraction(1), {"kg": 1}),
+    "N": (Fraction(1), _FORCE),
+    "kN": (Fraction(10**6), _FORCE),
+    "Pa": (Fraction(1), _PRESSURE),
+    "kPa": (Fraction(10**6), _PRESSURE),
+    # The values of pint, which rounds each of these units, and each product of them, to 16 digits.
     "slug": (Fraction("212.98200294060055"), {"kg": 2}),
     "slug ft^2": (Fraction("1.838242309017568"), {"kg": 2, "m": 4}),
     "slug/ft": (Fraction("2292.519200024031"), {"kg": 2, "m": -2}),
@@ -304,17 +316,20 @@ _KNOWN: dict[str, tuple[Fraction, dict[str, int]]] = {
     "lbf/ft^2": (Fraction("2292.519200024031"), _PRESSURE),
     "lbf/slug^0.5": (Fraction("1.3558179483314006"), {"kg": 1, "m": 2, "s": -4}),
 }
-"""Squares of the known units; their products, quotients and powers, also half ones, are units, too."""
+"""Squares of the units in the shipped files, because importing pint takes longer than a flight."""
 
 
 @cache
 def _squared(unit: str) -> Square:
-    square, base = _composed(unit)
+    try:
+        square, base = _composed(unit)
+    except KeyError:
+        return square_by_pint(unit)
     return square, tuple(sorted((name, exponent) for name, exponent in base.items() if exponent))
 
 
 def _composed(unit: str) -> tuple[Fraction, dict[str, int]]:
-    """Return factor and exponents of ``unit`` squared (see ``Square``); raise an ``_UnknownUnitError`` for a part."""
+    """Return factor and exponents of ``unit`` squared (see ``Square``); raise a KeyError if ``_KNOWN`` lacks a part."""
     if unit in _KNOWN:
         return _KNOWN[unit]
     if product := re.fullmatch(r"(.*)([*/ ])([^*/ ]+)", unit):
@@ -323,16 +338,32 @@ def _composed(unit: str) -> tuple[Fraction, dict[str, int]]:
         exponents = {name: base.get(name, 0) + sign * more.get(name, 0) for name in {**base, **more}}
         return square * other**sign, exponents
     symbol, _, power = unit.partition("^")
-    if not power:
-        raise _UnknownUnitError(unit)
-    (square, base), halves = _composed(symbol), 2 * Fraction(power)
-    # A half power needs the root of the square, which is exact for a unit whose size is a fraction.
-    root = Fraction(math.isqrt(square.numerator), math.isqrt(square.denominator))
-    powers = {name: halves * exponent / 2 for name, exponent in base.items()}
-    whole, odd = divmod(int(halves), 2)
-    if any(each.denominator != 1 for each in (halves, *powers.values())) or (odd and root * root != square):
-        raise _UnknownUnitError(unit)
-    return square**whole * root**odd, {name: int(each) for name, each in powers.items()}
+    if not power.removeprefix("-").isdigit():
+        raise KeyError(unit)
+    square, base = _composed(symbol)
+    return square ** int(power), {name: int(power) * exponent for name, exponent in base.items()}
+
+
+def square_by_pint(unit: str) -> Square:
+    """Return the square of ``unit``, see ``Square``, from the definitions of pint.
+
+    Raises:
+        ValueError: pint knows no such unit, or an exponent is not a multiple of one half.
+    """
+    import pint
+
+    square = {}
+    try:
+        units = registry().parse_units("" if unit == "1" else unit)._units
+    except pint.UndefinedUnitError as error:
+        raise _UnknownUnitError(str(error)) from None
+    for name, exponent in units.items():
+        square[name] = round(2 * float(exponent))  # type: ignore[arg-type]
+        if square[name] != 2 * exponent:
+            raise ValueError(f"{unit!r}: expected exponents that are whole or halves")
+    base = registry().Quantity(Fraction(1), pint.util.UnitsContainer(square)).to_base_units()
+    exponents = {registry().get_symbol(name): int(exponent) for name, exponent in base._units.items()}  # type: ignore[arg-type]
+    return Fraction(base.magnitude), tuple(sorted(exponents.items()))
 
 
 def _scaled(number: Fraction, square: Fraction) -> float:
