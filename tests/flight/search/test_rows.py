@@ -43,10 +43,10 @@ def whole(request, tmp_path_factory):
         campaign = search(WORST, "case1", "tube_level", 64, changes={"duration": "120 s"})
     else:
         campaign = search(RARE, required(folder, "0.49 deg", duration="4 s", fault=[]), "margin_a", rare.LEAST_BUDGET)
-    assert run(campaign, folder / "whole.parquet", Executor()).flown_now == len(
-        Results(folder / "whole.parquet").finished
-    )
-    return campaign, Results(folder / "whole.parquet")
+    rows = run(campaign, folder / "whole.parquet", Executor())
+    results = Results(folder / "whole.parquet")
+    assert rows.flown_now == results.campaign.samples
+    return campaign, results
 
 
 def run(campaign, out, executor):
