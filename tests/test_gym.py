@@ -51,7 +51,7 @@ def test_the_side_view_follows_the_vehicle(scenario):
     with pytest.raises(ParameterError, match="render_mode = 'ansi': expected one of human, rgb_array"):
         hsv.gym.TrackEnv(render_mode="ansi")
     matplotlib.use("agg")
-    with pytest.raises(ParameterError, match="'human': no window can be opened here, expected 'rgb_array'"):
+    with pytest.warns(UserWarning, match="'human': no window can be opened without a display"):
         hsv.gym.TrackEnv(render_mode="human").reset()
 
 

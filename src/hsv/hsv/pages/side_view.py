@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from hsv.base.errors import ParameterError
 from hsv.pages.airframe.geometry import Airframe, Point, airframe
 
 SPACING = 0.5
@@ -59,11 +59,7 @@ class Image:
     """The side view of a vehicle as an image, of 640 x 400 pixels; angles are true, the bending is exaggerated."""
 
     def __init__(self, shown: bool, elastic: bool) -> None:
-        """Open a window if the image is ``shown``; a vehicle that is not ``elastic`` is drawn as a plain cone.
-
-        Raises:
-            ParameterError: No window can be opened.
-        """
+        """Open a window if the image is ``shown``; a vehicle that is not ``elastic`` is drawn as a plain cone."""
         # Imported here, as pages need the geometry only and matplotlib takes long to import.
         from matplotlib import pyplot
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -73,7 +69,7 @@ class Image:
         self._opened = pyplot.fignum_exists
         self.figure = (pyplot.figure if shown else Figure)(figsize=(6.4, 4.0), dpi=100)
         if shown and self.figure.canvas.required_interactive_framework is None:
-            raise ParameterError("render_mode = 'human': no window can be opened here, expected 'rgb_array'")
+            warnings.warn("render_mode = 'human': no window can be opened without a display", stacklevel=2)
         self._pixels = FigureCanvasAgg(self.figure) if not shown else None
         self._axes = self.figure.add_axes((0.0, 0.0, 1.0, 1.0))
 
