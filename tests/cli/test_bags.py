@@ -62,9 +62,10 @@ def test_replay_names_process_step_and_field(hsv, bag, tmp_path):
     assert one.code == 0 and len(one.out.splitlines()) == 1
 
 
-def test_what_a_replay_over_dds_needs_is_looked_for_before_it_starts(hsv, bag):
-    done = hsv("replay", str(bag), "--over-dds", "--node", "plant")
-    assert done.code == 2 and f"{bag.name}_0.mcap: no topic /hsv/run" in done.error
+def test_a_replay_of_one_node_repeats_no_loop(hsv, bag):
+    for words in ("--over-dds", "--rerun"):
+        done = hsv("replay", str(bag), words, "--node", "plant")
+        assert done.code == 2 and done.error.startswith("node = 'plant': the whole loop is repeated, expected no ")
 
 
 def test_diff_names_the_first_difference_and_the_largest_with_units(hsv, bag, tmp_path):

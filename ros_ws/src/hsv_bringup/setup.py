@@ -25,7 +25,6 @@ setup(
             "client = hsv_bringup.commands:main",
             "player = hsv_bringup.player:main",
             "ring = hsv_bringup.ring:main",
-            "peer_emulator = hsv_bringup.peer_emulator:main",
         ]
     },
 )

@@ -191,9 +191,6 @@ CONTROLLERS = {node.name: node for node in (TUBE_MPC, ROBUST_MPC)}
 COMPOSED = NodeDescription("composed", "hsv_bringup", "composed", (), ())
 """All nodes of the graph in one process."""
 
-PEER_EMULATOR = NodeDescription("peer_emulator", "hsv_bringup", "peer_emulator", (), ())
-"""Process outside the graph that replaces all other nodes when one node is replayed."""
-
 PLAYER = NodeDescription("player", "hsv_bringup", "player", (), ())
 """Process outside the graph that republishes a bag."""
 

@@ -1,4 +1,4 @@
-"""Parameters of the nodes' infrastructure: lockstep, pace, recorder, live view and peer emulator.
+"""Parameters of the nodes' infrastructure: lockstep, pace, recorder and live view.
 
 The tables of :mod:`hsv.graph.node_parameters` also have the parameters of all components, which it has to import.
 A node imports only this module and its own component, so that it starts faster.
@@ -50,11 +50,3 @@ LIVE_PARAMETERS = (
     Parameter("live.bag", "", "bag of the flight, which the live page names at the end"),
 )
 """Parameters of the live view."""
-
-PEER_EMULATOR_PARAMETERS = (
-    Parameter("peer_emulator.bag", "", "bag to feed the node from"),
-    Parameter("peer_emulator.node", "", "node under test"),
-    Parameter("peer_emulator.directory", "", "bag to write with its outputs, a new directory"),
-    Parameter("peer_emulator.timeout", 30.0, "wall time to wait for an answer to a step", "s", 0.1, 1e6),
-)
-"""Parameters of the peer emulator, which replaces all other nodes in a replay over DDS."""

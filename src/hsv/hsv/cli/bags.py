@@ -27,7 +27,7 @@ def replay(
     design: SuppliedDesignOption = None,
     scenario: SuppliedScenarioOption = None,
     rerun: Annotated[bool, Option("--rerun", help="Repeat the whole loop, not each node.")] = False,
-    over_dds: Annotated[bool, Option("--over-dds", help="Run the real node processes.")] = False,
+    over_dds: Annotated[bool, Option("--over-dds", help="Repeat the whole loop with the node processes.")] = False,
     trust: TrustOption = False,
     json: JsonOption = False,
 ) -> None:
@@ -54,9 +54,9 @@ def replay(
     processes = engine.processes_of(controller, estimated(values))
     if node and node not in processes:
         raise ParameterError(f"node = {node!r}: expected {one_of(processes, node)}")
-    if node and rerun:
-        raise ParameterError(f"node = {node!r}: a rerun repeats the whole loop, expected one of --node and --rerun")
-    if controller_node(controller).foreign and rerun and over_dds:
+    if node and (rerun or over_dds):
+        raise ParameterError(f"node = {node!r}: the whole loop is repeated, expected no --rerun or --over-dds")
+    if controller_node(controller).foreign and over_dds:
         raise ParameterError(
             f"controller = {controller!r}: a separate node, which a bag does not start: expected --rerun without "
             "--over-dds, which uses its recorded commands"
@@ -67,10 +67,9 @@ def replay(
     results = []
     with output.stages() as progress:
         if over_dds:
-            from hsv.graph import replay_over_dds as real
+            from hsv.graph.replay_over_dds import replay as fly_again
 
-            given = (controller, values, progress)
-            compared = real.rerun(opened, *given) if rerun else real.replay_all(opened, names, *given)
+            compared = fly_again(opened, controller, values, progress)
         elif rerun:
             compared = iter(engine.rerun(opened, controller, values, progress))
         else:
