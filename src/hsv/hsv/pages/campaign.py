@@ -124,7 +124,6 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
         else {},
         failed=failed and spaced(failed.name),
         lost=lost,
-        old=results.format == 1,
         sorted=failed and _sorted(results, failed, numbers),
         picture=picture(pictured, numbers, end, shades),
         result=results.path.name,

@@ -80,8 +80,7 @@ def _lost(frame: DataFrame) -> np.ndarray:
 def _sizes(frame: DataFrame, name: str) -> np.ndarray:
     """Return the magnitudes (margins: values) of a metric, infinite if not reached, NaN if lost or not applicable."""
     values = frame[name].to_numpy(float, copy=True)
-    if "not_reached" in frame:
-        values[np.asarray(frame["not_reached"].fillna("").str.contains(name, regex=False))] = np.inf
+    values[np.asarray(frame["not_reached"].fillna("").str.contains(name, regex=False))] = np.inf
     values[_lost(frame)] = np.nan
     return np.abs(values) if name in METRICS and METRICS[name].signed else values
 

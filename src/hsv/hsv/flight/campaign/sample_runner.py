@@ -31,11 +31,8 @@ from hsv.plugins.library import LibraryController
 CAMPAIGN, ENVELOPE, DIGEST = b"hsv.campaign", b"hsv.envelope", b"hsv.digest"
 """Keys in the metadata of a result file: the campaign, the envelope, and the digest of both."""
 
-FORMAT = b"hsv.format"
-"""Key of the number of the file's format; a file without it has format 1."""
-
-LATEST = 2
-"""Number of this version's format. Format 1 has no column ``not_reached``, and lost flights are in its envelope."""
+FORMAT, LATEST = b"hsv.format", b"2"
+"""Key of the number of the file's format in its metadata, and the number; a file of release 0.1.0 has none."""
 
 OUTCOMES = {"end_time": "s", "tube_level": "1", **{name: metric.unit for name, metric in METRICS.items()}}
 """Names of the numbers that are recorded of every flight, with their SI units; a number may be undefined (null)."""

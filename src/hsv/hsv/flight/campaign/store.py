@@ -6,7 +6,6 @@ import hashlib
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -37,7 +36,7 @@ class ResultStore(Store):
             self.out.unlink(missing_ok=True)
         batches = self.numbers()
         if self.out.exists():
-            self._check(read_result(self.out).campaign, self.out)
+            self._check(read_result(self.out)[0], self.out)
             shutil.rmtree(self.folder, ignore_errors=True)
             return set(batches)
         described = self.folder / _CAMPAIGN_FILE
@@ -67,7 +66,7 @@ class ResultStore(Store):
                     envelope.merge(its_envelope)
                     writer.write_table(part.cast(columns))
                 kept = {CAMPAIGN: self._campaign.text.encode(), ENVELOPE: envelope.encode().encode()}
-                writer.add_key_value_metadata(kept | {DIGEST: result_digest(kept), FORMAT: b"%d" % LATEST})
+                writer.add_key_value_metadata(kept | {DIGEST: result_digest(kept), FORMAT: LATEST})
             replace_file(temporary, self.out)
         shutil.rmtree(self.folder)
 
@@ -105,17 +104,8 @@ class ResultStore(Store):
             )
 
 
-class ResultMetadata(NamedTuple):
-    """The metadata of a result file."""
-
-    campaign: Campaign
-    envelope: Envelope
-    format: int
-    """Number of the file's format, at most :data:`hsv.flight.campaign.sample_runner.LATEST`"""
-
-
-def read_result(path: Path) -> ResultMetadata:
-    """Return the metadata of a Parquet file with the results of a campaign.
+def read_result(path: Path) -> tuple[Campaign, Envelope]:
+    """Return campaign and envelope in the metadata of a Parquet file with the results of a campaign.
 
     Raises:
         CampaignError: The file is missing, damaged, not the result of a campaign, or of a format not read here.
@@ -130,22 +120,19 @@ def read_result(path: Path) -> ResultMetadata:
         raise CampaignError(f"{path}: not the result of a campaign, expected a file of hsv montecarlo")
     if metadata.get(DIGEST) != result_digest(metadata):
         raise CampaignError(f"{path}: damaged, its digest is missing or wrong; expected the result of a campaign")
-    number = metadata.get(FORMAT, b"1")
-    if number not in [b"%d" % known for known in range(1, LATEST + 1)]:
-        raise CampaignError(f"{path}: format {number.decode(errors='replace')!r}, expected 1 to {LATEST}")
+    if (number := metadata.get(FORMAT, b"1")) != LATEST:
+        raise CampaignError(f"{path}: format {number.decode(errors='replace')!r}, expected {LATEST.decode()}")
     try:
         campaign = Campaign.from_text(metadata[CAMPAIGN].decode())
     except (CampaignError, UnicodeDecodeError) as error:
         raise CampaignError(f"{path}: {error}") from error
     try:
         for column in schema(campaign):
-            if column.name == "not_reached" and number == b"1":
-                continue
             lack = f"column {column.name!r}"
             if not columns.field(column.name).equals(column, check_metadata=True):
                 raise KeyError
         lack = "envelope of this version's curves"
-        return ResultMetadata(campaign, Envelope.decode(metadata[ENVELOPE].decode()), int(number))
+        return campaign, Envelope.decode(metadata[ENVELOPE].decode())
     except (KeyError, ValueError) as error:
         raise CampaignError(
             f"{path}: has no {lack}, written by commit {campaign.commit}; expected a result of this version"

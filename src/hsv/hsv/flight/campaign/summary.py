@@ -88,8 +88,8 @@ class Results:
         self.trust = trust
         self.campaign: Campaign
         self.envelope: Envelope
-        """The envelope of the flights that finished; in format 1, of all whose controller did not crash."""
-        self.campaign, self.envelope, self.format = read_result(path)
+        """The envelope of the flights that finished."""
+        self.campaign, self.envelope = read_result(path)
 
     @property
     def flyable(self) -> bool:
@@ -150,9 +150,7 @@ class Results:
         return ~(self.column("diverged") | self.crashed)
 
     def not_reached(self, name: str) -> np.ndarray:
-        """Whether each flight did not reach the time ``name``, shape (flights,); unknown, hence false, in format 1."""
-        if self.format == 1:
-            return np.zeros(self.campaign.samples, bool)
+        """Whether each flight did not reach the time ``name``, shape (flights,)."""
         names = self._table["not_reached"].to_pylist()
         return np.array([name in each.split() if each else False for each in names])
 

@@ -105,7 +105,7 @@ class Rows(ResultStore):
     def finished(self, restart: bool) -> set[int]:
         """Open the results, or discard them with ``restart``; a search has no batches before it flies."""
         if self.out.exists() and not restart:
-            self._check(replace(read_result(self.out).campaign, samples=self._campaign.samples), self.out)
+            self._check(replace(read_result(self.out)[0], samples=self._campaign.samples), self.out)
             return set()
         return super().finished(restart)
 
