@@ -15,7 +15,7 @@ from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import NotchSection, discretise, with_notch
 from hsv.model.actuators import ACTUATOR_SETS, IDEAL, ActuatorSet
 from hsv.model.dynamics import VehicleParameters, jacobian
-from hsv.model.lpv.actuated import held_behind, sampled_actuators
+from hsv.model.lpv.actuated import behind_sampled, held_behind, sampled_actuators
 from hsv.model.signals import INPUT_NAMES, N_RIGID, N_STATES, PITCH_RATE, STATE_NAMES
 from hsv.model.trim import trim
 
@@ -185,12 +185,7 @@ def vertex_loops(design: ControlDesign) -> list[SampledLoop]:
     """
     A, B = design.polytope.A[:, :N_RIGID, :N_RIGID], design.polytope.B[:, :N_RIGID]
     if design.actuators:
-        sampled = sampled_actuators(design.actuator_sets, design.period)
-        n, a = N_RIGID, len(sampled.A)
-        whole, inputs = np.zeros((len(A), n + a, n + a)), np.zeros((len(A), n + a, B.shape[-1]))
-        whole[:, :n, :n], whole[:, :n, n:], whole[:, n:, n:] = A, B @ sampled.C, sampled.A
-        inputs[:, :n], inputs[:, n:] = B @ sampled.D, sampled.B
-        A, B = whole, inputs
+        A, B = behind_sampled(A, B, sampled_actuators(design.actuator_sets, design.period))
     gain = np.zeros((len(INPUT_NAMES), A.shape[-1]))
     gain[:, :N_RIGID] = design.feedback_gain[:, :N_RIGID]
     A, B, gain = with_notch(A, B, gain, discretise(design.notch, design.period))

@@ -26,7 +26,7 @@ import numpy as np
 from hsv.control.notch_filter import with_notch
 from hsv.core import Struct
 from hsv.model.actuators import ActuatorSet
-from hsv.model.lpv.actuated import actuator_names, sampled_actuators
+from hsv.model.lpv.actuated import actuator_names, behind_sampled, sampled_actuators
 from hsv.model.signals import N_RIGID, PITCH_RATE, STATE_NAMES
 
 
@@ -78,7 +78,8 @@ def error_system(
     r = len(A)
     A_x, B_x, F_x = A[:, :N_RIGID, :N_RIGID], B[:, :N_RIGID], F[:, :N_RIGID]
     if actuators:
-        A_x, B_x, F_x = _with_actuators(A_x, B_x, F_x, sampled_actuators(actuators, period))
+        A_x, B_x = behind_sampled(A_x, B_x, sampled_actuators(actuators, period))
+        F_x = np.pad(F_x, ((0, 0), (0, A_x.shape[1] - N_RIGID)))
     whole, inputs, gain = with_notch(A_x, B_x, F_x, notch)
     n, a = whole.shape[1], A_x.shape[1] - N_RIGID
     columns = np.zeros((r, n, 7))
@@ -95,17 +96,6 @@ def error_system(
     feedthrough = np.zeros((2, columns.shape[2]))
     feedthrough[:, 4] = F_x[:, PITCH_RATE]
     return ErrorSystem(whole + inputs @ gain, inputs, columns, gain, feedthrough, names, a)
-
-
-def _with_actuators(
-    A: np.ndarray, B: np.ndarray, F: np.ndarray, actuators: Struct
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return A (r, n + a, n + a), B (r, n + a, 2) and F (2, n + a) with the a states of ``actuators`` appended."""
-    (r, n, _), a = A.shape, len(actuators.A)
-    whole, inputs = np.zeros((r, n + a, n + a)), np.empty((r, n + a, B.shape[2]))
-    whole[:, :n, :n], whole[:, :n, n:], whole[:, n:, n:] = A, B @ actuators.C, actuators.A
-    inputs[:, :n], inputs[:, n:] = B @ actuators.D, actuators.B
-    return whole, inputs, np.concatenate((F, np.zeros((len(F), a))), axis=1)
 
 
 def union(first: ErrorSystem, *others: ErrorSystem) -> ErrorSystem:

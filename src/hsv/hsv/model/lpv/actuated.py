@@ -73,6 +73,18 @@ def respond(actuators: Struct, commands: np.ndarray) -> tuple[np.ndarray, np.nda
     return states, means
 
 
+def behind_sampled(A: np.ndarray, B: np.ndarray, actuators: Struct) -> tuple[np.ndarray, np.ndarray]:
+    """Return A (r, n + a, n + a) and B (r, n + a, 2) of discrete systems that follow the mean actuator positions.
+
+    The a states of the sampled ``actuators`` come last; ``A`` (r, n, n), ``B`` (r, n, 2).
+    """
+    (r, n, _), a = A.shape, len(actuators.A)
+    whole, inputs = np.zeros((r, n + a, n + a)), np.empty((r, n + a, N_INPUTS))
+    whole[:, :n, :n], whole[:, :n, n:], whole[:, n:, n:] = A, B @ actuators.C, actuators.A
+    inputs[:, :n], inputs[:, n:] = B @ actuators.D, actuators.B
+    return whole, inputs
+
+
 def held_behind(
     A: np.ndarray, B: np.ndarray, period: float, actuators: Sequence[ActuatorSet] = (), delay: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
