@@ -56,13 +56,12 @@ def critical_coupling(feedback: Feedback, over: Corners = NOMINAL) -> float | No
     return stability_limit(lambda kappa: largest_growth(feedback, load_vehicle().coupled(kappa), over), COUPLING_SCALES)
 
 
-def stability_limit(growth: Callable[[float], float], along: Sequence[float], tolerance: float = 1e-6) -> float | None:
+def stability_limit(growth: Callable[[float], float], along: Sequence[float]) -> float | None:
     """Return the first scalar, in the order of ``along``, at which a loop becomes unstable.
 
     Args:
         growth: Largest real part (1/s) of a loop's poles as a function of a scalar, such as kappa.
         along: Values of the scalar, increasing or decreasing, so dense that no two crossings lie between neighbours.
-        tolerance: Tolerance of a crossing, as a fraction of the interval that it lies in.
 
     Returns:
         ``along[0]`` if the loop is unstable there; None if it is stable at all values of ``along``.
@@ -71,5 +70,5 @@ def stability_limit(growth: Callable[[float], float], along: Sequence[float], to
         return float(along[0])
     for before, value in pairwise(along):
         if growth(value) >= 0.0:
-            return float(brentq(growth, before, value, xtol=tolerance * abs(value - before)))
+            return float(brentq(growth, before, value, xtol=1e-6 * abs(value - before)))
     return None

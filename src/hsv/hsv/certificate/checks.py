@@ -106,9 +106,9 @@ def same(name: str, value: Any, expected: Any, tolerance: str, size: Any = 1.0) 
     return Check(f"{name}{where}", float(value[worst]), f"{float(expected[worst])!r}", False)
 
 
-def recomputed(subject: Subject, field: str, value: Any, tolerance: str, size: Any = 1.0) -> Check:
+def recomputed(subject: Subject, field: str, value: Any, tolerance: str) -> Check:
     """Return the check that a ``field`` of the certificate has the recomputed ``value``; see :func:`same`."""
-    return replace(same(field, subject.stated(field), value, tolerance, size), fields=(field,))
+    return replace(same(field, subject.stated(field), value, tolerance), fields=(field,))
 
 
 def equal(subject: Subject, field: str, expected: Any) -> Check:

@@ -240,12 +240,12 @@ def mu_scaled(M: np.ndarray, scaling: float) -> np.ndarray:
     return np.asarray(np.linalg.norm(M * np.array([[1.0, scaling], [1.0 / scaling, 1.0]]), 2, axis=(-2, -1)))
 
 
-def classical_margins(loop: BrokenLoop, frequencies: np.ndarray | None = None) -> ClassicalMargins:
+def classical_margins(loop: BrokenLoop) -> ClassicalMargins:
     """Return gain, phase and delay margins of a single stable loop; the limits of each are refined between grid points.
 
     The upper gain margin of a discrete loop may lie at the Nyquist frequency, the lower one at frequency zero.
     """
-    w = grid(loop.period, 2400) if frequencies is None else frequencies
+    w = grid(loop.period, 2400)
     L, response = 1.0 / loop.sensitivity(w)[:, 0, 0] - 1.0, loop.transfer
     real = [(f, response(f)) for f in (0.0, *_roots(lambda f: response(f).imag, w, L.imag), pi / loop.period)]
     factors = [(1.0 / abs(value), f) for f, value in real if value.real < 0.0 and np.isfinite(value)]

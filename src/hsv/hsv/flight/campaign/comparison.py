@@ -146,7 +146,7 @@ def _difference(name: str, a: DataFrame, b: DataFrame) -> dict[str, Any]:
     return {"pairs": len(found), "difference": percentiles(found, (50.0,))[0], **ends}
 
 
-def median_interval(ordered: np.ndarray, confidence: float = CONFIDENCE) -> tuple[float, float]:
+def median_interval(ordered: np.ndarray) -> tuple[float, float]:
     """Return the percentile bootstrap interval of the median of ``ordered`` values, shape (n,), without resampling.
 
     The median of a resample is one of the values; of n uniform draws, the m-th smallest has a beta distribution.
@@ -155,6 +155,6 @@ def median_interval(ordered: np.ndarray, confidence: float = CONFIDENCE) -> tupl
 
     n = len(ordered)
     m = (n + 1) // 2
-    shares = beta.ppf([(1.0 - confidence) / 2.0, (1.0 + confidence) / 2.0], m, n + 1 - m)
+    shares = beta.ppf([(1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0], m, n + 1 - m)
     low, high = np.minimum((n * shares).astype(int), n - 1)
     return float(ordered[low]), float(ordered[high])
