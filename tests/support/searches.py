@@ -30,8 +30,9 @@ def in_memory(campaign):
 
 
 def required(folder, at_most, **fields):
-    """Write a variant of case1 that requires an attitude of ``at_most`` after the fault; return its path."""
+    """Write a variant of case1 that requires an attitude of ``at_most``, after the fault if any; return its path."""
     row = {"name": "a", "signal": "attitude_from_nominal", "at_most": at_most, "always": True}
+    row |= {} if fields.get("fault") == [] else {"from": "fault"}
     table = {"extends": "case1", "title": "required", "requirement": [row]} | fields
     (path := folder / "required.toml").write_text(tomli_w.dumps(table), encoding="utf-8")
     return str(path)
