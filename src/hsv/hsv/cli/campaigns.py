@@ -310,11 +310,8 @@ def resilience(
             flown = run_campaign(campaign, store, flying, progress=progress)
             complete(store.folder)
         results = ResilienceResults.read(campaign, store)
-        given = {
-            "--controllers": controllers,
-            "--faults": faults,
-            "--out": "" if out == Path("resilience") else str(out),
-        }
+        folder = "" if out == Path("resilience") else str(out)
+        given = {"--controllers": controllers, "--faults": faults, "--out": folder}
         options = [word for pair in given.items() if pair[1] for word in pair]
         written = write_results(results, out, shlex.join(["hsv", "resilience", *options]))
     if json:

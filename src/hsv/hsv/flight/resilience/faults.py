@@ -149,12 +149,8 @@ TRIED = {
     "pitch_rate_scale": TriedFault(_RATE, "sensor_scale", "factor", "1", 1.0, 0.0, (0.9, 0.7, 0.5)),
     "pitch_rate_drop_out": TriedFault(_RATE, "sensor_drop_out", "probability", "1", 0.0, 1.0, (0.1, 0.5, 0.8)),
 }
-"""Faults by name.
+"""Faults by name; docs/resilience.md explains values and ranges.
 
-Mild values are realistic: the effectiveness of 0.9 in the paper, published bandwidths, low noise, and for an unstart
-the moment of one degree of elevator (0.0225). At the severe values, controllers begin to differ. The ranges extend to
-the loss of the baseline design, or to the physical limit: no elevator, no fuel, no thrust. The elevator is trimmed at
-12 deg and limited to 30 deg. Therefore a bias, a drift or a moment is worse in the direction that must be countered by
-a larger positive deflection. Lock and float are intermittent; their severity is the fraction of the time in which they
-act. A hard-over runs at 100 deg/s, as usual actuators do, and ends when a monitor switches the actuator off; its
-severity is the time until then."""
+A bias, a drift or a moment has the direction that a larger positive elevator deflection counters, the worse one: the
+elevator is trimmed at 12 deg and limited to 30 deg. The moment of the mild unstart is that of one degree of elevator.
+"""
