@@ -8,7 +8,7 @@ import pytest
 
 from hsv.base.errors import ScenarioError
 from hsv.base.files import follow_extends
-from hsv.flight.distribution import KINDS, TRUNCATION, Distribution, standard_quantiles
+from hsv.flight.distribution import KINDS, TRUNCATION, Distribution, standard_quantiles, standard_shares
 from hsv.flight.scenario import scenario_at_means
 
 INITIAL = {"altitude": "85500 ft", "velocity": "7900 ft/s"}
@@ -111,3 +111,10 @@ def test_an_inherited_distribution_is_replaced_whole():
     }
     merged = follow_extends("own", files.__getitem__, lambda name, why: ScenarioError(why), values=KINDS)
     assert merged == {"x": {"a": {"normal": [0, 1]}, "b": 3, "c": {"uniform": [0, 1]}}}
+
+
+def test_shares_of_the_normal_distribution_are_those_of_mpmath():
+    x = np.linspace(-8.0, 8.0, 161)
+    exact = [float(mpmath.ncdf(each)) for each in x.tolist()]
+    np.testing.assert_allclose(standard_shares(x), exact, rtol=1e-15, atol=1e-15)
+    np.testing.assert_allclose(standard_quantiles(standard_shares(x[40:121])), x[40:121], atol=1e-11)

@@ -4,14 +4,12 @@ import math
 from dataclasses import replace
 from statistics import NormalDist
 
-import mpmath
 import numpy as np
 import pytest
 from searches import in_memory, required, search
 
 from hsv.flight.campaign.campaign import RARE
 from hsv.flight.campaign.summary import clopper_pearson
-from hsv.flight.distribution import standard_quantiles, standard_shares
 from hsv.flight.search.rare import estimate, of_campaign
 
 PROBABILITY = 1e-5
@@ -85,13 +83,6 @@ def test_lost_flights_are_failures_and_the_same_seed_gives_the_same_result():
     found = estimate(lambda points: np.where(points[:, 0] > 3.0, -math.inf, 3.0 - points[:, 0]), 2, 20_000)
     assert found.interval[0] <= 1.0 - NormalDist().cdf(3.0) <= found.interval[1]
     assert estimate(linear, 10, 6_000) == estimate(linear, 10, 6_000)
-
-
-def test_shares_of_the_normal_distribution_are_those_of_mpmath():
-    x = np.linspace(-8.0, 8.0, 161)
-    exact = [float(mpmath.ncdf(each)) for each in x.tolist()]
-    np.testing.assert_allclose(standard_shares(x), exact, rtol=1e-15, atol=1e-15)
-    np.testing.assert_allclose(standard_quantiles(standard_shares(x[40:121])), x[40:121], atol=1e-11)
 
 
 @pytest.mark.long
