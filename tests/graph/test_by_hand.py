@@ -155,6 +155,7 @@ def test_topics_are_listed_and_printed_with_units(processes):
     wait_until(lambda: recorded_steps(bag), [flight.pid])
     listed = [json.loads(line) for line in _lines(processes.run("hsv", "topic", "--json"))]
     rows = {row["topic"]: row for row in listed}
+    assert not any("/_" in topic for topic in rows)  # the topics of an action are hidden, as in ros2 topic
     command = rows["/hsv/command"]
     assert command["type"] == "hsv_msgs/msg/ControlInput" and command["publishers"] == ["/tube_mpc"]
     assert command["subscribers"] == ["/fault_injector", "/recorder"]

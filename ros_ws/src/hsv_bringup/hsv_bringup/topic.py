@@ -9,6 +9,7 @@ from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import QoSProfile
+from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 
 from hsv.bags.columns import Track
 from hsv.bags.definitions import definition, message_types
@@ -53,6 +54,7 @@ def _print_topics(client: GraphClient, options: SimpleNamespace) -> None:
         {"topic": name, "type": ", ".join(kinds)}
         | {"publishers": client.publishers_of(name), "subscribers": client.subscribers_of(name)}
         for name, kinds in _topics(client).items()
+        if not topic_or_service_is_hidden(name)
     ]
     width, wide = (max(len(row[column]) for row in rows) for column in ("topic", "type"))
     for row in rows:
