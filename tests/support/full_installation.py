@@ -16,26 +16,23 @@ from waiting import wait_until
 
 from ros2 import real_command
 
-COMMANDS = ("launch", "bag", "service", "param", "doctor")
-"""The subcommands of ros2 that the tests need."""
+COMMANDS = ("launch", "service", "param", "doctor")
+"""The subcommands of ros2 that all tests need."""
 
 
 @cache
-def missing() -> str:
-    """Return why the tests of these tools cannot run here; empty if they can."""
+def missing(*words: str) -> str:
+    """Return why tests of ``ros2`` with ``words`` cannot run here; empty if they can."""
     command = real_command()
     if command is None:
         return "no full ROS 2 installation is sourced: there is no ros2 but that of .venv"
-    for word in COMMANDS:
-        asked = subprocess.run([command, word, "--help"], capture_output=True, check=False)
-        if asked.returncode:
-            return f"the installation that is sourced has no ros2 {word}"
-    return ""
+    asked = subprocess.run([command, *words, "--help"], capture_output=True, check=False)
+    return f"the installation that is sourced has no ros2 {' '.join(words)}" if asked.returncode else ""
 
 
-def needs_full_installation() -> None:
-    """Skip the test if a tool is missing."""
-    if reason := missing():
+def needs(*words: str) -> None:
+    """Skip the test if ``ros2`` with ``words`` is missing."""
+    if reason := missing(*words):
         pytest.skip(reason)
 
 
