@@ -32,11 +32,14 @@ void hsv_plant_conditions(const hsv_plant *plant, hsv_plant_memory *memory, hsv_
     if (!plant->atmosphere.still)
         hsv_atmosphere_step(&plant->atmosphere, memory->atmosphere, k, plant->seed, x[ALTITUDE], x[VELOCITY],
                             conditions);
-    const AirRelative air =
-        air_relative(x[VELOCITY], x[PITCH] - x[ALPHA], conditions[WIND_FORWARD], conditions[WIND_UP]);
-    const double mach = air.speed / speed_of_sound(x[ALTITUDE], (const Vehicle *)&plant->vehicle);
-    hsv_apply_engine_faults(&faults->engine, k, plant->seed, x[ALPHA] - air.turn, mach, fuel,
-                            conditions + THRUST_FACTOR);
+    double alpha = x[ALPHA], mach = 0.0;
+    if (faults->engine.count > 0) {
+        const AirRelative air =
+            air_relative(x[VELOCITY], x[PITCH] - alpha, conditions[WIND_FORWARD], conditions[WIND_UP]);
+        alpha -= air.turn;
+        mach = air.speed / speed_of_sound(x[ALTITUDE], (const Vehicle *)&plant->vehicle);
+    }
+    hsv_apply_engine_faults(&faults->engine, k, plant->seed, alpha, mach, fuel, conditions + THRUST_FACTOR);
 }
 #endif
 
