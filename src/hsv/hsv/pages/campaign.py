@@ -32,6 +32,7 @@ from hsv.flight.campaign.summary import (
 from hsv.flight.flight import Flight
 from hsv.flight.limits import missed
 from hsv.flight.metrics import Group, is_share, metric_of, spaced
+from hsv.flight.search.rows import recorded_badness
 from hsv.model.plant import Plant
 from hsv.pages.campaign_plots import SURVIVAL, campaign_figure
 from hsv.pages.engine import Numbers, Plot, render, write_page
@@ -75,9 +76,12 @@ def write_campaign_page(results: Results, out: Path, units: UnitSystem = UnitSys
 
 def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> str:
     """Return the HTML page of a campaign; ``units`` are its initial units."""
-    worst, shown, judged = worst_flights(results), distributions(results), shares(results)
+    searched = results.campaign.method in SEARCHES
+    worst = worst_flights(results, badness=recorded_badness(results) if searched else None)
+    shown, judged = distributions(results), shares(results)
     flights = _repeated(results, worst[0].flight)
     differing = [d for d in shown if d.minimum < d.maximum]
+    varied = [d.name for d in differing]
     lost = results.campaign.samples - int(results.finished.sum())
     grouped = _grouped(differing)
     numbers = Numbers()
@@ -90,7 +94,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
     survival = partial(campaign_figure, {results.path.stem: results}, panels=[SURVIVAL], layout=Layout(size=(7.0, 2.5)))
     starts = [fault.start for fault in results.campaign.scenario.fault]
     shades = [(start, end) for start in starts if start < end]
-    search = search_section(results, numbers) if results.campaign.method in SEARCHES else None
+    search = search_section(results, numbers) if searched else None
     absent = [name for name, there in (("scatter", differing), ("search", search)) if not there]
     return render(
         "campaign.html.j2",
@@ -134,7 +138,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
         constant=[d for d in shown if d.minimum == d.maximum],
         outcome=_outcome,
         worst=worst,
-        chosen=next((d.name for d in differing if d.name == worst[0].limit), differing[0].name if differing else ""),
+        chosen=next((name for name in (results.campaign.goal, worst[0].limit, *varied) if name in varied), ""),
         ended=ENDED,
         relative=relative,
         share_interval=share_interval,

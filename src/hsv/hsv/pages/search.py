@@ -52,6 +52,7 @@ def search_section(results: Results, numbers: Numbers) -> dict[str, Any]:
     most = max(influences.values(), default=0.0) or 1.0
     return {
         "found": found,
+        "badness": bad.tolist(),
         "said": lambda badness: in_words(campaign, badness, UnitSystem.metric),
         "picture": picture([plot], numbers, float(len(bad)), axis="flight", kinds=("nominal", "actual")),
         "bars": [

@@ -277,8 +277,11 @@ def clopper_pearson(count: int, n: int, confidence: float = CONFIDENCE) -> tuple
     return float(interval.low), float(interval.high)
 
 
-def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
-    """Return the ``number`` worst flights: crashed, diverged (earliest first), then by largest ratio to a limit."""
+def worst_flights(results: Results, number: int = 10, badness: np.ndarray | None = None) -> list[WorstFlight]:
+    """Return the ``number`` worst flights: crashed, diverged (earliest first), then by largest ratio to a limit.
+
+    With ``badness`` (flights), that of a search, they are ordered by it instead of by the ratio.
+    """
     stated = {name: limit for name, limit in limits(results).items() if limit > 0.0}
     diverged, crashed, end = results.column("diverged"), results.crashed, results.column("end_time")
     every = [*stated, *required(results)]
@@ -288,7 +291,7 @@ def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
         ratios[:, index] = np.where(np.isnan(ratio), np.where(results.not_reached(name), np.inf, 0.0), ratio)
     largest = np.where(diverged | crashed, np.inf, ratios.max(axis=1))
     ended = np.where(crashed, -1.0, np.where(diverged, end, math.inf))
-    order = np.lexsort((np.arange(len(end)), ended, -largest))[:number]
+    order = np.lexsort((np.arange(len(end)), ended, -(largest if badness is None else badness)))[:number]
     samples, names = results.samples, every or [""]
     found = []
     for flight in order.tolist():
