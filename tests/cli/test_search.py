@@ -16,6 +16,8 @@ def test_the_worst_flight_flies_alone_with_the_printed_fingerprint(hsv):
     assert replayed["identical"] and replayed["fingerprint"] == alone["fingerprint"]
     again = hsv(*command).out
     assert f"fingerprint {alone['fingerprint']}" in again and "corner of the worse signs" in again
+    assert "HSV search" in (page := Path(ran["page"]).read_text(encoding="utf-8"))
+    assert f'flight</th><th scope="col" class="number">{ran["worst"]["flight"]}</th>' in page
 
 
 def test_wrong_searches_are_refused_in_one_line(hsv, tmp_path):
@@ -26,6 +28,7 @@ def test_wrong_searches_are_refused_in_one_line(hsv, tmp_path):
         (("worst", "case1", "--of", "level"), "of = 'level': expected"),
         (("worst", "case1", "--of", "tube_level", "--factor", "fault[0].start=1 s,2 s"), "a search has no grid"),
         (("rare", "required.toml", "--budget", "500"), "budget = 500: expected at least 5500 flights"),
+        (("rare", "required.toml", "--budget", "100000000"), "budget = 100000000: expected at most 10000000 flights"),
         (("rare", "case1", "--of", "tube_level"), "of = 'tube_level': a metric, expected a requirement"),
     ):
         ran = hsv(*words)

@@ -177,6 +177,7 @@ def test_a_requirement_is_read_with_units_and_in_words():
         ({"from": "later"}, "from = 'later': expected"),
         ({"from": ["fault"]}, "from"),
         ({"name": ""}, r"requirement\[0\].name = '': expected a text"),
+        ({"name": "two\nlines"}, r"requirement\[0\].name = 'two\\nlines': expected a text in one line"),
         ({"id": 3}, "id = 3"),
         ({"boud": 1}, r"requirement\[0\].boud: unknown key"),
     ],

@@ -36,6 +36,13 @@ def test_the_worst_corner_of_a_function_with_interactions_is_found(seed):
     assert sum(phase.flights for phase in worst.phases) == worst.flights
 
 
+def test_a_factor_at_whose_other_end_the_metric_is_not_defined_has_no_influence():
+    def evaluate(points):
+        return np.where(points[:, 1] < 0.0, -math.inf, points[:, 0])
+
+    assert find_worst(evaluate, FACTORS[:2], 20).influences == {"p0": 2.0}
+
+
 def test_a_time_is_searched_between_its_ends_and_the_search_is_the_same_for_any_budget_that_suffices():
     factors = [*FACTORS[:2], Factor(name="t", unit="s", low=0.0, high=150.0)]
     known = []

@@ -227,7 +227,7 @@ def replay(
         output.print_table(f"flight {flight} of {result.name}", quantities, units, shares=shares)
         crashed = outcome["crashed"]
         output.say(
-            f"sample  {sample_words(sample, units)}",
+            f"sample  {sample_words(results.campaign.factors, sample, units)}",
             f"crashed {crashed}" if crashed else f"fingerprint {outcome['fingerprint']}",
             *([f"bag     {replayed.bag}"] if replayed.bag else []),
         )

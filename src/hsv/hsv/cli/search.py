@@ -107,10 +107,11 @@ def _show_worst(found: Worst, results: Results, units: UnitSystem, json: bool, p
     if found.random_flights:
         output.say(f"worst of {found.random_flights} random flights: {drawn}")
     mattered = [f"{name} {in_words(campaign, gain, units, change=True)}" for name, gain in found.influences.items()]
+    less = [f"less bad if one moves to its other end, by: {', '.join(mattered)}"] if mattered else []
     output.say(
-        output.folded(f"sample: {sample_words(sample, units)}", 2),
-        output.folded(f"less bad if one moves to its other end, by: {', '.join(mattered)}", 2),
-        f"fingerprint {row['fingerprint'] or row['crashed']}",
+        output.folded(f"sample: {sample_words(campaign.factors, sample, units)}", 2),
+        *(output.folded(line, 2) for line in less),
+        f"crashed     {row['crashed']}" if row["crashed"] else f"fingerprint {row['fingerprint']}",
         *(f"{name:11} {file}" for name, file in files.items()),
     )
 
@@ -140,11 +141,8 @@ def rare(
     from hsv.flight.campaign.campaign import RARE
     from hsv.flight.campaign.summary import CONFIDENCE
     from hsv.flight.search.rare import LEAST_BUDGET, RUNS, of_campaign
-    from hsv.flight.search.rows import is_margin
 
     campaign = _planned(RARE, scenario, goal, budget, seed, scale, factor, changes)
-    if not is_margin(campaign.goal):
-        raise CampaignError(f"of = {goal!r}: a metric, expected a requirement of the scenario")
     if budget < LEAST_BUDGET:
         raise CampaignError(f"budget = {budget}: expected at least {LEAST_BUDGET} flights, for independent runs")
     with _searched(campaign, of_campaign, out, workers, scheduler, restart) as (found, results, flown):
@@ -180,14 +178,16 @@ def _planned(
     method: str, scenario: str, goal: str, budget: int, seed: int, scale: float, factor: Texts, changes: Texts
 ) -> Campaign:
     """Return the campaign of a search; the number of its samples is known only at its end."""
-    from hsv.flight.campaign.campaign import plan
+    from hsv.flight.campaign.campaign import MAX_SAMPLES, RARE, plan
     from hsv.flight.search.rows import check_goal
     from hsv.flight.tables import read_changes
     from hsv.graph.preparation import commit
 
+    if budget > MAX_SAMPLES:
+        raise CampaignError(f"budget = {budget}: expected at most {MAX_SAMPLES} flights")
     factors, changed = read_factors(factor or ()), read_changes(changes or ())
     planned = plan(scenario, samples=1, seed=seed, scale=scale, factors=factors, changes=changed)
-    goal = check_goal(goal, planned.scenario)
+    goal = check_goal(goal, planned.scenario, margins_only=method == RARE)
     for grid in planned.grid:
         raise CampaignError(f"factor {grid.name}: a search has no grid, expected {grid.name}=LEAST..LARGEST")
     return replace(planned, method=method, commit=commit(), goal=goal, budget=budget, samples=0)

@@ -21,6 +21,7 @@ from hsv.flight.metrics import NOT_REACHED, grouped, is_share, metric_of, spaced
 from hsv.flight.scenario import Scenario
 
 if TYPE_CHECKING:
+    from hsv.flight.campaign.campaign import Factor
     from hsv.flight.campaign.summary import Results, Share
 
 _LISTED = 5
@@ -253,7 +254,8 @@ def _print_campaign(results: Results, units: UnitSystem) -> None:
     for w in worst:
         used = "not reached" if math.isinf(w.ratio) else f"at {100 * w.ratio:.0f} % of its limit"
         used = w.limit if w.limit in ENDED else f"{spaced(w.limit)} {used}"
-        output.say(output.folded(f"{w.flight}: {used}; {sample_words(w.sample, units)}", 4, first=2))
+        sample = sample_words(results.campaign.factors, w.sample, units)
+        output.say(output.folded(f"{w.flight}: {used}; {sample}", 4, first=2))
 
 
 def _interval(share: Share) -> str:
@@ -261,13 +263,14 @@ def _interval(share: Share) -> str:
     return every if share.interval is None else " to ".join(f"{100.0 * p:.3g} %" for p in share.interval)
 
 
-def sample_words(sample: Mapping[str, float], units: UnitSystem) -> str:
-    """Return a sample (SI) as a line of text; relative changes are in percent, except in strict SI."""
-    from hsv.model.dynamics import COEFFICIENT_UNITS
-
-    percent = () if units is UnitSystem.si else COEFFICIENT_UNITS
-    words = (f"{100.0 * value:+.3g} %" if name in percent else f"{value:+.3g}" for name, value in sample.items())
-    return ", ".join(map(" ".join, zip(sample, words, strict=True)))
+def sample_words(factors: Sequence[Factor], sample: Mapping[str, float], units: UnitSystem) -> str:
+    """Return a sample (SI) of ``factors`` as a line of text in ``units``; relative changes have their sign."""
+    words = []
+    for factor in factors:
+        number, unit = in_system(sample[factor.name], factor.unit, units, share=factor.is_perturbation)
+        text = f"{number:+.3g}" if factor.is_perturbation else significant(number)
+        words.append(f"{factor.name} {text}" + ("" if unit == "1" else f" {unit}"))
+    return ", ".join(words)
 
 
 def _outcome(name: str, value: float, units: UnitSystem) -> tuple[str, str]:

@@ -252,10 +252,10 @@ def _requirement(row: Mapping[str, Any], field: str) -> Requirement:
         if key not in _KEYS:
             raise ScenarioError(f"{field}.{key}: unknown key, expected {one_of(_KEYS, key)}")
     name, own, begin = row.get("name", ""), row.get("id", ""), row.get("from", START)
-    if not isinstance(name, str) or not re.search(r"\w", name):
-        raise ScenarioError(f"{field}.name = {name!r}: expected a text")
-    if not isinstance(own, str):
-        raise ScenarioError(f"{field}.id = {own!r}: expected a text")
+    if not isinstance(name, str) or not re.search(r"\w", name) or not name.isprintable():
+        raise ScenarioError(f"{field}.name = {name!r}: expected a text in one line")
+    if not isinstance(own, str) or not own.isprintable():
+        raise ScenarioError(f"{field}.id = {own!r}: expected a text in one line")
     bounds, modes = [key for key in _BOUNDS if key in row], [key for key in MODES if key in row]
     if len(bounds) != 1:
         raise ScenarioError(f"{field}: expected either at_most or at_least")

@@ -30,10 +30,10 @@ Flown = Callable[[np.ndarray], np.ndarray]
 """Flies samples (n, factors), and returns how bad the flights are, see :func:`badness`, shape (n,)."""
 
 
-def check_goal(goal: str, scenario: Scenario) -> str:
+def check_goal(goal: str, scenario: Scenario, *, margins_only: bool = False) -> str:
     """Return the name of the metric that a search maximises, or :data:`EVERY_REQUIREMENT`, the default.
 
-    ``goal`` is a metric, or a requirement by its name or by that of its margin.
+    ``goal`` is a metric, or a requirement by its name or by that of its margin; with ``margins_only``, a requirement.
 
     Raises:
         CampaignError: There is no such metric or requirement, or no goal is given and the scenario has no requirement.
@@ -41,9 +41,12 @@ def check_goal(goal: str, scenario: Scenario) -> str:
     named = {requirement.name: requirement.metric for requirement in scenario.requirement}
     if not goal:
         if not named:
-            raise CampaignError(f"scenario {scenario.name!r}: has no requirement, expected one, or --of METRIC")
+            other = "" if margins_only else ", or --of METRIC"
+            raise CampaignError(f"scenario {scenario.name!r}: has no requirement, expected one{other}")
         return EVERY_REQUIREMENT
-    known = (*outcomes_of(scenario), *named)
+    known = (*named.values(), *named) if margins_only else (*outcomes_of(scenario), *named)
+    if margins_only and goal in OUTCOMES:
+        raise CampaignError(f"of = {goal!r}: a metric, expected a requirement of the scenario")
     if goal not in known:
         raise CampaignError(f"of = {goal!r}: expected {one_of(known, goal)}")
     return named.get(goal, goal)

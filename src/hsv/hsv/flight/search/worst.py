@@ -52,7 +52,10 @@ class Worst:
     random_flights: int
     phases: list[Phase]
     influences: dict[str, float]
-    """By how much the worst flight is less bad if a factor alone moves to its other end, by factor, sorted"""
+    """By how much the worst flight is less bad if a factor alone moves to its other end, by factor, sorted.
+
+    Factors are left out if a flight was lost, does not define the metric, or was not flown within the budget.
+    """
     flights: int
 
     def broken(self, goal: str) -> bool:
@@ -151,8 +154,8 @@ class _Search:
         for index, factor in enumerate(self.factors):
             moves = [self.moved(worst, index, end) for end in self.ends(index) if end != worst[index]]
             values = [self.known[move] for move in moves if move in self.known]
-            if values and math.isfinite(self.known[worst]):
-                found[factor.name] = self.known[worst] - min(values)
+            if values and math.isfinite(gain := self.known[worst] - min(values)):
+                found[factor.name] = gain
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
