@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hsv.base.errors import HsvError
+from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.history import History
 from hsv.flight.metrics import FlightData
@@ -186,6 +187,12 @@ def test_a_wrong_requirement_is_refused_in_one_line(changes, words):
     with pytest.raises(HsvError, match=words) as refused:
         read({**ROW, **changes})
     assert "\n" not in str(refused.value) and "case1" in str(refused.value)
+
+
+def test_a_window_shorter_than_a_period_is_refused_before_the_flight():
+    scenario = load_scenario("case1").model_copy(update={"requirement": (required(begin=0.01, within=1e-9),)})
+    with pytest.raises(HsvError, match=r"requirement 'r': within = 1e-09 s: an empty window, .* a period, 0.02 s"):
+        assemble_flight(scenario)
 
 
 def test_duplicate_names_windows_without_fault_and_other_types_are_refused():

@@ -99,12 +99,21 @@ def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> 
 
 
 def check_duration(scenario: Scenario, components: Components) -> None:
-    """Raise a ScenarioError if the duration of ``scenario`` is not a number of periods of its ``components``."""
+    """Raise a ScenarioError if the duration of ``scenario`` is no number of periods of its ``components``.
+
+    The window of a requirement must last a period, so that it has a step.
+    """
     plant, given = components.plant, f"duration = {scenario.duration:g} s"
     if plant.steps < 1:
         raise ScenarioError(f"{given}: expected at least a period, {plant.period:g} s")
     if abs(plant.steps * plant.period - scenario.duration) > 1e-9 * scenario.duration:
         raise ScenarioError(f"{given}: expected a whole number of periods, {plant.period:g} s each")
+    for requirement in scenario.requirement:
+        if requirement.within < plant.period:
+            raise ScenarioError(
+                f"requirement {requirement.name!r}: within = {requirement.within:g} s: an empty window, expected at "
+                f"least a period, {plant.period:g} s"
+            )
 
 
 @contextmanager
