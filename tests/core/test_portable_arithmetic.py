@@ -29,7 +29,7 @@ EXACT_NUMPY = {
     *("array", "asarray", "ascontiguousarray", "empty", "empty_like", "zeros", "zeros_like", "ones", "ones_like"),
     *("full", "eye", "arange", "broadcast_to", "stack", "concatenate", "column_stack", "reshape", "ravel", "copy"),
     *("abs", "sqrt", "floor", "clip", "minimum", "maximum", "max", "min", "argmax", "argmin", "ptp", "round", "diff"),
-    *("outer", "sort", "split", "void", "iscomplexobj"),
+    *("outer", "partition", "sort", "split", "void", "iscomplexobj"),
     *("all", "any", "isfinite", "isnan", "where", "flatnonzero", "searchsorted", "array_equal", "count_nonzero"),
 }
 """Permitted names of numpy: they create, move or compare arrays, or do one exact operation per element."""
