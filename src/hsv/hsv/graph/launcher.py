@@ -228,7 +228,8 @@ class Launcher:
             ):
                 time.sleep(_LOOK)
         for process in self._processes:
-            process.popen.wait(GRACE)
+            with suppress(subprocess.TimeoutExpired):  # a killed process that waits for its disk ends later
+                process.popen.wait(GRACE)
             if process.reader:
                 process.reader.join(1.0)
 

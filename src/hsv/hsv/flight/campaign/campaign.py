@@ -243,7 +243,7 @@ class Campaign:
             mine, theirs = getattr(self, field.name), getattr(other, field.name)
             if mine != theirs:
                 short = isinstance(mine, str | int) and len(str(mine)) < 60
-                return f"{field.name} = {mine} there, {theirs} here" if short else f"its {field.name} differ"
+                return f"{field.name} = {mine} there, {theirs} here" if short else f"another {field.name.replace('_', ' ')}"
         return ""
 
 
