@@ -242,8 +242,9 @@ class Campaign:
         for field in fields(self):
             mine, theirs = getattr(self, field.name), getattr(other, field.name)
             if mine != theirs:
-                short = isinstance(mine, str | int) and len(str(mine)) < 60
-                return f"{field.name} = {mine} there, {theirs} here" if short else f"another {field.name.replace('_', ' ')}"
+                if isinstance(mine, str | int) and len(str(mine)) < 60:
+                    return f"{field.name} = {mine} there, {theirs} here"
+                return f"another {field.name.replace('_', ' ')}"
         return ""
 
 
