@@ -54,8 +54,8 @@ PICTURED = ("altitude_error", "velocity_error", "angle_of_attack", "elevator_def
 """Signals of the picture of all flights."""
 
 SECTIONS = {
-    "summary": "Summary",
     "search": "Search",
+    "summary": "Summary",
     "worst": "Worst flights",
     "envelopes": "Envelopes",
     "distributions": "Distributions",
