@@ -38,7 +38,6 @@ OTHERS = {
 
 ELSEWHERE = {
     "hsv run case1 --namespace /veh1",
-    "ROS_DOMAIN_ID=7 hsv run case1",
     "hsv verify offline_design/baseline.yaml",
     "hsv design baseline",
     "hsv montecarlo case1 --corners",
