@@ -136,7 +136,7 @@ def _refuse_duplicates(processes, files):
         assert refused.returncode == 2 and len(errors) == 1, said
         assert re.search("another node (publishes|is called) /", errors[0]), said
     run = processes.run("hsv", "run", "case1", "--no-report", "--bag", processes.folder / "other")
-    assert run.returncode == 1 and "expected no other" in run.stdout and len(run.stdout.splitlines()) == 1, run.stdout
+    assert run.returncode == 2 and "expected no other" in run.stdout and len(run.stdout.splitlines()) == 1, run.stdout
     assert not (processes.folder / "other").exists()
 
 
