@@ -45,7 +45,8 @@ ELSEWHERE = {
     "hsv resilience --controllers case1 --faults elevator_loss",
 }
 """Long commands, and one on a file of the reader's. Others like them run in tests/graph/test_names.py,
-tests/flight/test_flown_checks.py, tests/design/test_agreement.py, tests/docs/test_blocks.py and tests/cli/test_resilience.py."""
+tests/flight/test_flown_checks.py, tests/design/test_agreement.py, tests/docs/test_blocks.py and
+tests/cli/test_resilience.py."""
 
 SAME = {f"hsv run case1 --bag bags/{name}": f"cp -r bags/case1_readme bags/{name}" for name in ("first", "case1")}
 """Flights that have already been flown under another name are copied."""
