@@ -122,7 +122,7 @@ def _record(data: memoryview, position: int) -> tuple[kinds.McapRecord | None, i
     end = start + length
     if end > len(data) or length > MAX_RECORD or opcode not in _KINDS:
         return None, end if opcode >= 0x80 and end <= len(data) else 0  # opcodes from 0x80 on are private
-    if opcode == Opcode.MESSAGE:  # by far the most records: read without the fields' own functions of the package
+    if opcode == Opcode.MESSAGE:  # nearly all records: the package would read each field of them by a function call
         if length < _MESSAGE.size:
             return None, 0
         channel, sequence, logged, published = _MESSAGE.unpack_from(data, start)

@@ -94,11 +94,11 @@ def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> 
         if design and TAU.name in own:
             design = design.with_tau(own[TAU.name])
         components = assemble_with(design, own)
-        check_duration(scenario, components)
+        check_times(scenario, components)
     return components
 
 
-def check_duration(scenario: Scenario, components: Components) -> None:
+def check_times(scenario: Scenario, components: Components) -> None:
     """Raise a ScenarioError if the duration of ``scenario`` is no number of periods of its ``components``.
 
     The window of a requirement must last a period, so that it has a step.

@@ -16,7 +16,7 @@ from hsv.flight.assembly import (
     assemble,
     assemble_flight,
     blamed_on,
-    check_duration,
+    check_times,
     design_parameters,
     scenario_parameters,
 )
@@ -58,7 +58,7 @@ def fly_variants(scenarios: Iterable[Scenario]) -> Iterator[Flight]:
                 variants = FlightVariants(scenario, design)
             with blamed_on(scenario):
                 built.append(variants.components(scenario))
-                check_duration(scenario, built[-1])
+                check_times(scenario, built[-1])
         # A group of its own for each, because the flights may be kept.
         yield from (each for each, _ in FlightGroup().fly(built)) if FlightGroup.takes(built) else map(fly, built)
 
