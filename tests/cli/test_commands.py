@@ -54,9 +54,9 @@ def test_the_list_of_commands_is_the_answer_to_no_command(hsv):
     ran = hsv()
     assert ran.out == hsv("--help").out
     assert len(VISIBLE) <= 33
-    listed = re.findall(r"^│ ([a-z]\S+) {2,}", ran.out, re.MULTILINE)
+    listed = re.findall(r"^  ([a-z]\S+) {2,}", ran.out, re.MULTILINE)
     assert sorted(listed) == sorted(VISIBLE)
-    assert all(f"─ {panel} ─" in ran.out for panel, _, _ in TREE if panel)
+    assert all(f"\n{panel}:\n" in ran.out for panel, _, _ in TREE if panel)
 
 
 def test_trim_and_linearise_of_another_vehicle_are_inside_its_envelope(hsv):

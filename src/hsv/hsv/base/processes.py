@@ -10,7 +10,6 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import mkdtemp
 from types import CodeType, FrameType
 from typing import Any, ParamSpec, TypeVar
 
@@ -105,6 +104,8 @@ def choose_log_folder() -> None:
         with suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
     if not folder or not os.access(folder, os.W_OK):
+        from tempfile import mkdtemp
+
         os.environ["ROS_LOG_DIR"] = mkdtemp(prefix="hsv_log_")
 
 

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer import Argument, Option
-from typer.core import TyperGroup
 
 from hsv.base.errors import CampaignError, RunError
 from hsv.base.units import UnitSystem, significant
 from hsv.cli import output
 from hsv.cli.options import (
+    Group,
     JsonOption,
     ScenarioArgument,
     SetOption,
@@ -43,7 +43,7 @@ RestartOption = Annotated[bool, Option("--restart", help="Discard existing resul
 PageOption = Annotated[bool, Option(help="Write a page next to the results.")]
 
 
-class _FlyByDefault(TyperGroup):
+class _FlyByDefault(Group):
     """A group of commands that runs ``fly`` unless the first word is one of its commands or a help option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

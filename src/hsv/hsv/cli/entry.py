@@ -44,6 +44,8 @@ def main() -> None:
     try:
         # SIGTERM then also ends child processes and removes temporary files, as Ctrl-C does.
         take_interrupts()
+        # pydantic searches the metadata of all installed packages for plugins, and no command needs one.
+        os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
         from hsv.cli.main import run
 
         run("hsv", COMMANDS, DESCRIPTION)

@@ -10,9 +10,10 @@ from typer import Argument, Option
 
 from hsv.base.errors import ParameterError
 from hsv.base.units import UnitSystem, parse_quantity
-from hsv.cli.options import GraphNamespaceOption, JsonOption, UnitsOption
+from hsv.cli.options import GraphNamespaceOption, Group, JsonOption, UnitsOption
 
 fault = typer.Typer(
+    cls=Group,
     no_args_is_help=True,
     help="""Inject, clear and list faults in a running flight, no matter how it was started.
 

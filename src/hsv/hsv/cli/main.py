@@ -20,6 +20,7 @@ from typer.core import TyperCommand
 
 import hsv
 from hsv.base.errors import HsvError, QuantityError, RunError, did_you_mean, one_of, reason
+from hsv.cli.options import Group
 from hsv.cli.output import Interrupted, console, report_error
 
 if TYPE_CHECKING:
@@ -71,11 +72,6 @@ class _StrictCommand(TyperCommand):
                 raise QuantityError(f"{parameter.opts[0]} = '': expected a text that is not empty")
         return super().parse_args(ctx, args)
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the help without boxes and types of flags, which take half of a narrow terminal."""
-        self.rich_markup_mode = None
-        super().format_help(ctx, formatter)
-
 
 def application(commands: Mapping[str, Command], *, prog: str = "hsv", listed: bool = False) -> typer.Typer:
     """Return a command line, and import the modules of its commands.
@@ -88,9 +84,10 @@ def application(commands: Mapping[str, Command], *, prog: str = "hsv", listed: b
     """
     app = typer.Typer(
         name=prog,
+        cls=Group,
         add_completion=False,
         pretty_exceptions_enable=False,
-        rich_markup_mode="rich",
+        rich_markup_mode=None,
         context_settings={"help_option_names": [*_HELP]},
         epilog="Exit codes: " + "; ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
     )

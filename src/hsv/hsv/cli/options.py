@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, and the checks of the files that they name."""
+"""Arguments, options and help that several commands share, and the checks of the files that they name."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import mkdtemp
-from typing import Annotated
+from typing import Annotated, Any
 
 from typer import Argument, Option
+from typer.core import TyperGroup
 
 from hsv.base.errors import ParameterError, reason
 from hsv.base.units import UnitSystem
@@ -31,6 +31,22 @@ SuppliedDesignOption = Annotated[Path | None, Option("--design", help="Design of
 SuppliedScenarioOption = Annotated[str | None, Option("--scenario", help="Scenario of a bag without attachments.")]
 TrustOption = Annotated[bool, Option("--trust", help="Run code that the file names, such as controllers.")]
 UnitsOption = Annotated[UnitSystem, Option(help="SI with degrees and percent, strict SI, or ft, ft/s, deg.")]
+
+
+class Group(TyperGroup):
+    """A group of commands whose help lists them by subject, each with the first paragraph of its description."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write names and descriptions of the commands that are not hidden, under the headings of their subjects."""
+        subjects: dict[str, list[tuple[str, str]]] = {}
+        width = max(map(len, self.commands))
+        for name, command in self.commands.items():
+            if not command.hidden:
+                heading = getattr(command, "rich_help_panel", None) or "Commands"
+                subjects.setdefault(heading, []).append((name.ljust(width), (command.help or "").split("\n\n")[0]))
+        for heading, rows in subjects.items():
+            with formatter.section(heading):
+                formatter.write_dl(rows)
 
 
 def check_target(path: Path, field: str, *suffixes: str) -> None:
@@ -75,6 +91,8 @@ def writing(path: Path, field: str) -> Iterator[None]:
 def _takes_files(folder: Path) -> bool:
     # To check the permissions is not enough: the file system may be read-only, or may not hold files.
     try:
+        from tempfile import mkdtemp
+
         Path(mkdtemp(dir=folder)).rmdir()
     except OSError:
         return False

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
-from rich.table import Table
 from rich.text import Text
 
 from hsv.base.errors import messages, visible
@@ -22,6 +21,7 @@ from hsv.base.units import UnitSystem, duration_in_words, in_system, significant
 
 if TYPE_CHECKING:
     from rich.progress import Progress
+    from rich.table import Table
 
     from hsv.bags.reader import Bag
 
@@ -189,6 +189,8 @@ def new_table(*headings: str, title: str = "", right: Collection[str] = (), head
     ``right`` are the headings of the columns of numbers, which are aligned on the right and do not wrap. The headings
     are printed if ``head`` is true.
     """
+    from rich.table import Table
+
     style: dict[str, Any] = {"title_justify": "left", "box": None, "pad_edge": False, "header_style": "bold"}
     table = Table(title=title or None, show_header=head, **style)
     for heading in headings:

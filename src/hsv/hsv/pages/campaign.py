@@ -34,10 +34,8 @@ from hsv.flight.limits import missed
 from hsv.flight.metrics import Group, is_share, metric_of, spaced
 from hsv.flight.search.rows import recorded_badness
 from hsv.model.plant import Plant
-from hsv.pages.campaign_plots import SURVIVAL, campaign_figure
 from hsv.pages.engine import Numbers, Plot, render, write_page
 from hsv.pages.picture import Picture, picture
-from hsv.pages.plots import Layout, inline_svg
 from hsv.pages.search import search_section
 from hsv.pages.text import capitalised, quantity, units_of
 
@@ -91,7 +89,6 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
     envelopes = _envelopes(results, flights, numbers)
     pictured = [plot for name in PICTURED for plot in envelopes if plot.name == f"envelope_{name}"]
     factors = sorted(results.campaign.factors, key=lambda factor: (not factor.values, factor.is_perturbation))
-    survival = partial(campaign_figure, {results.path.stem: results}, panels=[SURVIVAL], layout=Layout(size=(7.0, 2.5)))
     starts = [fault.start for fault in results.campaign.scenario.fault]
     shades = [(start, end) for start in starts if start < end]
     search = search_section(results, numbers) if searched else None
@@ -123,9 +120,7 @@ def campaign_page(results: Results, units: UnitSystem = UnitSystem.metric) -> st
         sentence=sentence(results),
         factors=factors,
         points=points(results),
-        survival={system: inline_svg(partial(survival, system)) for system in UnitSystem}
-        if len(results.campaign.grid) == 1
-        else {},
+        survival=_survival(results) if len(results.campaign.grid) == 1 else {},
         failed=failed and spaced(failed.name),
         lost=lost,
         sorted=failed and _sorted(results, failed, numbers),
@@ -231,6 +226,16 @@ def histogram(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         bins = distinct[0] + spacing * (np.arange(bars + 1) - 0.5) if bars <= BINS else bins
     counts, edges = np.histogram(values, bins)
     return counts, edges
+
+
+def _survival(results: Results) -> dict[UnitSystem, Markup]:
+    """Return the share of the flights that reach the end over the swept factor as SVG, by unit system."""
+    # Imported here, because matplotlib takes longer to load than the rest of the page to write.
+    from hsv.pages.campaign_plots import SURVIVAL, campaign_figure
+    from hsv.pages.plots import Layout, inline_svg
+
+    named, layout = {results.path.stem: results}, Layout(size=(7.0, 2.5))
+    return {u: inline_svg(partial(campaign_figure, named, u, [SURVIVAL], layout)) for u in UnitSystem}
 
 
 def _repeated(results: Results, worst: int) -> dict[str, Flight]:
