@@ -42,13 +42,15 @@ class FlowExecutor(SingleThreadedExecutor):
 
     def add_node(self, node: Node) -> bool:
         """Add a node with its present subscriptions; later ones are left to the base class."""
+        if not super().add_node(node):
+            return False  # the base class adds a node again while it is added
         for subscription in node.subscriptions:
             taken = (subscription.handle.take_message, subscription.msg_type, subscription.raw, subscription.callback)
             self._subscriptions.append(taken)
             # Announcements are left to the wait set. Recorded topics are swept: a message is recorded as it arrives.
             if subscription.raw or subscription.qos_profile.durability is not DurabilityPolicy.TRANSIENT_LOCAL:
                 self._flowing.append(taken)
-        return bool(super().add_node(node))
+        return True
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Sweep while messages arrive, up to ``SWEEPS`` times; then let the base class run a callback, if any is due.

@@ -247,8 +247,7 @@ class StepMessages:
             self._allocate(*layout)
             self._layout = layout
         front = (*signals.stamp, signals.step)[: len(self._front)]
-        for view, value in zip(self._views, (*front, *values), strict=True):
-            view[...] = value
+        self._row[0] = *front, *values
         return bytes(self._buffer)
 
     def _check(self, message: bytes) -> None:
@@ -279,7 +278,7 @@ class StepMessages:
         return self._faults
 
     def _allocate(self, lengths: Sequence[int], faults: tuple[ActiveFault, ...]) -> None:
-        """Allocate a message with sequences of these ``lengths`` and these ``faults``, and a view of its numbers."""
+        """Allocate a message with sequences of these ``lengths`` and these ``faults``, and a row of its numbers."""
         message = blank(self._store, self.type)
         if hasattr(message, "header"):
             message.header.frame_id = FRAME
@@ -297,8 +296,7 @@ class StepMessages:
         self._buffer = bytearray(data + bytes(-len(data) % WIRE_ALIGNMENT))
         structure = Structure(self._store.fielddefs, self.type, data)
         dtype = structure.select(self._front | {field: (field, size) for field, size in self._sent.items()})
-        row = np.frombuffer(self._buffer, dtype, 1, ENCAPSULATION)
-        self._views = [row[name].reshape(row[name].shape[1:]) for name in dtype.names or ()]
+        self._row = np.frombuffer(self._buffer, dtype, 1, ENCAPSULATION)
 
 
 def _size(signal: SignalType) -> int:

@@ -175,7 +175,7 @@ class DisturbanceMonitor:
 
     def __init__(self, design: ControlDesign, bounds: np.ndarray) -> None:
         """Watch flights of ``design``; ``bounds`` (2, 5) are the lower and upper ones of Delta, SI."""
-        self._polytope, (self._lower, self._upper) = design.polytope.data(), bounds
+        self._polytope, self._bounds = design.polytope.data(), bounds.T.tolist()
         self._expected, self._no_defect = np.zeros(N_STATES), np.zeros(N_STATES)
         self.reset()
 
@@ -189,7 +189,7 @@ class DisturbanceMonitor:
         self._expected[:N_RIGID], self._expected[N_RIGID:] = error, 0.0
         given = map(doubles, (self._expected, u - inputs.reference_input - inputs.nominal_input, self._no_defect))
         lib.hsv_nominal_advance(self._polytope.pointer, *inputs.estimate[:2], *given)
-        return bool(((delta < self._lower) | (delta > self._upper)).any())
+        return any(d < low or d > high for d, (low, high) in zip(delta.tolist(), self._bounds, strict=True))
 
 
 class TubeLaw(Controller):
