@@ -16,6 +16,8 @@ from cffi import FFI
 FOLDER = Path(__file__).parent
 # Fused multiply-add would change the bits of a flight. Automatic vectorisation by gcc only makes a flight slower.
 FLAGS = ["-std=gnu99", "-O3", "-g0", "-ffp-contract=off", "-fno-math-errno", "-fno-tree-vectorize"]
+# Python calls the functions by a table of cffi. As symbols of the library, they could not be inlined.
+FLAGS += ["-fvisibility=hidden"]
 # Warnings about the calling convention of vector types do not matter, because these do not leave the core.
 FLAGS += ["-Wno-psabi"]
 

@@ -35,16 +35,26 @@ void hsv_uniforms(int64_t seed, int64_t step, int64_t stream, int64_t draw, doub
     pair[1] = (double)(words[1] >> 11) * 0x1p-53;
 }
 
-/* Write two independent standard normal numbers, at most 8.6 in magnitude. */
+/* Write two independent standard normal numbers, at most 8.6 in magnitude, for each of at most 9 streams. Each stage is
+ * computed for all streams, so that the processor overlaps the independent numbers. */
+static inline void normals(int64_t seed, int64_t step, const int64_t *streams, int64_t draw, int count,
+                           double (*pairs)[2])
+{
+    double uniform[STATES][2], radius[STATES];
+    for (int i = 0; i < count; i++) hsv_uniforms(seed, step, streams[i], draw, uniform[i]);
+    /* The argument of the logarithm lies in (0, 1]. */
+    for (int i = 0; i < count; i++) radius[i] = __builtin_sqrt(-2.0 * hsv_logarithm(uniform[i][0] + 0x1p-53));
+    for (int i = 0; i < count; i++) {
+        double sine, cosine;
+        sine_cosine(6.283185307179586 * uniform[i][1], &sine, &cosine);
+        pairs[i][0] = radius[i] * cosine;
+        pairs[i][1] = radius[i] * sine;
+    }
+}
+
 void hsv_normals(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair)
 {
-    double uniform[2], sine, cosine;
-    hsv_uniforms(seed, step, stream, draw, uniform);
-    /* The argument of the logarithm lies in (0, 1]. */
-    const double radius = __builtin_sqrt(-2.0 * hsv_logarithm(uniform[0] + 0x1p-53));
-    sine_cosine(6.283185307179586 * uniform[1], &sine, &cosine);
-    pair[0] = radius * cosine;
-    pair[1] = radius * sine;
+    normals(seed, step, &stream, draw, 1, (double (*)[2])pair);
 }
 
 static inline double first_uniform(int64_t seed, int64_t step, int64_t stream, int64_t draw)

@@ -9,19 +9,22 @@
 #include "faults.h"
 #include "vehicle.h"
 
-/* Return the error b + n in step k; values that are constant in a flight are drawn in step 0. */
-static double sensor_error(const hsv_sensors *s, hsv_sensor_memory *m, int i, int64_t k, int64_t seed)
+static inline int is_noisy(const hsv_sensors *s, int i) { return s->noise[i] > 0.0 || s->drift_sigma[i] > 0.0; }
+
+/* Return the error b + n in step k, with two normal numbers "drawn" for white noise and drift; values that are constant
+ * in a flight are drawn in step 0. */
+static double sensor_error(const hsv_sensors *s, hsv_sensor_memory *m, int i, int64_t k, int64_t seed,
+                           const double *drawn)
 {
-    double drawn[2];
     if (k == 0) {
-        hsv_normals(seed, 0, SENSOR_CONSTANTS + i, 0, drawn);
-        m->bias = s->bias[i] + s->bias_sigma[i] * drawn[0];
-        m->scale = s->scale[i] + s->scale_sigma[i] * drawn[1];
+        double constant[2];
+        hsv_normals(seed, 0, SENSOR_CONSTANTS + i, 0, constant);
+        m->bias = s->bias[i] + s->bias_sigma[i] * constant[0];
+        m->scale = s->scale[i] + s->scale_sigma[i] * constant[1];
         m->walk = 0.0;
     }
     double error = m->bias;
-    if (s->noise[i] > 0.0 || s->drift_sigma[i] > 0.0) {
-        hsv_normals(seed, k, SENSOR_NOISE_STREAM + i, 0, drawn);
+    if (is_noisy(s, i)) {
         error += s->noise[i] * drawn[0];
         if (s->drift_sigma[i] > 0.0) {
             const double decay = s->drift_decay[i], share = root(maximum(1.0 - decay * decay, 0.0));
@@ -81,12 +84,18 @@ void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faul
                  const double *x, double *measurement)
 {
     const int64_t failing = hsv_begin_faults(faults, k, seed);
-    double pitch_error = 0.0;
+    double pitch_error = 0.0, drawn[STATES][2], *next = *drawn;
+    int64_t streams[STATES];
+    int noisy = 0;
+    for (int i = STATES - 1; i >= 0; i--)
+        if (sensors->on[i] && is_noisy(sensors, i)) streams[noisy++] = SENSOR_NOISE_STREAM + i;
+    normals(seed, k, streams, 0, noisy, drawn);
     /* In reverse order, because the angle of attack may need the error of the pitch angle, which comes after it. */
     for (int i = STATES - 1; i >= 0; i--) {
         measurement[i] = x[i];
         if (!sensors->on[i]) continue;
-        double error = sensor_error(sensors, &memory[i], i, k, seed);
+        double error = sensor_error(sensors, &memory[i], i, k, seed, next);
+        next += is_noisy(sensors, i) ? 2 : 0;
         if (i == PITCH)
             pitch_error = error;
         else if (i == ALPHA && sensors->inertial_angle_of_attack)
