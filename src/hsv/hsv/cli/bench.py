@@ -194,7 +194,7 @@ def against_imports(repeats: int) -> list[Figure]:
         _run(sys.executable, "-c", "import numpy")
 
     figures = []
-    for name, words, limit in (("help", ["--help"], 2.5), ("simulate", ["simulate", "case1"], 6.0)):
+    for name, words, limit in (("help", ["--help"], 1.8), ("simulate", ["simulate", "case1"], 6.0)):
         ours, theirs = interleaved(lambda words=words: _run(command, *words), import_numpy, repeats, clock)  # type: ignore[misc]
         what = f"processor time of hsv {' '.join(words)}"
         figures.append(Figure(f"startup_{name}", what, "python -c 'import numpy'", ours, theirs, limit))
