@@ -1,12 +1,12 @@
 """Controllers whose flights are repeatable byte for byte, and controllers whose flights are not."""
 
-import os
 import random
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from c_libraries import step_function
+from steady_controllers import OfTheProcess, Steady
 
 from hsv.base.errors import RunError
 from hsv.control.controller import StepKernel
@@ -17,29 +17,6 @@ from hsv.flight.repeatability import findings, under_load
 from hsv.flight.scenario import load_scenario
 
 STEPS = 100
-
-
-class Steady:
-    """Feedback with an integral of the pitch angle, which reset clears."""
-
-    PARAMETERS = ()
-
-    @classmethod
-    def from_parameters(cls, values, design):
-        return cls()
-
-    def __init__(self):
-        self.memory = SimpleNamespace(integral=0.0)
-
-    def reset(self):
-        self.memory.integral = 0.0
-
-    def step(self, inputs):
-        self.memory.integral += 0.02 * (inputs.estimate[3] - inputs.reference[3])
-        return inputs.reference_input + np.array([0.0, 0.05 * self.memory.integral + self.more(inputs)])
-
-    def more(self, inputs):
-        return 0.0
 
 
 class NotReset(Steady):
@@ -66,13 +43,6 @@ class Shared(Steady):
 
     def __deepcopy__(self, memo):
         return type(self)()
-
-
-class OfTheProcess(Steady):
-    """Depends on the process that it runs in."""
-
-    def more(self, inputs):
-        return 1e-12 * os.getpid()
 
 
 class Failing(Steady):
@@ -104,7 +74,7 @@ class CompiledStatic(Compiled):
 
 
 def scenario(controller):
-    name = controller if isinstance(controller, str) else f"{__name__}:{controller.__name__}"
+    name = controller if isinstance(controller, str) else f"{controller.__module__}:{controller.__name__}"
     return load_scenario("case1", {"controller": name, "duration": "2 s", "fault": []})
 
 
