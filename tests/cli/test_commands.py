@@ -59,6 +59,13 @@ def test_the_list_of_commands_is_the_answer_to_no_command(hsv):
     assert all(f"\n{panel}:\n" in ran.out for panel, _, _ in TREE if panel)
 
 
+@pytest.mark.parametrize("group", ["fault", "montecarlo"])
+def test_a_group_without_a_command_prints_its_help(hsv, group):
+    ran = hsv(group)
+    assert ran.code == 2 and not ran.err
+    assert ran.out == hsv(group, "--help").out
+
+
 def test_trim_and_linearise_of_another_vehicle_are_inside_its_envelope(hsv):
     envelope = load_vehicle("winged_cone")
     words = ("--vehicle", "winged_cone", "--json")

@@ -43,7 +43,7 @@ class FlowExecutor(SingleThreadedExecutor):
     def add_node(self, node: Node) -> bool:
         """Add a node with its present subscriptions; later ones are left to the base class."""
         if not super().add_node(node):
-            return False  # the base class adds a node again while it is added
+            return False  # rclpy sets node.executor while it adds a node, which calls this a second time
         for subscription in node.subscriptions:
             taken = (subscription.handle.take_message, subscription.msg_type, subscription.raw, subscription.callback)
             self._subscriptions.append(taken)

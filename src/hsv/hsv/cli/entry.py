@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import sys
 from typing import NamedTuple
@@ -45,8 +44,6 @@ def main() -> None:
     try:
         # SIGTERM then also ends child processes and removes temporary files, as Ctrl-C does.
         take_interrupts()
-        # By default, objects in circles are searched for 140 times while modules are loaded; there are hardly any.
-        gc.set_threshold(100_000)
         # pydantic searches the metadata of all installed packages for plugins, and no command needs one.
         os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
         from hsv.cli.main import run

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
-from typer import Argument, Option
+from typer import Argument, Option, echo
 from typer.core import TyperGroup
 
 from hsv.base.errors import ParameterError, reason
@@ -35,6 +35,13 @@ UnitsOption = Annotated[UnitSystem, Option(help="SI with degrees and percent, st
 
 class Group(TyperGroup):
     """A group of commands whose help lists them by subject, each with the first paragraph of its description."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Print the help, with exit code 2, if a group that needs a command is given none."""
+        if not args and self.no_args_is_help:
+            echo(ctx.get_help())
+            ctx.exit(2)
+        return super().parse_args(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write names and descriptions of the commands that are not hidden, under the headings of their subjects."""

@@ -84,9 +84,9 @@ void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faul
                  const double *x, double *measurement)
 {
     const int64_t failing = hsv_begin_faults(faults, k, seed);
-    double pitch_error = 0.0, drawn[STATES][2], *next = *drawn;
+    double pitch_error = 0.0, drawn[STATES + 1][2]; /* the last pair is not used */
     int64_t streams[STATES];
-    int noisy = 0;
+    int noisy = 0, next = 0;
     for (int i = STATES - 1; i >= 0; i--)
         if (sensors->on[i] && is_noisy(sensors, i)) streams[noisy++] = SENSOR_NOISE_STREAM + i;
     normals(seed, k, streams, 0, noisy, drawn);
@@ -94,8 +94,8 @@ void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faul
     for (int i = STATES - 1; i >= 0; i--) {
         measurement[i] = x[i];
         if (!sensors->on[i]) continue;
-        double error = sensor_error(sensors, &memory[i], i, k, seed, next);
-        next += is_noisy(sensors, i) ? 2 : 0;
+        double error = sensor_error(sensors, &memory[i], i, k, seed, drawn[next]);
+        if (is_noisy(sensors, i)) next++;
         if (i == PITCH)
             pitch_error = error;
         else if (i == ALPHA && sensors->inertial_angle_of_attack)
