@@ -44,7 +44,7 @@ def main() -> None:
     try:
         # SIGTERM then also ends child processes and removes temporary files, as Ctrl-C does.
         take_interrupts()
-        # pydantic searches the metadata of all installed packages for plugins, and no command needs one.
+        # Without plugins, here and in child processes, pydantic need not search all installed packages for them.
         os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
         from hsv.cli.main import run
 

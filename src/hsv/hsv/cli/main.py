@@ -170,7 +170,7 @@ def run(prog: str, commands: Mapping[str, Command], description: str) -> None:
         sys.exit(code)
     except SystemExit:
         if {*_HELP} & {*words}:
-            _end(0)  # rich ends with 1 if the reader of a help has read enough
+            _end(0)  # typer ends with 1 if the reader of a help has read enough
         raise
     except UsageError as error:
         _fail(_usage(error, prog), 2)

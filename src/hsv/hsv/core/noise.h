@@ -52,6 +52,7 @@ static inline void normals(int64_t seed, int64_t step, const int64_t *streams, i
     }
 }
 
+/* Write two independent standard normal numbers of one stream. */
 void hsv_normals(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair)
 {
     normals(seed, step, &stream, draw, 1, (double (*)[2])pair);

@@ -11,8 +11,8 @@
 
 static inline int is_noisy(const hsv_sensors *s, int i) { return s->noise[i] > 0.0 || s->drift_sigma[i] > 0.0; }
 
-/* Return the error b + n in step k, with two normal numbers "drawn" for white noise and drift; values that are constant
- * in a flight are drawn in step 0. */
+/* Return the error b + n in step k. Two normal numbers are given for white noise and drift, or NULL to a sensor without
+ * them; values that are constant in a flight are drawn in step 0. */
 static double sensor_error(const hsv_sensors *s, hsv_sensor_memory *m, int i, int64_t k, int64_t seed,
                            const double *drawn)
 {
@@ -24,7 +24,7 @@ static double sensor_error(const hsv_sensors *s, hsv_sensor_memory *m, int i, in
         m->walk = 0.0;
     }
     double error = m->bias;
-    if (is_noisy(s, i)) {
+    if (drawn) {
         error += s->noise[i] * drawn[0];
         if (s->drift_sigma[i] > 0.0) {
             const double decay = s->drift_decay[i], share = root(maximum(1.0 - decay * decay, 0.0));
@@ -84,7 +84,7 @@ void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faul
                  const double *x, double *measurement)
 {
     const int64_t failing = hsv_begin_faults(faults, k, seed);
-    double pitch_error = 0.0, drawn[STATES + 1][2]; /* the last pair is not used */
+    double pitch_error = 0.0, drawn[STATES][2];
     int64_t streams[STATES];
     int noisy = 0, next = 0;
     for (int i = STATES - 1; i >= 0; i--)
@@ -94,8 +94,7 @@ void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faul
     for (int i = STATES - 1; i >= 0; i--) {
         measurement[i] = x[i];
         if (!sensors->on[i]) continue;
-        double error = sensor_error(sensors, &memory[i], i, k, seed, drawn[next]);
-        if (is_noisy(sensors, i)) next++;
+        double error = sensor_error(sensors, &memory[i], i, k, seed, is_noisy(sensors, i) ? drawn[next++] : NULL);
         if (i == PITCH)
             pitch_error = error;
         else if (i == ALPHA && sensors->inertial_angle_of_attack)
